@@ -48,8 +48,8 @@ from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program, Slid
-from roughvisc.mechanics.stepping.scene import ControllerState, Instant, State, Step, Trajectory, Uncertainty
 from roughvisc.mechanics.stepping.seed import march_seed
+from roughvisc.mechanics.stepping.state import ControllerState, Instant, State, Step, Trajectory, Uncertainty
 from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.problem import Problem

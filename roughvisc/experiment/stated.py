@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.arrays import over_rows
 from roughvisc.mechanics.contact.neighbours import area_bounds, staircase
 from roughvisc.mechanics.stepping.program import Slid
-from roughvisc.mechanics.stepping.scene import Scene, Step
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import Step
 from roughvisc.mechanics.stepping.step import segment_number
 from roughvisc.mechanics.stepping.tangential import force_across, tangential_force
 

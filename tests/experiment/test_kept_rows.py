@@ -13,7 +13,8 @@ from roughvisc.mechanics.bodies.body import body_of
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.sparse import Sparse, Sum
-from roughvisc.mechanics.stepping.scene import Instant, Scene, State, Step, Uncertainty
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import Instant, State, Step, Uncertainty
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowsInMemory
 from roughvisc.settings import Settings

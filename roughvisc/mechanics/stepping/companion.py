@@ -20,11 +20,11 @@ from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import (
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import (
     ControllerState,
     Guess,
     Instant,
-    Scene,
     State,
     Step,
     Trajectory,

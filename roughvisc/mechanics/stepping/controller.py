@@ -16,7 +16,8 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import STIFF, Rule
 from roughvisc.mechanics.materials.prony import Prony, by_size
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import Scene, State, Trajectory, Trial
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import State, Trajectory, Trial
 
 Array = NDArray[np.float64]
 # Ages at which the weight of a step is tabulated, over the shortest time of the material, and how many in a decade.

@@ -38,8 +38,9 @@ from roughvisc.mechanics.stepping.controller import (
     suggestion,
 )
 from roughvisc.mechanics.stepping.program import Segment
-from roughvisc.mechanics.stepping.scene import NO_FIELD, Guess, Scene, State, Step, Trial
+from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.slide_march import through_slide
+from roughvisc.mechanics.stepping.state import NO_FIELD, Guess, State, Step, Trial
 from roughvisc.mechanics.stepping.step import (
     accept,
     carried_into_step,

@@ -19,7 +19,8 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.sparse import Sparse, Sum
-from roughvisc.mechanics.stepping.scene import UNKNOWN, Instant, Scene, State, Step
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import UNKNOWN, Instant, State, Step
 from roughvisc.mechanics.stepping.step import at_edge, edge_error, work_between
 
 Array = NDArray[np.float64]

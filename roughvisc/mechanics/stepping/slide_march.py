@@ -24,11 +24,11 @@ from roughvisc.mechanics.stepping.companion import (
 )
 from roughvisc.mechanics.stepping.controller import rule_for
 from roughvisc.mechanics.stepping.program import Segment, Slid, Slide, instant
-from roughvisc.mechanics.stepping.scene import (
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import (
     AnyTrajectory,
     Guess,
     Instant,
-    Scene,
     State,
     Step,
     Trajectory,

@@ -19,13 +19,13 @@ from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
-from roughvisc.mechanics.stepping.scene import (
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import (
     NO_FIELD,
     AnyTrajectory,
     ControllerState,
     Guess,
     Instant,
-    Scene,
     State,
     Step,
     Trajectory,

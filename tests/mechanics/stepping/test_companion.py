@@ -14,7 +14,8 @@ from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping import companion
 from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.scene import ControllerState, Instant, Scene, State, Step, Uncertainty
+from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping.state import ControllerState, Instant, State, Step, Uncertainty
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {

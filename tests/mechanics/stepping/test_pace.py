@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roughvisc.mechanics.stepping.scene import ControllerState
+from roughvisc.mechanics.stepping.state import ControllerState
 
 errors = st.floats(1e-12, 1e3)
 

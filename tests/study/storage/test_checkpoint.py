@@ -28,7 +28,7 @@ from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.sparse import Sparse
-from roughvisc.mechanics.stepping.scene import ControllerState, Instant, State
+from roughvisc.mechanics.stepping.state import ControllerState, Instant, State
 from roughvisc.problem import Problem
 from roughvisc.recorder import Checkpoint, MemoryRecorder
 from roughvisc.settings import Settings
