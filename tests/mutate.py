@@ -33,7 +33,7 @@ ROOMS = {
     "contact": (("mechanics/contact",), ("mechanics/contact", "mechanics/test_contact.py")),
     "stepping": (
         tuple(f"mechanics/stepping/{name}.py" for name in (
-            "companion", "controller", "energy", "march", "scene", "step",
+            "companion", "controller", "energy", "march", "scene", "state", "step",
         )),
         ("mechanics/stepping", "study/storage/test_checkpoint.py", "test_convergence.py"),
     ),
