@@ -53,7 +53,8 @@ class Entry:
         Whether it is an attribute of a result, unless it is None.
     always_in_key : bool
         Whether the key of a case includes it even if it has its default value. This must be False for a new setting, so
-        that the keys of existing cases do not change.
+        that the keys of existing cases do not change. It has no effect in ``[surface]``, whose keys
+        count but for those of ``_LATER`` in :mod:`roughvisc.study.statement.identity`.
     only_over : str
         Name of the axis whose experiments have it; empty: all experiments.
     check : callable, optional
@@ -212,11 +213,17 @@ class Settings(Numerics):
         "times in the result: all steps, a number of times (denser after each corner), or a list",
         "50",
         table="keep",
+        always_in_key=True,
         only_over="time",
         check=_times,
     )
     fields: Sequence[str] = setting(
-        ("pressure", "gap"), "fields in the result", '["pressure", "gap"]', table="keep", check=_fields
+        ("pressure", "gap"),
+        "fields in the result",
+        '["pressure", "gap"]',
+        table="keep",
+        always_in_key=True,
+        check=_fields,
     )
     missing: Missing = setting(
         "refuse",

@@ -23,14 +23,8 @@ from roughvisc.errors import InputError
 from roughvisc.topography.orientation import top_line_first
 from roughvisc.topography.separated_values import separated_by_blanks
 
-#: Formats that other libraries than SurfaceTopography read here.
-OWN_SUFFIXES: dict[str, tuple[str, ...]] = {
-    "x3p": ("x3p",),
-    "sdf": ("sdf",),
-    "csv": ("csv",),
-    "nc": ("nc", "nc4", "cdf", "hdf5", "zarr"),
-    "card": ("toml",),
-}
+#: Formats that are opened elsewhere, and their suffixes: grid files and surface cards.
+ELSEWHERE: dict[str, tuple[str, ...]] = {"nc": ("nc", "nc4", "cdf", "hdf5", "zarr"), "card": ("toml",)}
 _TEXT = ("xyz", "asc")
 #: Where suffixes are shared by formats: those to try, in this order.
 _SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
@@ -111,8 +105,8 @@ def open_instrument(path: Path, format: str | None) -> Opened:
 
         format = detect_format(str(path))
     suffix = path.suffix.lower().removeprefix(".")
-    for name, read in READERS.items():
-        if format == name or (format is None and suffix in OWN_SUFFIXES[name]):
+    for name, (theirs, read) in READERS.items():
+        if format == name or (format is None and suffix in theirs):
             return read(path)
     candidates = (format,) if format else formats_of(path)
     if candidates == ("npy",):  # SurfaceTopography does not close these
@@ -144,14 +138,19 @@ def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Open
     InputError
         If the name or a suffix belongs to a format that roughvisc reads itself.
     """
-    theirs = {suffix for name in _BUILT_IN for suffix in OWN_SUFFIXES[name]}
+    theirs = {suffix for name in _BUILT_IN for suffix in own_suffixes()[name]}
     given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
     if format in _BUILT_IN or theirs & set(given):
         raise InputError(
             f"format {format!r} with suffixes {', '.join(given) or 'none'}: expected others than the formats "
             f"{', '.join(sorted(_BUILT_IN))} and their suffixes {', '.join(sorted(theirs))}"
         )
-    READERS[format], OWN_SUFFIXES[format] = read, given
+    READERS[format] = given, read
+
+
+def own_suffixes() -> dict[str, tuple[str, ...]]:
+    """Format -> suffixes without the dot, of what SurfaceTopography does not read here."""
+    return {name: theirs for name, (theirs, _) in READERS.items()} | ELSEWHERE
 
 
 def suffixes() -> dict[str, tuple[str, ...]]:
@@ -160,7 +159,7 @@ def suffixes() -> dict[str, tuple[str, ...]]:
 
     theirs = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
     theirs["di"] = (*theirs["di"], "di", "000 to 999")
-    return {**theirs, **OWN_SUFFIXES}
+    return {**theirs, **own_suffixes()}
 
 
 def formats_of(path: Path) -> tuple[str, ...]:
@@ -260,9 +259,13 @@ def _csv(path: Path) -> Opened:
     return replace(_surface_topography(path, "asc"), format="csv")
 
 
-#: Format -> what reads the header of its files; of those that SurfaceTopography does not read here.
-READERS: dict[str, Callable[[Path], Opened]] = {"x3p": _x3p, "sdf": _sdf, "csv": _csv}
-_BUILT_IN = frozenset(OWN_SUFFIXES)
+#: Format -> suffixes without the dot, and what reads the header; of files that SurfaceTopography does not read here.
+READERS: dict[str, tuple[tuple[str, ...], Callable[[Path], Opened]]] = {
+    "x3p": (("x3p",), _x3p),
+    "sdf": (("sdf",), _sdf),
+    "csv": (("csv",), _csv),
+}
+_BUILT_IN = frozenset(own_suffixes())
 
 
 def _npy(path: Path) -> Opened:
@@ -291,7 +294,7 @@ def _surface_topography(path: Path, format: str) -> Opened:
     from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
 
     if format not in lookup_reader_by_format:
-        known = sorted({*lookup_reader_by_format, *OWN_SUFFIXES})
+        known = sorted({*lookup_reader_by_format, *own_suffixes()})
         raise InputError(f"format is {format!r}: expected one of {', '.join(known)}, or 'auto'")
     reader = lookup_reader_by_format[format](separated_by_blanks(path) if format in _TEXT else str(path))
     theirs = list(reader.channels)

@@ -270,7 +270,7 @@ def _is_grid(path: Path, format: str | None) -> bool:
     suffix = path.suffix.lower().removeprefix(".")
     if format is None and suffix == "h5":  # a grid written by way of HDF5, or an instrument's
         return gridfiles.is_labelled(path)
-    return format == _GRID or (format is None and suffix in instruments.OWN_SUFFIXES[_GRID])
+    return format == _GRID or (format is None and suffix in instruments.ELSEWHERE[_GRID])
 
 
 @contextmanager

@@ -537,8 +537,7 @@ def test_ground_steel__script_writes_the_file_that_ships(tmp_path):
 
 
 def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
-    for table in ("READERS", "OWN_SUFFIXES"):
-        monkeypatch.setattr(instruments, table, dict(getattr(instruments, table)))
+    monkeypatch.setattr(instruments, "READERS", dict(instruments.READERS))
     heights = np.arange(12.0).reshape(4, 3) * 1e-6
 
     def read(path):
@@ -555,6 +554,24 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     for format, suffixes in (("x3p", ["a"]), ("mine", ["toml"])):
         with pytest.raises(InputError, match="expected others than the formats"):
             instruments.add_format(format, suffixes, read)
+
+
+def test_entry_in_the_table_of_readers__is_all_that_a_format_needs(tmp_path, monkeypatch):
+    heights = np.arange(12.0).reshape(4, 3) * 1e-6
+
+    def read(path):
+        channel = instruments.Channel(0, "height", True, heights.shape, "m")
+        return instruments.Opened("ours", (channel,), lambda *_: (heights, (1e-6, 2e-6)))
+
+    monkeypatch.setattr(instruments, "READERS", {"ours": (("our",), read), **instruments.READERS})
+    (tmp_path / "a.our").write_text("x")
+    assert np.array_equal(open_scan(tmp_path / "a.our").values, heights)
+    assert supported_formats()["ours"] == ("our",)
+    np.save(tmp_path / "a.npy", heights)
+    other = open_scan(tmp_path / "a.npy", unit="m", spacing=1e-6)
+    assert np.array_equal(other.values, heights.T)  # a suffix that comes after it
+    with pytest.raises(InputError, match="ours"):
+        open_scan(tmp_path / "a.our", format="none such")
 
 
 def test_points_without_units__are_asked_for_both(tmp_path):

@@ -231,11 +231,15 @@ def choose_body_memory(
     Raises
     ------
     InputError
-        As there; and if a direct history of waves is asked for.
+        As there; if a direct history of waves is asked for; and if no memory is known for the body.
     """
     if body.separates:
         return choose_memory(body.material, duration, tolerance, acts_on, kind, shortest)
-    assert isinstance(body, LayeredBody)
+    if not isinstance(body, LayeredBody):
+        raise InputError(
+            f"material is a {type(body).__name__} in which space and time do not separate, and no memory is known for "
+            "it: expected the body that layer() makes, or a Body whose kernel is constant in time"
+        )
     if kind == "direct":
         raise InputError(
             f"memory is 'direct' and the body is {body!r}, in which space and time do not separate: expected 'auto'"

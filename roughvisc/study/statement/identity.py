@@ -31,6 +31,9 @@ _PROSE = {
     "sha256",
     "synthetic",
 }
+#: Keys of ``[solve]`` and ``[keep]`` that count at their defaults too. No new key does, so that the keys of former
+#: cases stay. The precision of the file is a key of ``[keep]`` and no setting of a solve.
+_ALWAYS = {name for name, entry in ENTRIES.items() if entry.always_in_key} | {"precision"}
 #: Keys of a surface that came later: where they are absent they do not count, so that the keys of former cases stay.
 _LATER = {"shortest_wave", "realisation"}
 
@@ -48,10 +51,9 @@ def identity(settings: Study) -> tuple[str, str]:
         exclude={"title", "audit", "observe", "want", "program", "surface", "material", *EXPERIMENTS},
         serialize_as_any=True,
     )
-    usual = type(settings.solve)().model_dump(mode="json")
-    stated["solve"] = {
-        key: value for key, value in stated["solve"].items() if ENTRIES[key].always_in_key or value != usual[key]
-    }
+    for table, section in (("solve", settings.solve), ("keep", settings.keep)):
+        usual = type(section)().model_dump(mode="json")
+        stated[table] = {key: value for key, value in stated[table].items() if key in _ALWAYS or value != usual[key]}
     experiment = settings.experiment()
     stated[experiment.table] = experiment.content()
     stated["material"] = settings.material.content()

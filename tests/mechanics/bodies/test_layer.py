@@ -91,6 +91,15 @@ def test_layer__lies_on_another_one():
     assert rv.layer(soft, math.inf, on=base) == rv.Body(soft)
 
 
+def test_body_of_the_users_own__that_does_not_separate_is_refused():
+    class Aged(rv.Body):
+        separates = False
+
+    ball, press = rv.sphere(1e-3, 2e-4, 45), rv.Program().load(1e-4, over=0.1)
+    with pytest.raises(InputError, match=r"Aged in which space and time do not separate.*expected the body"):
+        rv.simulate(ball, Aged(rv.zener(3e6, 1e6, 1e5)), press, progress=False)
+
+
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("speed", [2e-3, 0.1])
 def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, turned):

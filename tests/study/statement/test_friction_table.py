@@ -1,5 +1,7 @@
 """``[friction]`` in a study: what it takes, what it refuses, and what identifies its case."""
 
+from types import SimpleNamespace
+
 import pytest
 from support import BALL
 
@@ -108,6 +110,31 @@ def digested(monkeypatch, case):
     monkeypatch.setattr(identity_module, "_digest", lambda stated: seen.append(stated) or digest(stated))
     identity_module.identity(case.settings)
     return next(one for one in seen if "numerics" in one)
+
+
+@pytest.mark.parametrize("table", ["solve", "keep"])
+def test_key__does_not_change_by_a_new_setting_at_its_default(table, tmp_path):
+    (tmp_path / "ball.toml").write_text(BALL)
+    settings = read_study(tmp_path / "ball.toml").settings
+    former, _ = identity_module.identity(settings)
+
+    class WithNewKey(type(getattr(settings, table))):
+        added: int = 3
+
+    def key(**stated):
+        section = WithNewKey(**dict(getattr(settings, table)), **stated)
+        return identity_module.identity(settings.model_copy(update={table: section}))[0]
+
+    assert key() == former
+    assert key(added=4) != former
+
+
+def test_key__counts_the_first_keys_of_what_is_kept_at_their_defaults_too(tmp_path, monkeypatch):
+    (tmp_path / "ball.toml").write_text(BALL)
+    settings = read_study(tmp_path / "ball.toml").settings
+    usual = settings.model_copy(update={"keep": type(settings.keep)()})
+    stated = digested(monkeypatch, SimpleNamespace(settings=usual))
+    assert stated["keep"] == {"fields": ["pressure", "gap"], "times": "all", "precision": None}
 
 
 def test_key__of_a_program_knows_nothing_of_friction(tmp_path, monkeypatch):
