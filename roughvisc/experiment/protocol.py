@@ -125,6 +125,8 @@ class Experiment(Protocol):
     states_grid_error : bool
         Whether its rows state the error of the grid themselves; that of any other is found by doing all of it again
         on coarser grids.
+    convolution_cost : float
+        Time of one of its convolutions, with all that goes with it, over that of one in a contact problem.
     """
 
     axis: ClassVar[str]
@@ -134,6 +136,7 @@ class Experiment(Protocol):
     boundary: ClassVar[Boundary | None] = None
     states: ClassVar[tuple[type, ...]] = ()
     states_grid_error: ClassVar[bool] = False
+    convolution_cost: ClassVar[float] = 1.0
 
     @abstractmethod
     def rows(self, problem: Problem, state: Any = None, *, in_memory: bool = True) -> Rows:

@@ -474,7 +474,7 @@ def _general_row(ahead: _Ahead, stopwatch: ConvolutionTimer, there: Available) -
         "nominal_pressure": nominal,
         "full_contact_pressure": relaxed,
         "warning": full_contact_warning(nominal, relaxed),
-        "wall_time": found.convolutions * convolution
+        "wall_time": found.convolutions * convolution * experiment.convolution_cost
         + found.rows * stopwatch.beside(found.coarse_run, settings.boundary, body.kernel),
         "disk": disk(case, height.size, found),
     }
