@@ -229,3 +229,27 @@ def test_self_influence__with_periodic_boundaries_is_the_mean_of_the_symbol():
     qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((7, 6), (1.3, 0.7), strict=True))
     q = np.hypot(qx[:, None], qy).ravel()[1:]
     assert found == pytest.approx((2 / q).sum() / 42, rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
+def test_turned_spectrum__is_that_of_the_field_seen_from_farther(shape):
+    """Of a periodic field: cell ``i`` shows what was at ``i + cells``."""
+    operator = Operator(shape, (1.0, 2.0), "periodic")
+    field = np.random.default_rng(3).random(shape)
+    for axis, cells in [(0, 1), (0, -4), (1, 3), (1, -1)]:
+        turned = operator.spectrum(field) * operator.turn(cells, axis)
+        np.testing.assert_allclose(operator.field_of(turned), np.roll(field, -cells, axis), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_parseval__gives_the_work_of_a_pressure_on_its_displacement(shape, mirrored, boundary):
+    operator = Operator(shape, (1.0, 2.0), boundary, mirrored=mirrored)
+    pressure = np.random.default_rng(4).random(shape)
+    displacement = operator.displacement(pressure)
+    spectrum = operator.spectrum(pressure)
+    response = spectrum.copy()
+    operator.multiply(response, operator.symbol_of(operator.kernel))
+    found = float(np.sum(operator.parseval * (spectrum * response.conj()).real))
+    assert found == pytest.approx(float((pressure * displacement).sum()) * operator.cell_area)
