@@ -132,7 +132,7 @@ _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
 #: What an octave counts over the one before: grids that hold the shortest waves need hardly more iterations on finer
 #: cells. Measured with rough surfaces up to 1024 squared by the benchmark.
 _FADING = 0.7
-#: A coarse march ends after so many convolutions, or steps, which take about three seconds: counts, so that what is
+#: A coarse march ends after so many convolutions, or steps, which take three to six seconds: counts, so that what is
 #: foretold does not depend on how busy the machine is.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 20_000, 3_000
 #: Seconds for timing solves, in all and of one grid, which may be narrow and then takes a few milliseconds. [s, cells]
@@ -343,9 +343,9 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         grid -= 1
     while grid < last and pressed(grid, first.push).at_border:
         grid += 1
-    sides = coarse_sides(shapes[grid])
-    if (grid, sides) != (coarsely, (coarser, finer)):
-        coarser, finer = sides
+    first_on = (coarsely, coarser)
+    coarser, finer = coarse_sides(shapes[grid])
+    if (grid, coarser) != first_on:
         first = marched(grid, coarser)
     second = marched(grid, finer)
     if not second.whole and first.course[-1].time > second.course[-1].time:
