@@ -1,13 +1,14 @@
 """Whether many small cases are faster in one process together, as stacks of fields, than one after the other.
 
-    OPENBLAS_NUM_THREADS=1 python workflows/benchmarks/batched.py [CELLS ...]
+    OPENBLAS_NUM_THREADS=1 python workflows/benchmarks/batched.py [CELLS ...] [--sweep COUNT]
 
 Prints the processor time of a creep case by its parts, of transforms and passes over a stack, and of 16 contact
-problems solved in lockstep. Two processes measure at the same time, since a sweep keeps all cores busy.
+problems solved in lockstep. Two processes measure at the same time, since a sweep keeps all cores busy. `--sweep`: only
+contact problems, so many by both processes together, one by one and in stacks of 16.
 """
 
+import argparse
 import multiprocessing
-import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
@@ -19,6 +20,7 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.experiment.resources import keep_memory
+from roughvisc.mechanics.arrays import blocks
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.stepping import step
@@ -102,7 +104,7 @@ def stacked(cells, count, repeats):
     }
 
 
-def in_lockstep(cells, count, repeats, tolerance=1e-5):
+def in_lockstep(cells, count, repeats, tolerance=1e-5, stack=16):
     """Time of contact problems one after the other over that in lockstep, and what both are off by (L1)."""
     operator = Operator((cells, cells), (1e-3 / cells, 1e-3 / cells), "periodic")
     heights = np.array([rough(cells, seed).values for seed in range(count)])
@@ -117,7 +119,7 @@ def in_lockstep(cells, count, repeats, tolerance=1e-5):
         return [solve_contact(operator, gap, load=load, tolerance=tolerance).pressure / load for gap, load in given]
 
     def together():
-        return lockstep(scaled, kernel, tolerance)
+        return np.concatenate([lockstep(scaled[part], kernel, tolerance) for part in blocks(count, stack)])
 
     def error(found):
         return float(np.median(np.abs(np.reshape(found, exact.shape) - exact).sum(axis=(1, 2))))
@@ -128,8 +130,17 @@ def in_lockstep(cells, count, repeats, tolerance=1e-5):
     return {"contact": one / count, "lockstep_gain": one / all_at_once} | errors
 
 
+def sweep(cells, count, repeats=5):
+    keep_memory()
+    return [{"cells": n} | in_lockstep(n, count // 2, repeats) for n in cells]
+
+
 if __name__ == "__main__":
-    sizes = [int(cells) for cells in sys.argv[1:]] or [16, 64, 128]
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("cells", nargs="*", type=int, default=[16, 64, 128])
+    asked.add_argument("--sweep", metavar="COUNT", type=int, help="contact problems alone, so many")
+    given = asked.parse_args()
+    work = main if given.sweep is None else partial(sweep, count=given.sweep)
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        for rows in zip(*pool.map(main, [sizes, sizes]), strict=True):
+        for rows in zip(*pool.map(work, [given.cells, given.cells]), strict=True):
             print("  ".join(f"{name} {np.mean([row[name] for row in rows]):.3g}" for name in rows[0]))

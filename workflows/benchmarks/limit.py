@@ -5,7 +5,8 @@
 A convolution is a displacement or an application of the preconditioner. A bare pair is a transform of the cells, padded
 in free space, and its way back: in double precision, by the library that the package uses, with one thread. Each
 solve runs in a process of its own, in turn with that of another checkout where one is given. Printed are medians of
-processor time over the limit, of the contact solver alone (friction: of all) and of the whole call.
+processor time over the limit, of the contact solver alone (friction: of all) and of the whole call. A leak rate, which
+makes no convolution, is counted in bare pairs: between walls, with a tenth of the area in contact.
 """
 
 import argparse
@@ -22,15 +23,52 @@ CELLS = {
     "elastic": (64, 128, 256, 512, 1024, 2048, 4096),
     "friction": (64, 128, 256, 512),
     "ball": (128,),
+    "leak": (64, 128, 256, 512, 1024, 2048, 4096),
 }
 
 
 def measure(case, cells):
     """Seconds of one solve, of its contact problems, of a bare pair; and the number of convolutions."""
+    found = leak(cells) if case == "leak" else solved(case, cells)
+    return found | {"pair": bare_pair(cells, mirrored=case == "ball")}
+
+
+def bare_pair(cells, mirrored):
+    """Seconds of a transform and its way back; of the ball: of a quarter of twice as many a side, by cosines."""
     import numpy as np
 
-    import roughvisc as rv
     from roughvisc.mechanics.bodies import transforms
+
+    shape = (cells, cells)
+    along, field, pairs = transforms.transforms(mirrored), np.random.default_rng(1).random(shape), []
+    for _ in range(9 if cells <= 1024 else 3):
+        began, count = time.process_time(), 0
+        while count == 0 or time.process_time() - began < 0.05:
+            along.field_back(along.of_field(field, workers=1), s=shape, overwrite_x=True, workers=1)
+            count += 1
+        pairs.append((time.process_time() - began) / count)
+    return sorted(pairs)[len(pairs) // 2]
+
+
+def leak(cells):
+    """Seconds of a leak rate, as of one convolution."""
+    import roughvisc as rv
+    from roughvisc.mechanics.transport.flow import flow
+
+    rough = rv.self_affine(1.0, cells, hurst=0.8, rms_slope=0.1, rolloff=0.25, shortcut=8 / cells, seed=1)
+    settings = {"boundary": "periodic", "tolerance": 1e-3, "fields": ("gap",), "progress": False}
+    ds = rv.simulate(rough, rv.elastic(1.0), rv.Program().pressure(0.02, over=0), **settings)
+    gap, spacing = ds.gap[-1].values, (1 / cells, 1 / cells)
+    flow(gap[:64, :64], (1.0, 1.0))  # imports
+    began = time.process_time()
+    flow(gap, spacing)
+    spent = time.process_time() - began
+    return {"whole": spent, "convolutions": 1, "contact": (spent, 1)}
+
+
+def solved(case, cells):
+    """Seconds of a solve, of its contact problems; and the number of convolutions."""
+    import roughvisc as rv
     from roughvisc.mechanics.stepping import step
 
     def press(cells):
@@ -51,7 +89,7 @@ def measure(case, cells):
         )
 
     press(32)()  # imports
-    solve, solved = press(cells), []
+    solve, problems = press(cells), []
     if cells <= 512:
         solve()  # plans of the transforms
     inside = step.solve_contact
@@ -59,7 +97,7 @@ def measure(case, cells):
     def timed(*given, **named):
         began = time.process_time()
         found = inside(*given, **named)
-        solved.append((time.process_time() - began, found.convolutions))
+        problems.append((time.process_time() - began, found.convolutions))
         return found
 
     with mock.patch.object(step, "solve_contact", timed):
@@ -68,18 +106,10 @@ def measure(case, cells):
         whole = time.process_time() - began
     total = int(ds.roughvisc.cost.convolutions.sum())
 
-    shape = (cells, cells)  # of the ball: a quarter of twice as many a side, by cosines
-    along, field, pairs = transforms.transforms(case == "ball"), np.random.default_rng(1).random(shape), []
-    for _ in range(9 if cells <= 1024 else 3):
-        began, count = time.process_time(), 0
-        while count == 0 or time.process_time() - began < 0.05:
-            along.field_back(along.of_field(field, workers=1), s=shape, overwrite_x=True, workers=1)
-            count += 1
-        pairs.append((time.process_time() - began) / count)
-    contact = sum(seconds for seconds, _ in solved), sum(count for _, count in solved)
+    contact = sum(seconds for seconds, _ in problems), sum(count for _, count in problems)
     if case == "friction":
         contact = whole, total
-    return {"whole": whole, "convolutions": total, "contact": contact, "pair": sorted(pairs)[len(pairs) // 2]}
+    return {"whole": whole, "convolutions": total, "contact": contact}
 
 
 def in_process(checkout, case, cells):

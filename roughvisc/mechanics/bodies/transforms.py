@@ -88,9 +88,12 @@ def transforms(mirrored: bool) -> Transforms:
 
 
 def transform_library() -> str:
-    """What the last digits depend on: results are equal to the last bit only where this is the same."""
-    engine, version = ("ducc0", ducc.ducc0.__version__) if with_ducc0() else ("scipy.fft", scipy.__version__)
-    return f"{engine} {version}, numpy {np.__version__}"
+    """What the last digits depend on: results are equal to the last bit only where this is the same.
+
+    Kernels are sampled with SciPy in any case.
+    """
+    engine = f"ducc0 {ducc.ducc0.__version__}, scipy" if with_ducc0() else "scipy.fft"
+    return f"{engine} {scipy.__version__}, numpy {np.__version__}"
 
 
 def with_ducc0() -> bool:

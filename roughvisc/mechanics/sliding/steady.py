@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import threads_of
 from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.sliding.interior_point import solve_complementarity
 
 Array = NDArray[np.float64]
@@ -129,7 +131,7 @@ class Sliding:
         self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
-        self._threads = threads_of(nx * ny)
+        self._transforms, self._threads = transforms(mirrored=False), threads_of(nx * ny)
         #: Convolutions so far: forward and inverse transforms in pairs, those of the preconditioner too.
         self.convolutions = 0
         self.cell_area = dx * dy
@@ -140,21 +142,18 @@ class Sliding:
 
     def displacement(self, pressure: Array) -> Array:
         """Displacement of a pressure. [m]"""
-        return self._filtered(pressure, self.response)
+        return self._convolved(pressure, self.response)
 
     def full_contact(self, displacement: Array) -> Array:
         """Pressure of a displacement of all of the surface, to single precision: it is for a preconditioner. [Pa]"""
-        self.convolutions += 1
         symbol, unit = self._stiffness
         largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
-        waves = fft.rfftn((displacement / largest).astype(np.float32), workers=self._threads)
-        waves *= symbol
-        found = fft.irfftn(waves, s=self.shape, overwrite_x=True, workers=self._threads)
+        found = self._convolved((displacement / largest).astype(np.float32), symbol)
         return np.multiply(largest * unit, found, dtype=np.float64)
 
     def lagging(self, pressure: Array) -> Array:
         """Slope along x of the displacement out of phase. [-]"""
-        return self._filtered(pressure, self._skew * self._derivative)
+        return self._convolved(pressure, self._skew * self._derivative)
 
     def force_across(self, pressure: Array) -> float:
         r"""Force towards +y that keeps the profile on its path, :math:`-\int p\, \partial_y u\, \mathrm dA`. [N]
@@ -170,14 +169,15 @@ class Sliding:
         with the pressure adds nothing: its kernel is even, so that the sum over its slope is zero. What is left does
         not depend on how steeply the pressure ends at the edges of contact.
         """
-        inclined = self._filtered(pressure, self._skew * self._derivative_across)
+        inclined = self._convolved(pressure, self._skew * self._derivative_across)
         return -float((pressure * inclined).sum()) * self.cell_area
 
-    def _filtered(self, field: Array, symbol: NDArray[np.complex128]) -> Array:
+    def _convolved(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+        """Convolution in the precision of both."""
         self.convolutions += 1
-        waves = fft.rfftn(field, workers=self._threads)  # of the two-dimensional ones the axes are looked at each time
+        waves = self._transforms.of_field(field, workers=self._threads)
         waves *= symbol
-        return np.asarray(fft.irfftn(waves, s=self.shape, overwrite_x=True, workers=self._threads))
+        return self._transforms.field_back(waves, s=self.shape, overwrite_x=True, workers=self._threads)
 
 
 def steady_state(

@@ -41,7 +41,8 @@ _PARTS: dict[str, tuple[tuple[Any, str], ...]] = {
         *((kind, "__init__") for kind in (Operator, FarFieldDisplacement, Sliding)),
     ),
     "kept rows": ((loading.LoadingRows, "row"), (RowFile, "append")),
-    "files": ((run, "keep"), (CheckpointWriter, "save"), (CheckpointWriter, "resume")),
+    "checkpoints": ((CheckpointWriter, "save"), (CheckpointWriter, "resume")),
+    "result file": ((run, "keep"),),
 }
 REST = "stepping, figures and the rest"
 

@@ -6,10 +6,12 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies import ducc, transforms
+from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window
+from roughvisc.mechanics.sliding.steady import Sliding
 
 SHAPES = [(9, 15), (8, 14), (1, 11), (7, 1), (36, 25)]
 
@@ -77,6 +79,20 @@ def test_reach__is_the_same_by_both(mirrored, monkeypatch):
             )
         )
     np.testing.assert_allclose(found[0], found[1], rtol=1e-13)
+
+
+def test_sliding__is_the_same_by_both_and_goes_by_the_one_that_is_stated(monkeypatch):
+    pressure, body, calls, found = np.random.default_rng(0).random((15, 12)), Body(rv.zener(1e6, 1e6, 1e5)), [], []
+    sound = ducc.ducc0.fft.r2c
+    monkeypatch.setattr(ducc.ducc0.fft, "r2c", lambda *a, **kw: calls.append(a) or sound(*a, **kw))
+    for engine, by_ducc0 in (("scipy", 0), ("ducc0", 3)):
+        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
+        sliding = Sliding(body, pressure.shape, (1e-6, 2e-6), 0.1)
+        found.append((sliding.displacement(pressure), sliding.full_contact(pressure)))
+        assert sliding.convolutions == 3
+        assert len(calls) == by_ducc0
+    for (a, b), precision in zip(zip(*found, strict=True), (1e-14, 1e-5), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
 
 
 def test_threads__of_ducc0_are_those_of_scipy(by_ducc0, monkeypatch):

@@ -1,6 +1,7 @@
 """Steady sliding: against closed forms, against a dense solution of the same equations, and what must hold for any."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 
 LOSSY = {0.2: 0.48, 0.9: 4.4, 2.2: 20.0}  # the largest loss tangent: retarded over instantaneous compliance
@@ -238,12 +241,13 @@ def test_units__do_not_matter():
 @pytest.mark.parametrize(("shape", "threads"), [((33, 20), 1), ((1023, 1026), 2)])
 def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch):
     """Handing a small transform over takes ten times as long as the transform."""
-    used = set()
-    for name in ("rfftn", "irfftn"):
-        plain = getattr(fft, name)
-        monkeypatch.setattr(
-            fft, name, lambda *given, plain=plain, workers=None, **named: used.add(workers) or plain(*given, **named)
-        )
+    used, plain = set(), transforms(mirrored=False)
+
+    def watched(work):
+        return lambda *given, workers, **named: used.add(workers) or work(*given, workers=workers, **named)
+
+    both = replace(plain, of_field=watched(plain.of_field), field_back=watched(plain.field_back))
+    monkeypatch.setattr(steady, "transforms", lambda mirrored: both)
     with fft.set_workers(2):
         sliding = Sliding(Body(rubber(), HALF_SPACE), shape, (1e-3, 1e-3), 1.0)
         pressure = np.zeros(shape)

@@ -47,7 +47,8 @@ def test_profile__sums_up_to_the_whole_and_counts_the_transforms(study, tmp_path
     assert sum(profile.seconds.values()) == pytest.approx(profile.whole)
     assert all(seconds > 0 for seconds in profile.seconds.values())
     assert profile.calls["transforms"] >= int(ds.convolutions.sum())
-    assert profile.calls["files"] >= 1
+    assert profile.calls["result file"] == 1
+    assert profile.calls["checkpoints"] >= 1
     assert profile.calls["memory"] > 0
     assert profile.share("transforms") + profile.share(REST) < 1
 
