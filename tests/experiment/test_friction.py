@@ -2,17 +2,17 @@
 
 import io
 import re
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rich.console import Console
-from scipy import fft
 from support import friction_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
+from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.materials import frequency
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding import steady
@@ -285,14 +285,13 @@ def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion()
 @pytest.mark.parametrize("last_octave", [False, True])
 def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
     """Of the solution, of its forces, and of the same without the shortest octave of waves."""
-    forward = []
+    forward, plain = [], transforms(mirrored=False)
 
     def counted(*given, **named):
         forward.append(1)
-        return fft.rfftn(*given, **named)
+        return plain.of_field(*given, **named)
 
-    here = {name: getattr(fft, name) for name in ("irfftn", "fftfreq", "rfftfreq")}
-    monkeypatch.setattr(steady, "fft", SimpleNamespace(rfftn=counted, **here))
+    monkeypatch.setattr(steady, "transforms", lambda mirrored: replace(plain, of_field=counted))
     ds = friction_whole(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
     assert int(ds.convolutions.sum()) == len(forward)
     assert (ds.convolutions > 2 * ds.iterations).all()
