@@ -1,6 +1,7 @@
 """Every study that ships runs, and ends with an honest result."""
 
 import importlib
+import json
 import pathlib
 
 import numpy as np
@@ -297,6 +298,19 @@ def test_big_scans_and_results__are_measured(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out.count("| pressure") == len(results.CHUNKS)
     found = results.steps(results.stored(32, tmp_path), tmp_path)["observables.clusters"]()
     assert int(found["cluster_count"].min()) >= 3
+
+
+@pytest.mark.thorough
+def test_big_benchmark__counts_iterations_on_nested_grids_by_their_cells(monkeypatch, tmp_path, capsys):
+    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
+    big = importlib.import_module("big")
+    monkeypatch.setattr(big, "scene", lambda cells, area: (big.rough_gap(cells), 0.02, "periodic"))
+    big.one("roughvisc", 256, 0.3, 1e-4, 1, tmp_path)
+    told = json.loads(capsys.readouterr().out)
+    assert told["iterations"] < told["passes"] < 2 * told["iterations"]
+    pressure = np.load(tmp_path / "roughvisc-0.0001.npy")
+    assert pressure.mean() == pytest.approx(0.02)
+    assert told["area"] == np.mean(pressure > 0)
 
 
 def test_memory_benchmark__measures_what_is_stated(monkeypatch):
