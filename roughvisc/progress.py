@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import time
+from bisect import bisect
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -17,6 +19,10 @@ from roughvisc.errors import ON_SCREEN, printable, shortened
 
 #: Seconds between two lines, and between two pictures.
 LINE_EVERY, PICTURE_EVERY = 10.0, 0.2
+#: So much longer has a computation gone on when it is noted again how far it is.
+_NOTED = 1.02
+#: Least power of what is reached that may grow evenly; nearly that of a logarithm.
+_LEAST_POWER = 1e-3
 
 #: A label, how much is done of how much (None: no bar), and a text beside the bar.
 Row = tuple[str, float, float | None, str]
@@ -105,7 +111,8 @@ class Bar:
         self, console: Console | None = None, label: str = "", at: Callable[[float, float], str] | None = None
     ) -> None:
         self._at = at or (lambda now, end: f"t = {now:.3g} of {end:.3g} s")
-        self._label, self._now, self._end, self._began = label, 0.0, 0.0, time.monotonic()
+        self._label, self._now, self._end = label, 0.0, 0.0
+        self._begin()
         self._display = Display(console, self._rows, self._line)
 
     def __enter__(self) -> Bar:
@@ -118,15 +125,23 @@ class Bar:
     def reached(self, now: float, end: float) -> None:
         """It is at this time of so much. [s]"""
         self._now, self._end = now, end
+        spent = time.monotonic() - self._began
+        if not self._noted or spent > _NOTED * self._noted[-1][0]:
+            self._noted.append((spent, now))
         self._display.tick()
 
     def measured(self, label: str, now: float, end: float) -> None:
         """Of several things computed in turn, this one is at this time of so much [s]; a line names each anew."""
         if label != self._label:
-            self._label, self._began = label, time.monotonic()
+            self._label = label
+            self._begin()
             if not self._display.draws:
                 self._display.say(f"measuring {label}")
         self.reached(now, end)
+
+    def _begin(self) -> None:
+        self._began = time.monotonic()
+        self._noted: list[tuple[float, float]] = []  # how long it had gone on [s], and where it was
 
     def _rows(self) -> list[Row]:
         return [(self._label, self._now, self._end, self._text())]
@@ -138,7 +153,7 @@ class Bar:
         spent = time.monotonic() - self._began
         words = [self._at(self._now, self._end) if self._end else "starting"]
         if 0 < self._now < self._end:
-            words.append(f"about {clock(spent * (self._end - self._now) / self._now)} left")
+            words.append(f"about {clock(time_left([*self._noted, (spent, self._now)], self._end))} left")
         return ", ".join([*words, f"{clock(spent)} so far"])
 
 
@@ -169,6 +184,44 @@ def reporting(
     else:
         with Bar(console, label, at) as bar:
             yield bar.reached if label else bar.measured
+
+
+def time_left(noted: list[tuple[float, float]], end: float) -> float:
+    """How long a computation will still take, if its pace goes on to quicken as it has of late. [s]
+
+    Steps of a creeping contact grow with the time that is reached: nine tenths of that may be the last third of the
+    work. So a power of it, at most the first, is sought that has grown evenly over the last two thirds of the work.
+
+    Parameters
+    ----------
+    noted : list of (float, float)
+        How long it had gone on [s] and where it was, several times, now at last.
+    end : float
+        Where it ends.
+
+    Examples
+    --------
+    >>> time_left([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)], 10.0)
+    8.0
+    """
+    (began, _), (spent, now) = noted[0], noted[-1]
+    thirds = (began + (spent - began) * part / 3 for part in (1, 2))
+    (early, first), (middle, then) = (noted[max(bisect(noted, (third, math.inf)) - 1, 0)] for third in thirds)
+    if not (early < middle < spent and first < then < now):
+        return spent * (end - now) / now
+
+    def quickened(power: float) -> bool:
+        """Whether this power of what is reached was faster in the last third than in the one before."""
+        last, before = 1 - (then / now) ** power, (then / now) ** power - (first / now) ** power
+        return last * (middle - early) > before * (spent - middle)
+
+    low, high = _LEAST_POWER, 1.0  # a power that is slower, and one that is faster
+    if not quickened(high):
+        low = high
+    while high - low > _LEAST_POWER:
+        power = (low + high) / 2
+        low, high = (low, power) if quickened(power) else (power, high)
+    return (spent - middle) * ((end / now) ** high - 1) / (1 - (then / now) ** high)
 
 
 def clock(seconds: float) -> str:

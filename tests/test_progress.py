@@ -2,6 +2,7 @@
 
 import io
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -44,6 +45,36 @@ def test_bar__is_lines_elsewhere(shown, monkeypatch):
         "pressing: starting, 0 s so far",
         "pressing: 25%, about 0 s left, 0 s so far",
     ]
+
+
+PACES = {  # where a computation is after so many seconds, and how far its time left may be off
+    "steady": (lambda spent: spent, 1.01),
+    "growing steps": (lambda spent: spent**2, 1.05),
+    "steps that grow with time": (lambda spent: 1e-3 * np.expm1(spent / 8), 1.1),
+    "slowing down": (lambda spent: spent**0.5, 2.1),
+    "resumed": (lambda spent: 300 + spent, 1.02),
+}
+
+
+@pytest.mark.parametrize("pace", PACES)
+def test_time_left__follows_the_pace(pace, shown, monkeypatch):
+    reached, factor = PACES[pace]
+    now = [1000.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    with Bar(shown(False), "creep") as bar:
+        for spent in np.arange(0.25, 50.1, 0.25):
+            now[0] = 1000.0 + spent
+            bar.reached(reached(spent), reached(100.0))
+        left = progress.time_left([*bar._noted, (50.0, reached(50.0))], reached(100.0))
+        assert len(bar._noted) < 180, "not every step"
+        assert f", about {progress.clock(left)} left" in bar._line()
+    assert 1 / factor < left / 50 < factor
+
+
+def test_time_left__of_steps_too_short_to_tell_is_finite(shown):
+    noted = [(0.0, 5.0), (1.0, np.nextafter(5.0, 6)), (2.0, np.nextafter(np.nextafter(5.0, 6), 6))]
+    assert 0 < progress.time_left(noted, 6.0) < np.inf
+    assert progress.time_left([(0.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 3.0) == 4.0, "it does not get on"
 
 
 def test_quiet__shows_nothing(shown):
