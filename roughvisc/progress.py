@@ -111,8 +111,7 @@ class Bar:
         self, console: Console | None = None, label: str = "", at: Callable[[float, float], str] | None = None
     ) -> None:
         self._at = at or (lambda now, end: f"t = {now:.3g} of {end:.3g} s")
-        self._label, self._now, self._end = label, 0.0, 0.0
-        self._begin()
+        self._label, self._now, self._end, self._pace = label, 0.0, 0.0, Pace()
         self._display = Display(console, self._rows, self._line)
 
     def __enter__(self) -> Bar:
@@ -125,23 +124,16 @@ class Bar:
     def reached(self, now: float, end: float) -> None:
         """It is at this time of so much. [s]"""
         self._now, self._end = now, end
-        spent = time.monotonic() - self._began
-        if not self._noted or spent > _NOTED * self._noted[-1][0]:
-            self._noted.append((spent, now))
+        self._pace.reached(now)
         self._display.tick()
 
     def measured(self, label: str, now: float, end: float) -> None:
         """Of several things computed in turn, this one is at this time of so much [s]; a line names each anew."""
         if label != self._label:
-            self._label = label
-            self._begin()
+            self._label, self._pace = label, Pace()
             if not self._display.draws:
                 self._display.say(f"measuring {label}")
         self.reached(now, end)
-
-    def _begin(self) -> None:
-        self._began = time.monotonic()
-        self._noted: list[tuple[float, float]] = []  # how long it had gone on [s], and where it was
 
     def _rows(self) -> list[Row]:
         return [(self._label, self._now, self._end, self._text())]
@@ -150,11 +142,32 @@ class Bar:
         return f"{self._label}: {self._text()}"
 
     def _text(self) -> str:
-        spent = time.monotonic() - self._began
         words = [self._at(self._now, self._end) if self._end else "starting"]
         if 0 < self._now < self._end:
-            words.append(f"about {clock(time_left([*self._noted, (spent, self._now)], self._end))} left")
-        return ", ".join([*words, f"{clock(spent)} so far"])
+            words.append(f"about {clock(self._pace.left(self._now, self._end))} left")
+        return ", ".join([*words, f"{clock(self._pace.spent)} so far"])
+
+
+class Pace:
+    """How fast a computation comes on, from when this is made."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
+        self._noted: list[tuple[float, float]] = []  # how long it had gone on [s], and where it was
+
+    @property
+    def spent(self) -> float:
+        """How long it has gone on. [s]"""
+        return time.monotonic() - self._began
+
+    def reached(self, now: float) -> None:
+        """It is here."""
+        if not self._noted or self.spent > _NOTED * self._noted[-1][0]:
+            self._noted.append((self.spent, now))
+
+    def left(self, now: float, end: float) -> float:
+        """How long it will still take from here to an end. [s]"""
+        return time_left([*self._noted, (self.spent, now)], end)
 
 
 @contextmanager

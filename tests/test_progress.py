@@ -65,8 +65,8 @@ def test_time_left__follows_the_pace(pace, shown, monkeypatch):
         for spent in np.arange(0.25, 50.1, 0.25):
             now[0] = 1000.0 + spent
             bar.reached(reached(spent), reached(100.0))
-        left = progress.time_left([*bar._noted, (50.0, reached(50.0))], reached(100.0))
-        assert len(bar._noted) < 180, "not every step"
+        left = bar._pace.left(reached(50.0), reached(100.0))
+        assert len(bar._pace._noted) < 180, "not every step"
         assert f", about {progress.clock(left)} left" in bar._line()
     assert 1 / factor < left / 50 < factor
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from rich.console import Console
 
 from roughvisc.errors import ON_SCREEN, DiskFullError, printable, shortened
-from roughvisc.progress import Display, Row, clock
+from roughvisc.progress import Display, Pace, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.variation import REALISATION
@@ -79,6 +79,7 @@ class LiveMonitor(Monitor):
         self._names: dict[str, str] = {}
         self._at: dict[str, Callable[[float, float], str]] = {}
         self._running: dict[str, tuple[float, float]] = {}
+        self._paces: dict[str, Pace] = {}
         self._ended: dict[str, Outcome] = {}
         self._began = time.monotonic()
         self._display = Display(console, self._rows, self._summary, below=True)
@@ -97,6 +98,7 @@ class LiveMonitor(Monitor):
         with self._lock:
             if key not in self._ended:
                 self._running[key] = (now, end)
+                self._paces.setdefault(key, Pace()).reached(now)
 
     def ended(self, outcome: Outcome) -> None:
         with self._lock:
@@ -129,17 +131,25 @@ class LiveMonitor(Monitor):
             kinds = [outcome.kind for outcome in self._ended.values()]
             fresh = sum(not outcome.reused for outcome in self._ended.values())
             running = dict(self._running)
+            worked = fresh + sum(self._worked(key) for key in running)
         total, elapsed = len(self._names), time.monotonic() - self._began
         parts = [f"{kinds.count('done')} of {total} cases done"]
         for kind in ("unconverged", "failed", "hindered", "held"):
             parts += [f"{kinds.count(kind)} {IN_WORDS[kind]}"] if kind in kinds else []
         if running:
             parts.append(f"{len(running)} running")
-        worked = fresh + sum(now / end for now, end in running.values() if end)
         if worked and len(kinds) < total:
             parts.append(f"about {clock(elapsed * (total - len(kinds) + fresh - worked) / worked)} left")
         parts.append(f"{clock(elapsed)} so far" if len(kinds) < total else f"in {clock(elapsed)}")
         return ", ".join(parts)
+
+    def _worked(self, key: str) -> float:
+        """Part of the work of a running case that is done."""
+        (now, end), pace = self._running[key], self._paces[key]
+        if not 0 < now < end:
+            return float(0 < end <= now)
+        spent = pace.spent
+        return spent / (spent + pace.left(now, end)) if spent else now / end
 
     def _rows(self) -> list[Row]:
         with self._lock:

@@ -5,6 +5,7 @@ import hashlib
 import io
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -372,6 +373,23 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
     watch.stopping()
     watch.close()
     assert "stopping" in stream.getvalue()
+
+
+def test_watch__tells_the_time_left_by_the_work_and_not_by_the_time_reached(study, monkeypatch):
+    """Steps grow with time: half way in work, a case may have come a thousandth of its time."""
+    now = [0.0]
+    monkeypatch.setattr("roughvisc.progress.time.monotonic", lambda: now[0])
+    cases = study()
+    watch = LiveMonitor(Console(file=io.StringIO(), width=160))
+    watch.begin(cases, "")
+    watch.ended(outcome(cases[0].key))
+    for now[0] in np.arange(1.0, 50.1):
+        watch.reached(cases[1].key, np.exp(now[0] / 7), np.exp(100 / 7))
+    found = re.search(r"about (\d+) s left", watch._summary())
+    assert 0.8 < int(found[1]) / (50 * (4 - 1.5) / 1.5) < 1.2
+    watch.reached(cases[1].key, 0.0, 0.0)
+    watch.reached(cases[2].key, 3.0, 3.0)
+    assert "about 50 s left" in watch._summary(), "one that is at its end has done its work, one at the start none"
 
 
 def test_watch__hears_from_workers(study, tmp_path):
