@@ -32,6 +32,20 @@ def is_card(path: Path, format: str | None) -> bool:
     return format == "card" or (format is None and path.suffix.lower() == ".toml")
 
 
+def measured_file(path: Path, format: str | None) -> Path | None:
+    """The file that heights were measured to: the one that a card names, or the file itself; None where it is a recipe.
+
+    Raises
+    ------
+    InputError
+        If a card cannot be read.
+    """
+    if not is_card(path, format):
+        return path
+    named = read_toml(path, "a surface card in TOML").get("file")
+    return path.parent / named if isinstance(named, str) else None
+
+
 def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.DataArray:
     """Height over (x, y) as a surface card describes it, conditioned. [m]
 
@@ -135,7 +149,7 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
         cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
+        a surrogate, or a table of it and of a ``seed``), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
         and ``mirror``. They act in this order; false leaves a step out.
 
     Returns
@@ -281,7 +295,7 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
     "filter": _filter,
     "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
-    "realisation": lambda h, value: surrogate(h, value),
+    "realisation": lambda h, value: surrogate(h, **value) if isinstance(value, Mapping) else surrogate(h, value),
     "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
     "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),

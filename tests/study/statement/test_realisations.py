@@ -1,7 +1,9 @@
 """Realisations of a surface in a study: which cases they are, and where they make no sense."""
 
+import numpy as np
 import pytest
 
+import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases, read_study, vary
 
@@ -127,3 +129,24 @@ def test_realisations__a_case_that_is_refused_says_which_it_is(study):
         read_cases(study(open_border, "[sweep]\nrealisations = 2\n"))
     with pytest.raises(InputError, match=r"realisation: unknown key"):
         read_cases(study(ROUGH, "[sweep]\nrealisation = [1, 2]\n"))
+
+
+def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatment(tmp_path):
+    """Of one seed the first few deviate alike, whatever scan they are of."""
+    spectrum = {"hurst": 0.8, "rms_height": 1e-6, "rolloff": 4e-5}
+    for seed in (1, 2):
+        rv.save_scan(rv.self_affine(1e-4, (33, 30), **spectrum, seed=seed), tmp_path / f"{seed}.x3p")
+
+    def waves(surface):
+        (tmp_path / "study.toml").write_text(f"[surface]\nrealisation = 1\n{surface}\n" + BODY)
+        found = np.fft.rfft2(read_study(tmp_path / "study.toml").height().values)[1:4, 1:4]
+        return found / np.abs(found)  # of the longest, whose amplitudes are those of the scan
+
+    first = waves('file = "1.x3p"')
+    assert np.abs(np.angle(first / waves('file = "2.x3p"'))).max() > 0.5
+    np.testing.assert_allclose(waves('file = "1.x3p"\nshortest_wave = "15 um"'), first, rtol=1e-6)
+    checksum = read_study(tmp_path / "study.toml").surface_sha256
+    (tmp_path / "card.toml").write_text(f'file = "1.x3p"\nsha256 = "{checksum}"\ntitle = "As measured"\n')
+    np.testing.assert_allclose(waves('file = "card.toml"'), first)
+    (tmp_path / "copy.x3p").write_bytes((tmp_path / "1.x3p").read_bytes())
+    np.testing.assert_allclose(waves('file = "copy.x3p"'), first, err_msg="by the content, not by the name")

@@ -136,17 +136,20 @@ class Conditioned(Prepared):
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 
-    def framed(self, height: xr.DataArray) -> xr.DataArray:
-        """Heights after the steps asked for that come last. [m]"""
-        return _conditioned(self, Conditioned, height)
+    def framed(self, height: xr.DataArray, seed: int) -> xr.DataArray:
+        """Heights after the steps asked for that come last; the seed is that of surrogates. [m]"""
+        surrogate = {} if self.realisation is None else {"realisation": {"realisation": self.realisation, "seed": seed}}
+        return _conditioned(self, Conditioned, height, surrogate)
 
 
-def _conditioned(stated: Prepared, steps: type[Prepared], height: xr.DataArray) -> xr.DataArray:
-    """Heights after the steps that a class of them names itself. [m]"""
+def _conditioned(
+    stated: Prepared, steps: type[Prepared], height: xr.DataArray, more: dict[str, Any] | None = None
+) -> xr.DataArray:
+    """Heights after the steps that a class of them names itself, some with `more` than is stated. [m]"""
     from roughvisc.topography.cards import condition
 
     names = set(steps.__annotations__) - {"missing"}
-    return condition(height, stated.model_dump(include=names, exclude_none=True))
+    return condition(height, stated.model_dump(include=names, exclude_none=True) | (more or {}))
 
 
 PURE = measured("1", above=0)
@@ -197,6 +200,10 @@ class Raw(Section):
         """Boundary that the heights are made for; None where the study has to say it."""
         raise NotImplementedError
 
+    def surrogate_seed(self) -> int:
+        """Seed of the surrogates of the surface."""
+        return 0
+
 
 class FromFile(Raw):
     """An instrument file or a surface card."""
@@ -219,6 +226,14 @@ class FromFile(Raw):
 
         path = Path(self.file)
         return boundary_of_card(path) if is_card(path, self.format) else None
+
+    def surrogate_seed(self) -> int:
+        """Of its own for each scan: the first surrogates of one seed deviate alike, whatever scan they are of."""
+        from roughvisc.topography.cards import measured_file
+        from roughvisc.topography.readers import sha256
+
+        path = measured_file(Path(self.file), self.format)
+        return 0 if path is None else int(sha256(path)[:8], 16)
 
 
 class FromRecipe(Raw):
@@ -296,7 +311,8 @@ class SurfaceSection(Conditioned, Raw):
     def height(self) -> xr.DataArray:
         """The heights as conditioned, peaks up; of two faces: their sum. [m]"""
         height = self.prepared(self.raw())
-        return self.framed(height if self.second is None else self.second.laid(height))
+        seed = 0 if self.realisation is None else self.surrogate_seed()
+        return self.framed(height if self.second is None else self.second.laid(height), seed)
 
     def boundary(self) -> Boundary | None:
         """Boundary that the surface is made for, without its heights; None where the study has to say it."""
