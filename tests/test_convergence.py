@@ -96,7 +96,7 @@ def orders(material, program, grid, counts):
         *(pytest.param(n, marks=pytest.mark.long) for n in ("power_law", "two_branches")),
     ],
 )
-@pytest.mark.parametrize("program", ["triangle", "jump"])
+@pytest.mark.parametrize("program", [pytest.param("triangle", marks=pytest.mark.thorough), "jump"])
 @pytest.mark.parametrize("grid", [uniform, pytest.param(random, marks=pytest.mark.long)], ids=["uniform", "random"])
 def test_instantaneous_compliance__second_order(name, program, grid):
     # through a jump the rate of creep of a power law is singular: uniform steps approach second order slowly

@@ -76,6 +76,16 @@ ROWS = 3
 plain_load_is_thorough = pytest.mark.parametrize(
     "kind", [pytest.param("load", marks=pytest.mark.thorough), "slide", "friction"], indirect=True, scope="module"
 )
+#: For pictures: those of a curve of friction are drawn by the command, in test_friction_study.py.
+only_slides_are_quick = pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=[] if kind == "slide" else pytest.mark.thorough)
+        for kind in ("load", "slide", "friction")
+    ],
+    indirect=True,
+    scope="module",
+)
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -175,7 +185,7 @@ def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
     assert table["contact_area [m^2]"].iloc[0] == float(done.result.contact_area[row])
 
 
-@plain_load_is_thorough
+@only_slides_are_quick
 def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pictures):
     drawn = rv.plot.save_figures(done.result, tmp_path, "one")
     names = {path.stem.rpartition("-")[2] for path in drawn}
@@ -187,7 +197,7 @@ def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pict
             assert np.ptp(np.asarray(picture.convert("L"))) > 100, path
 
 
-@plain_load_is_thorough
+@only_slides_are_quick
 def test_report__tells_what_was_done(kind, done, tmp_path, coarse_pictures):
     page = rv.report(done.result, tmp_path / "page.html").read_text()
     for words in (

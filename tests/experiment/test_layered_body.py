@@ -71,7 +71,7 @@ def test_creeping_ball__on_moduli_in_proportion_is_that_of_lee_and_radok():
     np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=4e-3)
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic"])
 def test_limits__are_the_half_space_and_the_sheet(boundary):
     """Equal materials to rounding; a stiff base in proportion to what it gives way."""
     height = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)

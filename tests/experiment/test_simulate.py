@@ -60,7 +60,7 @@ def test_fields__not_asked_for_are_not_there():
 
 @pytest.mark.parametrize(
     ("material", "duration"),
-    [(rv.maxwell(1e6, 1e6), 2.0), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
+    [pytest.param(rv.maxwell(1e6, 1e6), 2.0, marks=pytest.mark.thorough), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
     ids=["maxwell", "zener"],
 )
 def test_seed_papers_validations__at_the_default_tolerance(material, duration):

@@ -102,13 +102,11 @@ sys.meta_path.insert(0, Finder())
 sys.argv = ["roughvisc", "run", "s.toml"]
 runpy.run_module("roughvisc", run_name="__main__")
 """
-LATER_MODULES = "roughvisc.cli.results", "rich.console", "xarray"
+LATER_MODULES = "click", "roughvisc.cli.results", "rich.console", "xarray"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize(
-    "module", ["click", "pydantic", *(pytest.param(m, marks=pytest.mark.thorough) for m in LATER_MODULES)]
-)
+@pytest.mark.parametrize("module", ["pydantic", *(pytest.param(m, marks=pytest.mark.thorough) for m in LATER_MODULES)])
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_run__signalled_during_an_import_ends_quietly(tmp_path, module, number, status):
     (tmp_path / "s.toml").write_text(MANY_STEPS)

@@ -22,7 +22,9 @@ def final(steps):
 TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
 
 
-@pytest.mark.parametrize("program", [STEP_LOAD, TRIANGLE], ids=["step", "triangle"])
+@pytest.mark.parametrize(
+    "program", [STEP_LOAD, pytest.param(TRIANGLE, marks=pytest.mark.thorough)], ids=["step", "triangle"]
+)
 @pytest.mark.parametrize(
     "name",
     [

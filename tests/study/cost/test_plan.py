@@ -79,7 +79,10 @@ def study(tmp_path):
     [
         {},
         {"solve.boundary": "free", "solve.edge": "accept"},
-        {"material": {"model": "kelvin_voigt", "shear_modulus": 1e6, "viscosity": 2e4}, "keep.times": EVEN},
+        pytest.param(
+            {"material": {"model": "kelvin_voigt", "shear_modulus": 1e6, "viscosity": 2e4}, "keep.times": EVEN},
+            marks=pytest.mark.thorough,
+        ),
         {"solve.time_step": 0.01},
     ],
 )

@@ -135,7 +135,7 @@ def test_ladder__has_the_settings_that_the_experiment_has(tmp_path):
     assert "solve.memory: found 'direct': steady sliding has none" in ds.note[2].item()
 
 
-@pytest.mark.parametrize(("times", "least"), [('"all"', 1), ("20", 3)])
+@pytest.mark.parametrize(("times", "least"), [('"all"', 1), pytest.param("20", 3, marks=pytest.mark.thorough)])
 def test_slides__are_compared_where_whole_cells_of_all_grids_are_behind(tmp_path, times, least):
     """24 cells and 12 of a wave, for its finest run's accuracy 6 too."""
     ds = measured(case_of(tmp_path, SLIDES + f"[keep]\ntimes = {times}\n"), Setting(0.1), Setting(1e-2, coarsening=2.0))
@@ -193,6 +193,7 @@ def test_advice__on_a_curve_can_be_applied_and_run(tmp_path):
     assert float(abs(advised[FRICTION] - fine[FRICTION]).max() / fine[FRICTION].max()) < 0.05
 
 
+@pytest.mark.thorough
 def test_command__applies_what_it_advises_on_friction(invoke, tmp_path, monkeypatch):
     monkeypatch.setattr("roughvisc.study.trade.trade.ladder", lambda case, shape: [Setting(0.1), Setting(0.01)])
     timed = TimedRuns._timed

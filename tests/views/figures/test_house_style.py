@@ -54,7 +54,12 @@ DRAWN = {
     "film": (lambda ds: animate._moving(ds, None, 3)[0], ("rough", "one frame", "open", "slid")),
     "film of the flow": (lambda ds: animate._moving(closed(ds), "flux", 2)[0], ("rough",)),
 }
-PAIRS = [(name, sample) for name, (_, samples) in DRAWN.items() for sample in samples]
+#: Every figure of one sample in the default suite, and of all samples in the thorough one.
+PAIRS = [
+    pytest.param(name, sample, marks=pytest.mark.thorough if place else [])
+    for name, (_, samples) in DRAWN.items()
+    for place, sample in enumerate(samples)
+]
 
 
 @pytest.fixture(scope="module")

@@ -69,9 +69,9 @@ DRAWN = [(name, sample) for name, sample in DRAWN if sample in FLOWS.get(name, S
 
 
 def _members():
-    """Two histories and a strip of every figure, and of those of the plane all samples, in the default suite."""
+    """A history and a strip of every figure, and of those of the plane all samples, in the default suite."""
     for name, sample in DRAWN:
-        quick = sample in ("rough", "open", "thin strip") or name in ("section", "maps")
+        quick = sample in ("rough", "thin strip") or name in ("section", "maps")
         yield (name, sample) if quick else pytest.param(name, sample, marks=pytest.mark.thorough)
 
 
@@ -611,7 +611,15 @@ def test_area_against_load__says_what_the_lines_of_low_loads_assume():
     assert plot.area_against_load(ds, contact_modulus={}).get_supxlabel() == ""
 
 
-@pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame, made.open_contact])
+@pytest.mark.parametrize(
+    "make",
+    [
+        made.rough_creep,
+        made.one_frame,
+        pytest.param(made.hertz_creep, marks=pytest.mark.thorough),
+        pytest.param(made.open_contact, marks=pytest.mark.thorough),
+    ],
+)
 def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
     ds = make()
     path = plot.animate(ds, tmp_path / "contact.gif", frames=3, dpi=40)
