@@ -262,18 +262,7 @@ def test_budget__a_surface_with_plateaus_is_no_random_phase_surface(tmp_path):
         assert found.attrs["kurtosis"] == pytest.approx((level**4).mean() / (level**2).mean() ** 2, rel=1e-3)
         coarse = rv.vary(study, {"surface.band_limit": [27, 25]})  # as the surrogates are
         cases = [coarse, *(rv.vary(coarse, {"surface.realisation": number}) for number in range(1, 7))]
-        own, *drawn = (
-            rv.simulate(
-                one.height(),
-                one.material(),
-                one.program(),
-                boundary="periodic",
-                tolerance=1e-2,
-                times=(1.0,),
-                progress=False,
-            )["contact_area"][-1].item()
-            for one in cases
-        )
+        own, *drawn = (rv.run(one, progress=False)["contact_area"][-1].item() for one in cases)
         assert float(found["surrogate_ratio"][-1]) == pytest.approx(own / np.mean(drawn), rel=1e-6)
         meanings = found["standing"].attrs["flag_meanings"].split()
         assert meanings[int(found["standing"][-1])] == stands
