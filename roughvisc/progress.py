@@ -19,9 +19,9 @@ from roughvisc.errors import ON_SCREEN, printable, shortened
 
 #: Seconds between two lines, and between two pictures.
 LINE_EVERY, PICTURE_EVERY = 10.0, 0.2
-#: So much longer has a computation gone on when it is noted again how far it is.
+#: Ratio of the elapsed times at which two successive progress records are kept.
 _NOTED = 1.02
-#: Least power of what is reached that may grow evenly; nearly that of a logarithm.
+#: Smallest exponent for the extrapolation of progress; progress is then nearly exponential in time.
 _LEAST_POWER = 1e-3
 
 #: A label, how much is done of how much (None: no bar), and a text beside the bar.
@@ -149,24 +149,24 @@ class Bar:
 
 
 class Pace:
-    """How fast a computation comes on, from when this is made."""
+    """Progress of a computation that starts when this object is created."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
-        self._noted: list[tuple[float, float]] = []  # how long it had gone on [s], and where it was
+        self._noted: list[tuple[float, float]] = []  # elapsed time [s] and position
 
     @property
     def spent(self) -> float:
-        """How long it has gone on. [s]"""
+        """Elapsed time. [s]"""
         return time.monotonic() - self._began
 
     def reached(self, now: float) -> None:
-        """It is here."""
+        """Record that the computation has reached this position."""
         if not self._noted or self.spent > _NOTED * self._noted[-1][0]:
             self._noted.append((self.spent, now))
 
     def left(self, now: float, end: float) -> float:
-        """How long it will still take from here to an end. [s]"""
+        """Estimated time from the position ``now`` to the end. [s]"""
         return time_left([*self._noted, (self.spent, now)], end)
 
 
@@ -200,17 +200,18 @@ def reporting(
 
 
 def time_left(noted: list[tuple[float, float]], end: float) -> float:
-    """How long a computation will still take, if its pace goes on to quicken as it has of late. [s]
+    """Estimated remaining time of a computation, extrapolated from its recent progress. [s]
 
-    Steps of a creeping contact grow with the time that is reached: nine tenths of that may be the last third of the
-    work. So a power of it, at most the first, is sought that has grown evenly over the last two thirds of the work.
+    The time steps of a creeping contact grow with time, so the simulated time increases ever faster. The estimate finds
+    the exponent, at most one, for which this power of the position increased linearly over the last two thirds of the
+    elapsed time, and continues that line to the end.
 
     Parameters
     ----------
     noted : list of (float, float)
-        How long it had gone on [s] and where it was, several times, now at last.
+        Elapsed time [s] and position, in order; the last record is the present one.
     end : float
-        Where it ends.
+        Position at the end.
 
     Examples
     --------
@@ -224,11 +225,11 @@ def time_left(noted: list[tuple[float, float]], end: float) -> float:
         return spent * (end - now) / now
 
     def quickened(power: float) -> bool:
-        """Whether this power of what is reached was faster in the last third than in the one before."""
+        """Whether this power of the position increased faster in the last third of the time than in the second."""
         last, before = 1 - (then / now) ** power, (then / now) ** power - (first / now) ** power
         return last * (middle - early) > before * (spent - middle)
 
-    low, high = _LEAST_POWER, 1.0  # a power that is slower, and one that is faster
+    low, high = _LEAST_POWER, 1.0  # the exponent lies between them
     if not quickened(high):
         low = high
     while high - low > _LEAST_POWER:

@@ -47,7 +47,7 @@ def test_bar__is_lines_elsewhere(shown, monkeypatch):
     ]
 
 
-PACES = {  # where a computation is after so many seconds, and how far its time left may be off
+PACES = {  # position after some seconds, and the factor by which the remaining time may be wrong
     "steady": (lambda spent: spent, 1.01),
     "growing steps": (lambda spent: spent**2, 1.05),
     "steps that grow with time": (lambda spent: 1e-3 * np.expm1(spent / 8), 1.1),

@@ -76,7 +76,7 @@ ROWS = 3
 plain_load_is_thorough = pytest.mark.parametrize(
     "kind", [pytest.param("load", marks=pytest.mark.thorough), "slide", "friction"], indirect=True, scope="module"
 )
-#: For pictures: those of a curve of friction are drawn by the command, in test_friction_study.py.
+#: For figures and reports: test_friction_study.py draws those of a friction curve.
 only_slides_are_quick = pytest.mark.parametrize(
     "kind",
     [

@@ -33,7 +33,9 @@ def is_card(path: Path, format: str | None) -> bool:
 
 
 def measured_file(path: Path, format: str | None) -> Path | None:
-    """The file that heights were measured to: the one that a card names, or the file itself; None where it is a recipe.
+    """File with the measured heights of a surface file: the file named in a card, otherwise the file itself.
+
+    None for a card with a recipe.
 
     Raises
     ------
@@ -149,7 +151,7 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
         cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate, or a table of it and of a ``seed``), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
+        a surrogate, or a table of ``number`` and ``seed``), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
         and ``mirror``. They act in this order; false leaves a step out.
 
     Returns
@@ -285,6 +287,13 @@ def _filter(h: xr.DataArray, value: Any) -> xr.DataArray:
     return conditioning.gaussian_filter(h, **options)
 
 
+def _realisation(h: xr.DataArray, value: Any) -> xr.DataArray:
+    options = _table("realisation", value, ("number", "seed")) if isinstance(value, Mapping) else {"number": value}
+    if "number" not in options:
+        raise InputError("realisation.number is missing: expected the number of a surrogate")
+    return surrogate(h, options["number"], seed=options.get("seed", 0))
+
+
 #: step -> (height, value in the file) -> height; in the order in which they act
 _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "crop": _crop,
@@ -295,7 +304,7 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
     "filter": _filter,
     "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
-    "realisation": lambda h, value: surrogate(h, **value) if isinstance(value, Mapping) else surrogate(h, value),
+    "realisation": _realisation,
     "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
     "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),

@@ -3,8 +3,8 @@
     OPENBLAS_NUM_THREADS=1 python workflows/benchmarks/batched.py [CELLS ...] [--sweep COUNT]
 
 Prints the processor time of a creep case by its parts, of transforms and passes over a stack, and of 16 contact
-problems solved in lockstep. Two processes measure at the same time, since a sweep keeps all cores busy. `--sweep`: only
-contact problems, so many by both processes together, one by one and in stacks of 16.
+problems solved in lockstep. Two processes measure at the same time, since a sweep keeps all cores busy. With
+`--sweep` the processes share this number of contact problems, and solve them one by one and in stacks of 16.
 """
 
 import argparse
@@ -138,7 +138,7 @@ def sweep(cells, count, repeats=5):
 if __name__ == "__main__":
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("cells", nargs="*", type=int, default=[16, 64, 128])
-    asked.add_argument("--sweep", metavar="COUNT", type=int, help="contact problems alone, so many")
+    asked.add_argument("--sweep", metavar="COUNT", type=int, help="solve only contact problems, this number in total")
     given = asked.parse_args()
     work = main if given.sweep is None else partial(sweep, count=given.sweep)
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:

@@ -34,7 +34,7 @@ def measure(case, cells):
 
 
 def bare_pair(cells, mirrored):
-    """Seconds of a transform and its way back; of the ball: of a quarter of twice as many a side, by cosines."""
+    """Seconds of a transform and its inverse; for the ball of a quarter of the padded cells, by cosines."""
     import numpy as np
 
     from roughvisc.mechanics.bodies import transforms
@@ -51,7 +51,7 @@ def bare_pair(cells, mirrored):
 
 
 def leak(cells):
-    """Seconds of a leak rate, as of one convolution."""
+    """Seconds that a leak rate takes, counted as one convolution."""
     import roughvisc as rv
     from roughvisc.mechanics.transport.flow import flow
 

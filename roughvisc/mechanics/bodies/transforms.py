@@ -88,9 +88,10 @@ def transforms(mirrored: bool) -> Transforms:
 
 
 def transform_library() -> str:
-    """What the last digits depend on: results are equal to the last bit only where this is the same.
+    """Names and versions of the libraries that determine the last digits of results.
 
-    Kernels are sampled with SciPy in any case.
+    Results are identical to the last bit only if these are the same. SciPy is always among them, since it transforms
+    the sampled kernels.
     """
     engine = f"ducc0 {ducc.ducc0.__version__}, scipy" if with_ducc0() else "scipy.fft"
     return f"{engine} {scipy.__version__}, numpy {np.__version__}"

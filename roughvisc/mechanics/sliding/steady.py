@@ -173,7 +173,7 @@ class Sliding:
         return -float((pressure * inclined).sum()) * self.cell_area
 
     def _convolved(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
-        """Convolution in the precision of both."""
+        """Convolution in the precision of field and symbol."""
         self.convolutions += 1
         waves = self._transforms.of_field(field, workers=self._threads)
         waves *= symbol

@@ -104,6 +104,7 @@ class LiveMonitor(Monitor):
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
+            self._paces.pop(outcome.key, None)
         if outcome.kind in ("failed", "hindered", "held", "unconverged") and not outcome.reused:
             self._complaints += 1
             if self._complaints <= _SHOWN:
@@ -144,7 +145,7 @@ class LiveMonitor(Monitor):
         return ", ".join(parts)
 
     def _worked(self, key: str) -> float:
-        """Part of the work of a running case that is done."""
+        """Estimated fraction of the work of a running case that is complete."""
         (now, end), pace = self._running[key], self._paces[key]
         if not 0 < now < end:
             return float(0 < end <= now)

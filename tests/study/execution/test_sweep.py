@@ -376,7 +376,7 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
 
 
 def test_watch__tells_the_time_left_by_the_work_and_not_by_the_time_reached(study, monkeypatch):
-    """Steps grow with time: half way in work, a case may have come a thousandth of its time."""
+    """Time steps grow: after half of the work, a case may have reached a thousandth of its simulated time."""
     now = [0.0]
     monkeypatch.setattr("roughvisc.progress.time.monotonic", lambda: now[0])
     cases = study()

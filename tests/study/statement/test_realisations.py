@@ -6,6 +6,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.topography.cards import condition
 
 ROUGH = """
 [surface]
@@ -132,7 +133,7 @@ def test_realisations__a_case_that_is_refused_says_which_it_is(study):
 
 
 def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatment(tmp_path):
-    """Of one seed the first few deviate alike, whatever scan they are of."""
+    """With a common seed, the first surrogates of all scans deviate in the same direction."""
     spectrum = {"hurst": 0.8, "rms_height": 1e-6, "rolloff": 4e-5}
     for seed in (1, 2):
         rv.save_scan(rv.self_affine(1e-4, (33, 30), **spectrum, seed=seed), tmp_path / f"{seed}.x3p")
@@ -150,3 +151,12 @@ def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatm
     np.testing.assert_allclose(waves('file = "card.toml"'), first)
     (tmp_path / "copy.x3p").write_bytes((tmp_path / "1.x3p").read_bytes())
     np.testing.assert_allclose(waves('file = "copy.x3p"'), first, err_msg="by the content, not by the name")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [({"seed": 3}, "realisation.number is missing"), ({"number": 1, "sed": 3}, "unknown key 'sed'")],
+)
+def test_realisation__that_is_a_wrong_table_is_refused(table, message):
+    with pytest.raises(InputError, match=message):
+        condition(rv.self_affine(1e-4, (33, 30), hurst=0.8, rms_height=1e-6, seed=1), {"realisation": table})

@@ -136,20 +136,16 @@ class Conditioned(Prepared):
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 
-    def framed(self, height: xr.DataArray, seed: int) -> xr.DataArray:
-        """Heights after the steps asked for that come last; the seed is that of surrogates. [m]"""
-        surrogate = {} if self.realisation is None else {"realisation": {"realisation": self.realisation, "seed": seed}}
-        return _conditioned(self, Conditioned, height, surrogate)
 
+def _conditioned(stated: Prepared, steps: type[Prepared], height: xr.DataArray, **detailed: Any) -> xr.DataArray:
+    """Heights after the steps that the class ``steps`` itself declares. [m]
 
-def _conditioned(
-    stated: Prepared, steps: type[Prepared], height: xr.DataArray, more: dict[str, Any] | None = None
-) -> xr.DataArray:
-    """Heights after the steps that a class of them names itself, some with `more` than is stated. [m]"""
+    The values of the steps are those stated, except for steps in ``detailed``.
+    """
     from roughvisc.topography.cards import condition
 
     names = set(steps.__annotations__) - {"missing"}
-    return condition(height, stated.model_dump(include=names, exclude_none=True) | (more or {}))
+    return condition(height, stated.model_dump(include=names, exclude_none=True) | detailed)
 
 
 PURE = measured("1", above=0)
@@ -201,7 +197,7 @@ class Raw(Section):
         raise NotImplementedError
 
     def surrogate_seed(self) -> int:
-        """Seed of the surrogates of the surface."""
+        """Random seed of the surrogates of this surface."""
         return 0
 
 
@@ -228,7 +224,10 @@ class FromFile(Raw):
         return boundary_of_card(path) if is_card(path, self.format) else None
 
     def surrogate_seed(self) -> int:
-        """Of its own for each scan: the first surrogates of one seed deviate alike, whatever scan they are of."""
+        """Random seed of the surrogates, different for each scan.
+
+        With a common seed, the first surrogates of all scans would deviate from their mean in the same direction.
+        """
         from roughvisc.topography.cards import measured_file
         from roughvisc.topography.readers import sha256
 
@@ -311,8 +310,12 @@ class SurfaceSection(Conditioned, Raw):
     def height(self) -> xr.DataArray:
         """The heights as conditioned, peaks up; of two faces: their sum. [m]"""
         height = self.prepared(self.raw())
-        seed = 0 if self.realisation is None else self.surrogate_seed()
-        return self.framed(height if self.second is None else self.second.laid(height), seed)
+        if self.second is not None:
+            height = self.second.laid(height)
+        if self.realisation is None:
+            return _conditioned(self, Conditioned, height)
+        surrogate = {"number": self.realisation, "seed": self.surrogate_seed()}
+        return _conditioned(self, Conditioned, height, realisation=surrogate)
 
     def boundary(self) -> Boundary | None:
         """Boundary that the surface is made for, without its heights; None where the study has to say it."""
