@@ -25,7 +25,41 @@ class RoughviscError(Exception):
 
 
 class InputError(RoughviscError, ValueError):
-    """The input is wrong: the message names the file, the key or the point, what was found and what was expected."""
+    """Invalid input.
+
+    Parameters
+    ----------
+    message : str, optional
+        Complete message. Built from the other arguments if not given.
+    key : str
+        Name of the argument, study key, file or point at fault.
+    found : object
+        The invalid value.
+    expected : str
+        Description of valid values.
+
+    Attributes
+    ----------
+    key, found, expected
+        As given. Programs and tests read these and never the message.
+
+    Examples
+    --------
+    >>> print(InputError(key="material.shear_modulus", found="3 N", expected="a modulus [Pa]"))
+    material.shear_modulus: found '3 N': expected a modulus [Pa]
+    """
+
+    def __init__(self, message: str = "", *, key: str = "", found: object = None, expected: str = "") -> None:
+        if not message:
+            text = repr(found)
+            text = text if len(text) <= 60 else text[:57] + "..."
+            message = f"{key}: found {text}: expected {expected}" if key else f"found {text}: expected {expected}"
+        super().__init__(message)
+        self.key, self.found, self.expected = key, found, expected
+
+    def prefixed(self, text: str) -> "InputError":
+        """Return this error with a file, table or key in front of its message."""
+        return InputError(f"{text}: {self}", key=self.key, found=self.found, expected=self.expected)
 
 
 class EdgeContactError(InputError):

@@ -93,16 +93,19 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     label = f"{name} is {shown(value)}" if name else f"found {shown(value)}"
     wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
     if isinstance(value, str):
-        result = _parsed(value, unit, label, wanted, difference)
+        try:
+            result = _parsed(value, unit, label, wanted, difference)
+        except InputError as error:
+            raise InputError(str(error), key=name, found=value, expected=wanted) from error.__cause__
     elif isinstance(value, Real) and not isinstance(value, bool):
         try:
             result = float(value)
         except OverflowError:  # an integer of hundreds of digits
             result = math.inf
     else:
-        raise InputError(f"{label}: expected {wanted}")
+        raise InputError(f"{label}: expected {wanted}", key=name, found=value, expected=wanted)
     if not math.isfinite(result):
-        raise InputError(f"{label}: expected {wanted}, finite")
+        raise InputError(f"{label}: expected {wanted}, finite", key=name, found=value, expected=f"{wanted}, finite")
     return result
 
 
@@ -292,10 +295,11 @@ def bounded_quantity(
     except InputError as error:
         for key, other in (instead or {}).items():
             if is_quantity(value, other):
-                raise InputError(f"{error}; did you mean {key} = {value!r}?") from None
+                hint = f"{error}; did you mean {key} = {value!r}?"
+                raise InputError(hint, found=value, expected=error.expected) from None
         raise
     if not within(number, **bounds):
-        raise InputError(f"found {shown(value)}: expected {wanted_quantity(unit, **bounds)}")
+        raise InputError(found=value, expected=wanted_quantity(unit, **bounds))
     return number
 
 
@@ -319,7 +323,7 @@ def stated_quantity(value: Any, unit: str, key: str, **bounds: Any) -> float:
     try:
         return bounded_quantity(value, unit, **bounds)
     except InputError as error:
-        raise InputError(f"{key}: {error}") from None
+        raise InputError(f"{key}: {error}", key=key, found=value, expected=error.expected) from None
 
 
 def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> float:

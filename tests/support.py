@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -259,3 +260,12 @@ def changed_package(folder, page, test, places):
         assert f"roughvisc/{name}`" in text
         path.write_text(before.replace(below, code + below), encoding="utf-8")
     return folder
+
+
+def refused(key=None, found=None):
+    """Expect an InputError at this key, and with this value if one is given."""
+
+    def matches(error):
+        return (key is None or error.key == key) and (found is None or error.found == found)
+
+    return pytest.raises(rv.InputError, check=matches)

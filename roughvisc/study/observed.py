@@ -93,7 +93,7 @@ def _add(case: Case, path: Path) -> bool:
         try:
             found = asked(_frame_by_frame(result), lacking).compute()
         except InputError as error:
-            raise InputError(f"{path}: {error}") from error
+            raise error.prefixed(str(path)) from error
         told = {"case": case.to_json(), OBSERVED: json.dumps(before | wanted)}
         whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
             found, compat="equals", join="exact"

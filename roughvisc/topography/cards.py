@@ -86,7 +86,7 @@ def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.Dat
         h = _scan(rest, path.parent) if "file" in rest else generate(rest)
         h = condition(h, steps) if conditioned else h
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise error.prefixed(str(path)) from error
     instrument = {"instrument": card["instrument"]} if "instrument" in card else {}
     return h.assign_attrs(card=path.name, **about, **instrument)
 

@@ -286,7 +286,7 @@ def _reading(path: Path) -> Iterator[None]:
         try:
             yield
         except InputError as error:
-            raise InputError(f"{path}: {error}") from error
+            raise error.prefixed(str(path)) from error
         except Exception as error:  # damaged files raise of every kind, MemoryError and struct.error among them
             forget(error)
             raise InputError(

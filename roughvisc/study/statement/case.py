@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 
 class Problems(InputError):
-    """All that is wrong with one case, one line each."""
+    """All problems of one case, one line each; `key` and `found` are those of the first."""
 
-    def __init__(self, lines: Sequence[str]) -> None:
-        super().__init__("\n".join(lines))
+    def __init__(self, lines: Sequence[str], *, key: str = "", found: object = None) -> None:
+        super().__init__("\n".join(lines), key=key, found=found)
         self.lines = list(lines)
 
 
@@ -293,20 +293,23 @@ def read_cases(path: str | Path) -> list[Case]:
                 found = f"what is {_NO_RESULT[table]} changes no result: expected one value, in [{table}]"
                 raise InputError(f"sweep: {key}: cannot be varied: {found}")
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise error.prefixed(str(path)) from error
     cases: list[Case] = []
     problems: dict[str, list[int]] = {}
+    first: Problems | None = None
     for number, (change, drawn) in enumerate(changes):
         try:
             case = _varied(data, change, path)
         except Problems as error:
+            first = first or error
             for problem in error.lines:
                 problems.setdefault(problem, []).append(number)
         else:
             cases.append(case if drawn is None else as_realisation(case, drawn))
-    if problems:
+    if first is not None:
         told = [change if drawn is None else change | {REALISATION: drawn} for change, drawn in changes]
-        raise InputError(report(path, [in_sweep(problem, where, told) for problem, where in problems.items()]))
+        message = report(path, [in_sweep(problem, where, told) for problem, where in problems.items()])
+        raise InputError(message, key=first.key, found=first.found)
     return cases
 
 
@@ -342,7 +345,7 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     try:
         changed = _varied(data, changes, case.origin)
     except Problems as error:
-        raise InputError(report(case.origin, error.lines)) from error
+        raise InputError(report(case.origin, error.lines), key=error.key, found=error.found) from error
     written = {key: text for key, text in case.written.items() if key not in changes}
     return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
 
@@ -352,7 +355,7 @@ def _varied(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | 
         try:
             data = place(data, key, value)
         except InputError as error:
-            raise Problems([f"{key}: {error}"]) from error
+            raise Problems([f"{key}: {error}"], key=key, found=value) from error
     settings = _checked(data, origin.parent if origin else None)
     stated = _dump(settings)
     varied = {key: _at(stated, key, value) for key, value in changes.items()}
@@ -365,7 +368,9 @@ def _checked(data: Mapping[str, Any], folder: Path | None, name: str = "") -> St
         return Study.model_validate(data, context={"folder": folder})
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc'])) or 'study'}: {e['msg']}" for e in error.errors()]
-        raise Problems([f"{name}: {one}" if name else one for one in lines]) from None
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"])) or "study"
+        raise Problems([f"{name}: {one}" if name else one for one in lines], key=key, found=first["input"]) from None
 
 
 def _text_or_error(what: Callable[[], str]) -> str:

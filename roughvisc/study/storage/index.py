@@ -162,7 +162,7 @@ def read_entry(path: Path) -> Entry:
     try:
         current, known = current_histories(stored, attributes), _names_of_histories()
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise error.prefixed(str(path)) from error
     histories = {name: values for name, values in current.items() if name in known}
     along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]

@@ -437,7 +437,7 @@ def _stored(path: str | Path) -> xr.Dataset:
             dataset = root_of(to_current(whole_of(dataset)))
         attributes_of(dataset.attrs)
     except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise error.prefixed(str(path)) from error
     found = _foreign(dataset)
     if found:
         dataset.close()

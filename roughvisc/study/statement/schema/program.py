@@ -176,7 +176,7 @@ def _read_rows(control: Control) -> Any:
             except ValidationError as error:
                 raise of_file(path, {"times": "time", "values": control}, error) from None
             except InputError as error:
-                raise InputError(f"{path}: {error}") from None
+                raise error.prefixed(str(path)) from None
             return rows
         if not isinstance(value, dict | Section):
             raise InputError(f"found {shown(value)}: expected the path of a CSV file, or a table with times and values")
