@@ -1,4 +1,4 @@
-"""The seed paper's first validation: a sphere on a Maxwell half-space under a suddenly applied load.
+"""The paper's first validation: a sphere on a Maxwell half-space under a suddenly applied load.
 
 Pressure profiles at several times against the closed form (Lee and Radok), in the paper's dimensionless axes:
 pressure over the Hertz peak pressure at time zero, against radius over the Hertz contact radius at time zero.

@@ -1,4 +1,4 @@
-"""The seed paper's second validation: a sphere on a Zener half-space under a suddenly applied load.
+"""The paper's second validation: a sphere on a Zener half-space under a suddenly applied load.
 
 For a Kelvin modulus equal to the spring's and for a quarter of it: the paper's equation (20) holds for the first
 only, the closed form used here for any.

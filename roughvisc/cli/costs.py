@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Show what a study will model and what it will cost.
 
-    Runs and writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
+    Writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
     of steps and FFTs by coarse runs, and the time by a solve timed on this machine. The exit status is 2 if the study
     does not fit into memory or on the disk.
 
