@@ -1,9 +1,7 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
 ``import roughvisc as rv`` gives the public names that ``__init__.pyi`` lists; each is imported from its module when
-first used, so that the package itself is imported in no time. ``h.roughvisc`` has the conditioning as methods of a
-DataArray, as soon as a function that gives or takes heights has been used; for DataArrays made otherwise,
-``import roughvisc.topography``.
+first used, so that the package itself is imported in no time.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Conditioning of scans, one function for each step.
 
 Every function takes a grid and gives a new one; what was done stands in the attribute ``history``. Missing points are
-NaN, and stay so until :func:`fill`. The same steps are methods of the accessor ``h.roughvisc``.
+NaN, and stay so until :func:`fill`.
 """
 
 from roughvisc.topography.bandwidth import gaussian_filter, level

@@ -85,8 +85,8 @@ def with_coordinates(
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     """The grid as float64 in metres over ``("x", "y")``, after a check that it is one: the door for all heights.
 
-    Heights and coordinates that state a unit of length, as an attribute ``units`` or as pint arrays, are converted;
-    those that state none are metres. A Dataset stands for its variable ``height``; masked points become NaN; any
+    Heights and coordinates that state a unit of length in the attribute ``units`` are converted; those that state none
+    are metres. A Dataset stands for its variable ``height``; masked points become NaN; any
     order of the dimensions and any type of real numbers will do.
 
     Parameters
@@ -133,10 +133,7 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
 
 
 def unit_of(numbers: Any) -> str | None:
-    """Unit that an array states: a pint array its own, a DataArray the attribute ``units``; None if none."""
-    held = numbers.data if isinstance(numbers, xr.DataArray) else numbers
-    if hasattr(held, "magnitude"):
-        return str(held.units)
+    """Attribute ``units`` of a DataArray; None if there is none."""
     stated = numbers.attrs.get("units") if isinstance(numbers, xr.DataArray) else None
     return None if stated is None else str(stated)
 
@@ -156,7 +153,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
 
     Parameters
     ----------
-    numbers : DataArray, pint array or array_like
+    numbers : DataArray or array_like
         Real numbers; metres if they state no unit.
     name : str
         What they are, for the message.
@@ -164,7 +161,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     Raises
     ------
     InputError
-        If they are no real numbers, are packed as in a file, or their unit is no length.
+        If they are no real numbers, are packed as in a file or held by pint, or their unit is no length.
     """
     unit = unit_of(numbers)
     factor = 1.0 if unit is None else metres_in(unit, name)
@@ -176,11 +173,12 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
                 "with mask_and_scale=True"
             )
         numbers = numbers.data
-    held = getattr(numbers, "magnitude", numbers)
+    if hasattr(numbers, "magnitude"):  # NumPy would drop its unit
+        raise InputError(f"{name} is a pint array: expected plain numbers [m]")
     try:
-        held = held if isinstance(held, np.ma.MaskedArray) else np.asarray(held)
+        held = numbers if isinstance(numbers, np.ma.MaskedArray) else np.asarray(numbers)
     except ValueError as error:  # rows of different lengths
-        raise InputError(f"{name} is {type(held).__name__}: expected real numbers, as many in each row") from error
+        raise InputError(f"{name} is {type(numbers).__name__}: expected real numbers, as many in each row") from error
     if held.dtype.kind not in "fiu":
         raise InputError(f"{name} is of {held.dtype}: expected real numbers")
     values = np.ma.filled(held.astype(float, copy=False), np.nan)

@@ -96,8 +96,8 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     Parameters
     ----------
     heights : array_like, shape (nx, ny)
-        Heights over (x, y), peaks up, NaN or masked where missing; a pint array is converted. [m] Transpose a matrix
-        whose rows run along x, as in the files that :func:`roughvisc.open_scan` reads.
+        Heights over (x, y), peaks up, NaN or masked where missing. [m] Transpose a matrix whose rows run along x, as in
+        the files that :func:`roughvisc.open_scan` reads.
     spacing : float or str, or pair of them
         Cell sides (dx, dy). [m]
 

@@ -35,15 +35,6 @@ def test_plot__draws_maps_with_x_to_the_right():
             for image, other in zip(found.images, expected.images, strict=True):
                 np.testing.assert_array_equal(image.get_array(), other.get_array())
                 assert image.get_clim() == other.get_clim()
-    for field in (ds.gap.isel(time=-1), ds.gap):
-        figure = field.roughvisc.plot(**({} if field.ndim == 2 else {"times": -1}))
-        (image,) = figure.axes[0].images
-        np.testing.assert_array_equal(image.get_array(), last[1].images[0].get_array())
-        assert image.get_array().shape == (16, 22), "rows are y"
-        assert figure.axes[0].get_aspect() == 1
-    assert len(ds.height.roughvisc.plot().axes) == len(rv.plot.surface(ds.height).axes)
-    with pytest.raises(rv.InputError, match="plot of heights has no option 'times'"):
-        ds.height.roughvisc.plot(times=-1)
 
 
 def test_plot__of_a_file_that_xarray_alone_has_opened(tmp_path):
