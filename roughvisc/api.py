@@ -233,7 +233,6 @@ def run(
     *,
     want: Mapping[str, Quantity] | None = None,
     progress: bool | Progress = True,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Compute one case and store it in a file.
@@ -254,9 +253,6 @@ def run(
         is computed as it is stated.
     progress : bool or callable
         A progress bar, or a function called with the current time and the length of the program. [s]
-    same_bits : bool
-        Compute again what was computed, completely or in part, with other versions of the FFTs or of NumPy, whose last
-        digits differ. Otherwise such results are used, because they also meet the tolerance, and a warning says so.
     threads : int, optional
         Number of threads for a large grid; see :func:`roughvisc.simulate`. Default on a worker: all its threads.
 
@@ -284,7 +280,7 @@ def run(
 
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None and not stated.is_to_be_chosen:
-        return run_stated(stated, out, progress=progress, same_bits=same_bits, threads=threads)
+        return run_stated(stated, out, progress=progress, threads=threads)
     from roughvisc.study.budget import target
 
-    return target.run(stated, out, want=want, progress=progress is not False, same_bits=same_bits, threads=threads)
+    return target.run(stated, out, want=want, progress=progress is not False, threads=threads)

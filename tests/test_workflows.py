@@ -117,10 +117,6 @@ def test_benchmarks__run_small(tmp_path, monkeypatch):
     assert (tmp_path / "table.nc").exists()
     for row in tables["seed"] + tables["tamaas"] + tables["contact_mechanics"]:
         assert row["error"] <= row["peer_error"]
-    scaled, followed = tables["scaling"][:-4], tables["scaling"][-4:]
-    assert all(0 < row["transform_share"] < 1 for row in scaled)
-    assert all(row["error"] < 1e-3 for row in followed)
-    assert len({row["seconds"] for row in followed}) == 4
     swept, stored = tables["sweep"][:1], tables["sweep"][1:]
     assert all(0 < row["busy"] <= 1 for row in swept)
     assert len(stored) == 2

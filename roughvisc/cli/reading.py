@@ -90,5 +90,4 @@ def naming_keys(message: str) -> str:
     message = re.sub(
         rf"\b({'|'.join(_TABLES)})=(['\"])(\w+)\2", lambda m: f'[{_TABLES[m[1]]}] {m[1]} = "{m[3]}"', message
     )
-    message = message.replace("same_bits=True (--same-bits)", "--same-bits")
     return re.sub(rf"\b({_NAMES})=(?=\W|$)", r"the key \1", message)

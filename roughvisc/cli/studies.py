@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,8 +38,6 @@ _FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
 @click.option("--scheduler-file", type=PATH, help="Scheduler file written by a Dask scheduler.")
 @click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
-@click.option("--same-bits", is_flag=True, help="Repeat cases computed with other versions of the FFT library.")
-@click.option("--profile", is_flag=True, help="Print where the time went; runs in this process.")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 def run(
     study: Path,
@@ -48,7 +46,6 @@ def run(
     no_plots: bool,
     scheduler: str | None,
     scheduler_file: Path | None,
-    profile: bool,
     quiet: bool,
     retry_failed: bool,
     **computing: Any,
@@ -89,40 +86,19 @@ def run(
     folder = result_folder(cases[0], out, to_write=False)
     console = Console(quiet=quiet)
     elsewhere = bool(scheduler or scheduler_file)
-    if profile and (elsewhere or computing["workers"]):
-        raise InputError(
-            "--profile: measures this process only: expected no --scheduler, --scheduler-file or --workers"
-        )
-    if profile and not chosen:
-        computing["workers"] = 0
-    with (
-        _profile(console) if profile else nullcontext(),
-        connect(scheduler, scheduler_file) if elsewhere else nullcontext() as client,
-    ):
+    with connect(scheduler, scheduler_file) if elsewhere else nullcontext() as client:
         if len(cases) > 1 or (elsewhere and not chosen):
             _run_all(cases, folder, console, client=client, retry_failed=retry_failed, **computing)
             return
         case, budgets = cases[0], {}
         if chosen:
             case, budgets = _choose(case, folder, console, client=client, **computing)
-        same_bits, threads = computing["same_bits"], computing["threads"]
-        complaint = _run_one(case, folder, study.stem, console, not no_plots, same_bits, threads, bool(chosen))
+        complaint = _run_one(case, folder, study.stem, console, not no_plots, computing["threads"], bool(chosen))
         for name, one in budgets.items():
             show(console, one, folder / "budget", name, not no_plots)
         if complaint:
             complain(f"{study.stem}: {complaint}")
             raise Failure("1 of 1 cases failed", 1)
-
-
-@contextmanager
-def _profile(console: Console) -> Iterator[None]:
-    """Print where the time of what runs inside went."""
-    from roughvisc.study.execution.profile import profiled
-    from roughvisc.views.console.tables import profile_table
-
-    with profiled() as profile:
-        yield
-    console.print(profile_table(profile))
 
 
 def _choose(case: Case, folder: Path, console: Console, **computing: Any) -> tuple[Case, Mapping[str, xr.Dataset]]:
@@ -149,7 +125,6 @@ def _run_one(
     label: str,
     console: Console,
     plots: bool,
-    same_bits: bool,
     threads: int | None,
     chosen: bool = False,
 ) -> str:
@@ -162,7 +137,7 @@ def _run_one(
     from roughvisc.study.storage.upkeep import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
-    if is_result_of(case, result_path(folder, case.key), same_bits):
+    if is_result_of(case, result_path(folder, case.key)):
         if not chosen:
             console.print("Already finished: nothing to compute")
         if not is_writable(folder):
@@ -174,7 +149,7 @@ def _run_one(
             complain(told)
     end_if_interrupted()
     with Bar(console, label, case.at) as bar:
-        path = run_case(case, folder, progress=bar.reached, same_bits=same_bits, threads=threads or threads_each(1))
+        path = run_case(case, folder, progress=bar.reached, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
     with whole_result(path) as dataset:
         console.print(result_table(dataset))

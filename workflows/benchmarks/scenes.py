@@ -19,11 +19,6 @@ def without_symmetry():
     return mock.patch.object(profile, "is_mirrored", return_value=False)
 
 
-def without_window():
-    """Context in which the whole domain is solved, also where the contact is small."""
-    return mock.patch.object(profile, "_WORTH_FOLLOWING", 10**9)
-
-
 def with_symmetry_and_without():
     """Goes round twice, and gives what to add to a case's name."""
     yield ""

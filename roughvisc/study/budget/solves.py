@@ -96,7 +96,7 @@ class Bench:
         Makes what shows how solves that take long go on.
     tell : callable
         Told in a sentence what solves have given.
-    client, workers, threads, same_bits, retry_failed
+    client, workers, threads, retry_failed
         As :func:`roughvisc.sweep` has them; ``workers=None``: further processes where they are worth it.
     what : str
         What the solves are for, in messages.
@@ -109,7 +109,6 @@ class Bench:
     client: Client | None = None
     workers: int | None = 0
     threads: int | None = None
-    same_bits: bool = False
     retry_failed: bool = True
     what: str = "want"
 
@@ -142,7 +141,6 @@ class Bench:
             client=self.client,
             workers=self.workers,
             threads=self.threads,
-            same_bits=self.same_bits,
             retry_failed=self.retry_failed,
         )
         with ExitStack() as files:

@@ -133,7 +133,6 @@ def run(
     *,
     want: Mapping[str, Any] | None = None,
     progress: bool = True,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Result of the case that is chosen for what is wanted of another; see :func:`roughvisc.run`."""
@@ -148,12 +147,11 @@ def run(
         watch=partial(watcher, progress, summary=False),
         tell=log.info,
         client=default_client(),
-        same_bits=same_bits,
         threads=threads,
     )
     for name, one in choice.budgets.items():
         write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
-    found = run_stated(choice.case, out, progress=False, same_bits=same_bits, threads=threads)
+    found = run_stated(choice.case, out, progress=False, threads=threads)
     return found.assign_attrs(choice="\n".join(choice.reasons))
 
 
@@ -166,7 +164,6 @@ def choose(
     client: Client | None = None,
     workers: int | None = 0,
     threads: int | None = None,
-    same_bits: bool = False,
 ) -> Choice:
     """Choose grid and tolerance for what is wanted of a case, and bring the case so chosen to its file.
 
@@ -180,7 +177,7 @@ def choose(
         Makes what shows how solves that take long go on.
     tell : callable
         Told in a sentence what a grid has given.
-    client, workers, threads, same_bits
+    client, workers, threads
         As :func:`roughvisc.sweep` has them; ``workers=None``: further processes where they are worth it.
 
     Raises
@@ -194,7 +191,7 @@ def choose(
     main = "friction_coefficient" if case.experiment().largest_speed > 0 else "contact_area"
     quantities = [known_quantity(name, case) for name in want.numbers() or [main]]
     require_writable(folder, "since what is wanted takes several solves")
-    bench = Bench(quantities, folder / FOLDER, watch, tell, client, workers, threads, same_bits)
+    bench = Bench(quantities, folder / FOLDER, watch, tell, client, workers, threads)
 
     around = first_grids(case, bench, targets, limit).with_changed_cases()
     if told := list(around.missed(targets, FLOOR)):
@@ -210,7 +207,7 @@ def choose(
     chosen = around.grids.case(found.level)
     bench.solve({"own": chosen})
     path = result_path(folder, chosen.key)
-    if not is_result_of(chosen, path, same_bits):
+    if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
             shutil.copyfile(result_path(bench.folder, chosen.key), temporary)
     budgets = {one.name: found.budget(one, chosen) for one in quantities}

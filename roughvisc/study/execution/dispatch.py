@@ -22,7 +22,6 @@ from distributed import CancelledError, Client, KilledWorker, as_completed
 
 from roughvisc import errors
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
-from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.cluster import SOURCE, VERSION
 from roughvisc.study.execution.monitor import Monitor, SweepLog, watcher
 from roughvisc.study.execution.task import INPUTS, Outcome, Progress, Report, serialize_with_inputs, stop_sweep
@@ -193,9 +192,7 @@ class _Dispatch:
                 self.waiting.append(key)
 
 
-def distribute(
-    texts: Mapping[str, str], book: SweepLog, client: Client, threads: int | None, link: str, same_bits: bool
-) -> None:
+def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads: int | None, link: str) -> None:
     """Bring cases to their ends on the workers of a client.
 
     Parameters
@@ -210,8 +207,6 @@ def distribute(
         Of the transforms; None: as many as a worker has.
     link : str
         Address of Dask's dashboard, if there is one.
-    same_bits : bool
-        As in :func:`roughvisc.study.execution.run.run_case`.
 
     Raises
     ------
@@ -225,8 +220,7 @@ def distribute(
     name = f"roughvisc-{secrets.token_hex(4)}"
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
     courses = {key: _CaseStatus() for key in texts}
-    transforms = transform_library() if same_bits else ""
-    cases = _Dispatch(client, book, texts, (str(book.folder), name, threads, transforms), name, finished, courses)
+    cases = _Dispatch(client, book, texts, (str(book.folder), name, threads), name, finished, courses)
     client.subscribe_topic(name, cases.heard)
     try:
         book.begin(link)
@@ -242,9 +236,7 @@ def distribute(
             client.unsubscribe_topic(name)
 
 
-def run_on(
-    client: Client, case: Case, folder: Path, progress: bool | Progress, same_bits: bool, threads: int | None = None
-) -> Path:
+def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, threads: int | None = None) -> Path:
     """Bring one case to its file on a worker, and give the file's path.
 
     Raises
@@ -256,7 +248,7 @@ def run_on(
     book = SweepLog(folder, {case.key: case}, {}, watch, [])
     try:
         packed = {case.key: serialize_with_inputs(case, folder / INPUTS)}
-        distribute(packed, book, client, threads, client.dashboard_link, same_bits)
+        distribute(packed, book, client, threads, client.dashboard_link)
     finally:
         watch.close()
     outcome = book.outcomes[case.key]

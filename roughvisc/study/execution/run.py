@@ -7,8 +7,7 @@ import json
 import logging
 import os
 import re
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
 from roughvisc.experiment.resources import keep_memory, require_surface
-from roughvisc.groups import attributes_of
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
@@ -27,7 +25,7 @@ from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION, program
 from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable, warn_once
+from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import open_result, quarantine, result_path, write_result
@@ -155,7 +153,6 @@ def run_case(
     stop: Callable[[], bool] | None = None,
     checkpoint_seconds: float = 30.0,
     checkpoint_steps: int | None = None,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> Path:
     """Bring one case to its file in a folder, and give the file's path.
@@ -180,9 +177,6 @@ def run_case(
         Time between checkpoints; longer where they would take a twentieth of the time. [s]
     checkpoint_steps : int, optional
         Accepted steps between checkpoints, whatever these take.
-    same_bits : bool
-        Compute anew what was computed, all or in part, with other versions of the transforms or of NumPy, whose last
-        digits differ. Otherwise it counts, since it keeps the tolerance as well, and a warning says so.
     threads : int, optional
         As :func:`roughvisc.simulate` has them.
 
@@ -199,7 +193,7 @@ def run_case(
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path, same_bits) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
+    if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
         return path  # and no run has left behind what it needs no longer
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     keep_memory()
@@ -216,17 +210,16 @@ def run_case(
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
                 stop=stop,
-                same_bits=same_bits,
             )
             with closing(keeper):
-                if not is_result_of(case, path, same_bits):
-                    if path.exists() and (problem := _problem(case, path)):  # not one of other transforms
+                if not is_result_of(case, path):
+                    if path.exists() and (problem := _problem(case, path)):
                         quarantine(path, problem)
                     keeper.resume()
                     _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
     except InUseError:
-        if is_result_of(case, path, same_bits):  # the other run has just finished
+        if is_result_of(case, path):  # the other run has just finished
             return path
         raise
     except OSError as error:
@@ -267,16 +260,9 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Checkpo
         raise
 
 
-def is_result_of(case: Case, path: Path, same_bits: bool = False) -> bool:
-    """Whether a file is the whole result of a case, and on request of the transforms that are here."""
-    if not path.exists() or _problem(case, path):
-        return False
-    with open_result(path) as dataset:
-        made_with = str(attributes_of(dataset.attrs).get("transforms", ""))
-    if made_with != transform_library():
-        warn_once(path, f"{path}: {other_transforms([made_with])}")
-        return not same_bits
-    return True
+def is_result_of(case: Case, path: Path) -> bool:
+    """Return whether a file is the whole result of a case."""
+    return path.exists() and not _problem(case, path)
 
 
 def _problem(case: Case, path: Path) -> str:
@@ -287,18 +273,6 @@ def _problem(case: Case, path: Path) -> str:
     except InputError as error:
         return str(error)
     return "" if found == case.key else f"{path}: holds the result of case {found}: expected that of its name"
-
-
-def other_transforms(made_with: Iterable[str]) -> str:
-    """What to tell of finished results by what they were made with; empty if there is nothing to tell."""
-    counts = Counter(made_with)
-    if set(counts) <= {transform_library()}:
-        return ""
-    found = ", ".join(f"{count} with {transforms}" for transforms, count in counts.items())
-    return (
-        f"{found}, where this process has {transform_library()}: equal within the tolerance, not to the last bit; "
-        "same_bits=True (--same-bits) computes the others anew"
-    )
 
 
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
@@ -329,6 +303,3 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     axis = AXES[rows]
     first = axis.place(float(histories[rows][bad[0]]))
     return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try {axis.advice}"
-
-
-log = logging.getLogger("roughvisc")

@@ -28,21 +28,20 @@ def run_stated(
     out: str | Path | None = None,
     *,
     progress: bool | Progress = True,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Bring a case as it is stated to its file; see :func:`roughvisc.run`."""
     folder, client = result_folder(case, out, to_write=False), default_client()
-    if not is_result_of(case, result_path(folder, case.key), same_bits):
+    if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
         if told := upgrade_note(folder, [case]):
             log.warning("%s", told)
     if client is None:
-        path = run_case(case, folder, progress=progress, same_bits=same_bits, threads=threads)
+        path = run_case(case, folder, progress=progress, threads=threads)
     else:
         from roughvisc.study.execution.dispatch import run_on
 
-        path = run_on(client, case, folder.absolute(), progress, same_bits, threads)
+        path = run_on(client, case, folder.absolute(), progress, threads)
     dataset = open_result(path)
     complaint = unconverged(whole_of(dataset))
     if complaint:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.experiment.resources import cores
-from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.cluster import (
     local_client,
     refuse_unguarded_script,
@@ -20,7 +19,7 @@ from roughvisc.study.execution.cluster import (
     threads_each,
 )
 from roughvisc.study.execution.monitor import Monitor, SweepLog
-from roughvisc.study.execution.run import other_transforms, result_folder, set_aside_damaged
+from roughvisc.study.execution.run import result_folder, set_aside_damaged
 from roughvisc.study.execution.single import default_client
 from roughvisc.study.execution.task import INPUTS, REFUSED, Outcome, outcome_of, run_case_safely, serialize_with_inputs
 from roughvisc.study.statement.case import Case, read_cases
@@ -45,7 +44,6 @@ def sweep(
     retry_failed: bool = False,
     progress: bool = True,
     workers: int | None = None,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Compute many cases, store each in a file, and open the results together.
@@ -71,8 +69,6 @@ def sweep(
         Show a progress bar.
     workers : int, optional
         Number of processes of the default cluster; 0: this process.
-    same_bits : bool
-        Compute results of other versions of the FFTs or of NumPy again; see :func:`roughvisc.run`.
     threads : int, optional
         Number of threads of each case on a large grid. Default: its share of the cores; on the workers of a client, all
         their threads.
@@ -108,7 +104,6 @@ def sweep(
         client=client,
         workers=workers,
         retry_failed=retry_failed,
-        same_bits=same_bits,
         threads=threads,
         watch=watcher(progress),
     )
@@ -129,7 +124,6 @@ def run_cases(
     client: Client | None = None,
     workers: int | None = None,
     retry_failed: bool = False,
-    same_bits: bool = False,
     threads: int | None = None,
 ) -> dict[str, Outcome]:
     """Bring all cases to their files; see :func:`sweep`.
@@ -170,7 +164,7 @@ def run_cases(
         if writable:
             clean_folder(folder)
         index = index_of(folder, warn=False)
-        outcomes = _known(distinct, folder, index, retry_failed, same_bits)
+        outcomes = _known(distinct, folder, index, retry_failed)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         if todo:
             require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
@@ -186,10 +180,7 @@ def run_cases(
         book = SweepLog(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
             _tell_beforehand(book, index, todo, writable)
-            _compute(todo, folder, book, client, processes, same_bits, threads)
-            told = other_transforms(str(e.attributes.get("transforms")) for o in outcomes.values() if (e := o.entry))
-            if told:
-                book.tell(told)
+            _compute(todo, folder, book, client, processes, threads)
             unsealed = [one.entry.file for one in outcomes.values() if one.entry and not one.entry.sealed]
             if unsealed:
                 more = f" and {len(unsealed) - 1} more" if len(unsealed) > 1 else ""
@@ -224,15 +215,13 @@ def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], wri
     warn_of(book.folder, problems)
 
 
-def _known(
-    distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool, same_bits: bool
-) -> dict[str, Outcome]:
+def _known(distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool) -> dict[str, Outcome]:
     """What needs not be computed: finished cases, and those that are known to fail."""
     outcomes = {}
     for key in distinct:
         record = recorded_failure(folder, key)
         entry = index.entries.get(key)
-        if entry is not None and not (same_bits and entry.attributes.get("transforms") != transform_library()):
+        if entry is not None:
             forget_failure(folder, key)
             outcomes[key] = outcome_of(entry, reused=True)
         elif record is not None and not retry_failed:
@@ -246,7 +235,6 @@ def _compute(
     book: SweepLog,
     client: Client | None,
     processes: int,
-    same_bits: bool,
     threads: int | None,
 ) -> None:
     if not todo or (client is None and not processes):
@@ -258,18 +246,18 @@ def _compute(
         book.begin()
         for key, case in todo.items():
             progress, here = partial(report, key), threads or cores()
-            book.ended(run_case_safely(case, folder, progress=progress, stop=None, threads=here, same_bits=same_bits))
+            book.ended(run_case_safely(case, folder, progress=progress, stop=None, threads=here))
         return
     from roughvisc.study.execution.dispatch import distribute
 
     if client is not None:
         texts = {key: serialize_with_inputs(case, folder / INPUTS) for key, case in todo.items()}
-        distribute(texts, book, client, threads, client.dashboard_link, same_bits)
+        distribute(texts, book, client, threads, client.dashboard_link)
         return
     texts = {key: case.to_json() for key, case in todo.items()}
     with local_client(processes) as own:
         link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-        distribute(texts, book, own, threads or threads_each(processes), link, same_bits)
+        distribute(texts, book, own, threads or threads_each(processes), link)
 
 
 def _processes(workers: int | None, cases: Sequence[Case]) -> int:

@@ -24,7 +24,6 @@ import numpy as np
 from distributed.core import Status
 
 from roughvisc.errors import ChangedError, DiskFullError, InputError, InUseError, RoughviscError, TransientError
-from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.files import atomic_write, refuse_link
@@ -124,7 +123,6 @@ def run_case_safely(
     progress: Progress,
     stop: Callable[[], bool] | None,
     threads: int,
-    same_bits: bool = False,
 ) -> Outcome:
     """Bring a case to its file and say how that ended; :class:`KeyboardInterrupt` passes through.
 
@@ -140,12 +138,10 @@ def run_case_safely(
         Asked at every step.
     threads : int
         Of a large grid.
-    same_bits : bool
-        As in :func:`roughvisc.study.execution.run.run_case`.
     """
     began = time.perf_counter()
     try:
-        path = run_case(case, folder, progress=progress, stop=stop, same_bits=same_bits, threads=threads)
+        path = run_case(case, folder, progress=progress, stop=stop, threads=threads)
         outcome = outcome_of(read_entry(path))
     except InUseError as error:
         outcome = Outcome(case.key, "held", str(error), type(error).__name__)
@@ -173,7 +169,7 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
     return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
 
 
-def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None, transforms: str) -> Outcome:
+def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None) -> Outcome:
     """The task of a worker: :func:`run_case_safely`, with progress sent to the scheduler.
 
     It ends as interrupted, with a checkpoint, if the sweep is stopped or the worker told to leave.
@@ -190,8 +186,6 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
         Name of the sweep: the topic of the reports, and what :func:`stop_sweep` is told.
     threads : int or None
         Of a large grid; None: as many as the worker has.
-    transforms : str
-        The library whose bits are asked for; empty: any.
     """
     from distributed import get_worker
 
@@ -215,16 +209,11 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None,
         report(0.0, 0.0)
         try:
             case = Case.from_json(text)
-            if transforms not in ("", transform_library()):
-                there = f"{worker.address} has {transform_library()}, and the bits of {transforms} are asked for"
-                return Outcome(key, "hindered", f"{there}: expected the same versions, or no same_bits")
             if case.key != key:
                 there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
                 return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
             threads = threads or worker.state.nthreads
-            return run_case_safely(
-                case, Path(folder), progress=report, stop=stop, threads=threads, same_bits=bool(transforms)
-            )
+            return run_case_safely(case, Path(folder), progress=report, stop=stop, threads=threads)
         except RoughviscError as error:  # a file that this machine does not have
             return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it

@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
 
-from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.recorder import Checkpoint, Frame
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.files import (
@@ -344,8 +343,6 @@ class CheckpointWriter:
         so many accepted steps.
     stop : callable or None
         Asked after every accepted step.
-    same_bits : bool
-        Do not go on from what other transforms have computed.
 
     Raises
     ------
@@ -363,7 +360,6 @@ class CheckpointWriter:
         seconds: float = 30.0,
         steps: int | None = None,
         stop: Callable[[], bool] | None = None,
-        same_bits: bool = False,
     ) -> None:
         refuse_link(folder, "the folder of an unfinished run")
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
@@ -377,7 +373,7 @@ class CheckpointWriter:
         self._folder = folder
         self._key = key
         self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
-        self._states, self._same_bits = states, same_bits
+        self._states = states
         self._pending, self._last_save = 0, time.monotonic()
 
     def resume(self) -> None:
@@ -388,11 +384,6 @@ class CheckpointWriter:
         found = [(reached, path) for reached, path in read if reached is not None]
         for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
             here = reached.with_current_transforms()
-            if here != reached and self._same_bits:
-                log.warning(
-                    "%s: was computed with %s: not used, this is %s", path, reached.transforms, transform_library()
-                )
-                continue
             if self.rows.keep_first(reached.rows):
                 log.info("%s: goes on from here", path)
                 self.latest = here

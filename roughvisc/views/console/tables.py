@@ -20,7 +20,6 @@ from roughvisc.views.realisation_rows import realisation_rows
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roughvisc.study.execution.profile import TimeProfile
     from roughvisc.study.execution.task import Outcome
     from roughvisc.study.validation.validate import Comparison
 
@@ -174,19 +173,6 @@ _LARGE = 1e9
 _FALLS = 1.02
 #: Cases that a plan lists one by one.
 _LISTED = 20
-
-
-def profile_table(profile: TimeProfile) -> Group:
-    """Where the time of a run went."""
-    table = Table(box=None, padding=(0, 2), title="Where the time went", title_justify="left", title_style="bold")
-    table.add_column("part")
-    for column in ("time", "share", "calls"):
-        table.add_column(column, justify="right")
-    for part, seconds in profile.seconds.most_common():
-        calls = profile.calls[part]
-        table.add_row(part, readable(seconds, "s"), f"{profile.share(part):.1%}", f"{calls:,}" if calls else "")
-    table.add_row("all", readable(profile.whole, "s"), "100.0%", "", style="bold")
-    return Group(table)
 
 
 def _grid(row: xr.Dataset) -> str:

@@ -112,9 +112,9 @@ def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
         '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.3 mm"\nshape = [16, 15]\n'
         '[material]\nmodel = "elastic"\nshear_modulus = "1 MPa"\n[[program]]\nload = "1 mN"\nover = 0\n'
     )
-    fast = rv.run(rv.read_study(study), progress=False)
+    fast = rv.run(rv.read_study(study), tmp_path / "fast", progress=False)
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
-    plain = rv.run(rv.read_study(study), progress=False, same_bits=True)
+    plain = rv.run(rv.read_study(study), tmp_path / "plain", progress=False)
     assert fast.roughvisc.attributes["transforms"].startswith("ducc0 ")
     assert plain.roughvisc.attributes["transforms"].startswith("scipy.fft ")
     np.testing.assert_allclose(fast.pressure, plain.pressure, rtol=0, atol=1e-9 * float(plain.pressure.max()))

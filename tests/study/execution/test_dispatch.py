@@ -18,7 +18,6 @@ from support import LOADS, LONG, assert_same, numbers
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError, InputError, InUseError, RoughviscError
 from roughvisc.groups import whole_of
-from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, has_other_versions
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
@@ -103,39 +102,6 @@ def test_lifetime__of_each_worker_is_shorter_than_the_sweep(study, tmp_path):
     assert sum(end == 0 for _, _, end in ear.heard) > 4, "some were begun again"
     run_cases(cases, tmp_path / "calm", watch=Monitor(), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
-
-
-# ----------------------------------------------------------------------------------------------------------------
-# workers with other transforms
-
-
-def test_other_transforms__are_told_and_computed_anew_on_request(study, tmp_path, monkeypatch):
-    cases, ear = study()[:2], Ear()
-    scipy = transform_library()
-    run_cases(cases[:1], tmp_path, watch=ear, workers=0)
-    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
-    ducc0 = transform_library()
-    assert not ear.messages
-    assert [o.reused for o in run_cases(cases, tmp_path, watch=ear, workers=0).values()] == [True, False]
-    (message,) = ear.messages
-    assert message.startswith(f"1 with {scipy}, 1 with {ducc0}, where this process has {ducc0}: equal within")
-    outcomes = run_cases(cases, tmp_path, watch=ear, workers=0, same_bits=True)
-    assert [o.reused for o in outcomes.values()] == [False, True]
-    assert {o.entry.attributes["transforms"] for o in outcomes.values()} == {ducc0}
-    assert ear.messages == [message]
-
-
-def test_other_transforms__on_a_worker_are_named_where_bits_are_asked_for(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(dispatch, "transform_library", lambda: "fftw 3")
-    cases, here = study()[:2], transform_library()
-    with (
-        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        asked = run_cases(cases[:1], tmp_path, watch=Ear(), client=client, same_bits=True)[cases[0].key]
-        other = run_cases(cases[1:], tmp_path, watch=Ear(), client=client)[cases[1].key]
-    assert (asked.kind, other.kind) == ("hindered", "done")
-    assert f" has {here}, and the bits of fftw 3 are asked for" in asked.message
 
 
 # ----------------------------------------------------------------------------------------------------------------

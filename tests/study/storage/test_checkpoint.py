@@ -531,8 +531,8 @@ def test_other_revision__begins_again(whole, tmp_path, monkeypatch, caplog, what
 
 
 def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, caplog):
-    """The tolerance is kept by either; whoever asks for bits has them."""
-    case, expected, steps = whole(MODES)
+    """The tolerance is kept by either."""
+    case, _, steps = whole(MODES)
     stopped(case, tmp_path, steps // 2)
     here = transform_library()
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
@@ -547,23 +547,9 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
         force = mixed.pressure.sum(("x", "y")).values
     assert run_case(case, tmp_path, stop=stop) == path
     assert stop.asked == steps - steps // 2, "it is finished"
-    (record,) = caplog.records
-    assert f"1 with {here}; then {there}, where this process has {there}: equal within" in record.getMessage()
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
-    assert values(run_case(case, tmp_path, same_bits=True)) == expected
-    with whole_result(path) as same:
-        assert same.roughvisc.attributes["transforms"] == here
+    with whole_result(run_case(case, tmp_path / "scipy")) as same:
         np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
-
-
-def test_other_transforms__begin_again_where_bits_are_asked_for(whole, tmp_path, monkeypatch):
-    case, _, steps = whole(MODES)
-    stopped(case, tmp_path, steps // 2)
-    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "ducc0")
-    stop = Stop()
-    with whole_result(run_case(case, tmp_path, stop=stop, same_bits=True)) as ds:
-        assert ds.roughvisc.attributes["transforms"] == transform_library()
-    assert stop.asked == steps
 
 
 def test_two_runs_at_once__the_second_says_so(whole, tmp_path):
