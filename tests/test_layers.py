@@ -66,7 +66,6 @@ ALLOWED = {
     "study.quantities": {"errors", "variables", "observables", "study.statement"},
     "study.trade": {*_TRADE, "study.quantities"},
     "study.budget": {*_TRADE, "study.quantities", "study.trade", "study.ensembles", "observables"},
-    "study.validation": {*_SOLVE, "solve", "mechanics.closed_forms"},
     "views.realisation_rows": {"units"},
     "views.figures": {*_LABELS, "study.storage", "study.trade", "topography", "observables"},
     "views.sweep_figures": {
@@ -98,7 +97,6 @@ ALLOWED = {
         "study.audit",
         "study.execution",
         "study.trade",
-        "study.validation",
         "observables",
     },
     "api": {*_SOLVE, "solve", "study.budget", "study.execution", "study.statement", "study.storage"},
@@ -114,7 +112,6 @@ ALLOWED = {
         "study.quantities",
         "study.trade",
         "study.budget",
-        "study.validation",
         "views.plot",
         "views.figures",
         "views.console",

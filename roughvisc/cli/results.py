@@ -1,4 +1,4 @@
-"""Commands on results: ``plot``, ``report``, ``audit``, ``verify`` and ``clean``; and ``validate``."""
+"""Commands on results: ``plot``, ``report``, ``audit``, ``verify`` and ``clean``."""
 
 from __future__ import annotations
 
@@ -106,34 +106,6 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
     for path in paths:
         with whole_result(path) as dataset:
             console.print(audit_table(audited(dataset, **given.stated())))
-
-
-@click.command()
-@click.option(
-    "--cells", type=click.IntRange(33), default=129, show_default=True, help="Cells along each side of the grids."
-)
-def validate(cells: int) -> None:
-    """Compare the solver with closed-form solutions on this machine.
-
-    Takes less than a minute on most machines. The expected errors follow from the grid and the tolerance. The exit
-    status is 1 if any error is larger than expected.
-
-    \b
-    Example:
-      roughvisc validate --cells 65
-    """
-    from rich.console import Console
-
-    from roughvisc.study.validation.validate import validate as validated
-    from roughvisc.views.console.tables import print_validation
-
-    console = Console()
-    with console.status("validating") as status:
-        found = validated(cells, progress=lambda done, of: status.update(f"validating: {done} of {of} cases done"))
-    print_validation(console, found)
-    failed = sum(not one.passed for one in found)
-    if failed:
-        raise Failure(f"{failed} of {len(found)} comparisons failed", 1)
 
 
 @click.command()

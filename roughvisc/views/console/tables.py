@@ -1,4 +1,4 @@
-"""Tables on the command line: sweeps, plans, scans, validation."""
+"""Tables on the command line: sweeps, plans, scans."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from roughvisc.study.execution.task import Outcome
-    from roughvisc.study.validation.validate import Comparison
 
 #: What is stated of accuracy, and its parts, each at its worst.
 _ERRORS = {
@@ -117,41 +116,6 @@ def plan_tables(costs: xr.Dataset) -> Group:
     if total > 1:
         parts += [Text(), _case_table(costs, varied)]
     return Group(*parts)
-
-
-def print_validation(console: Console, found: Sequence[Comparison]) -> None:
-    """What was held against closed forms: a table, or plain lines of it where there is no terminal.
-
-    Parameters
-    ----------
-    console : Console
-        Where to.
-    found : sequence of Comparison
-        Of :func:`roughvisc.validate`.
-    """
-    heading = ("case", "compared", "error", "expected", "verdict")
-    rows = [
-        (
-            "" if i and found[i - 1].case == one.case else one.case,
-            one.compared,
-            f"{one.error:.1e}",
-            f"{one.expected:.1e}",
-            "ok" if one.passed else "FAILED",
-        )
-        for i, one in enumerate(found)
-    ]
-    if console.is_terminal:
-        table = Table(box=None, pad_edge=False)
-        for name in heading:
-            table.add_column(name, justify="right" if name in ("error", "expected") else "left")
-        for row in rows:
-            table.add_row(*map(Text, row), style="" if row[-1] == "ok" else "bold red")
-        console.print(table)
-    else:
-        widths = [max(len(row[i]) for row in (heading, *rows)) for i in range(len(heading))]
-        for row in (heading, *rows):
-            line = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
-            console.print(Text(line.rstrip()), soft_wrap=True)
 
 
 #: What a result and a plan say in words.

@@ -1,4 +1,4 @@
-"""Validation cases: surface, closed form, and the error that the method explains.
+"""Contacts with closed-form solutions: surface, closed form, and the error that the method explains.
 
 All in units of their own: lengths in contact radii or wavelengths, moduli and times of order one; the solver is
 neutral to units. Each case yields rows ``(what is compared, error, expected error)``. The expected ones are sums of
@@ -35,9 +35,7 @@ from roughvisc.mechanics.bodies.layer import layer as layer_of
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.materials.models import (
     Material,
-    PowerLaw,
     Prony,
-    Tabulated,
     elastic,
     kelvin_voigt,
     maxwell,
@@ -217,46 +215,6 @@ def without_jump(cells: int) -> Rows:
     yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, radius) + _TOLERANCE
 
 
-def power_law(cells: int) -> Rows:
-    exact = closed_forms.power_law_ramp(_ROUND, 2 / _ROUND, 1.0, 0.5)
-    material = PowerLaw(0.0, 4.0, 0.5)  # C = J / 4
-    ds = _press(sphere(_ROUND, _SIZE, cells), material, Program().load(2 / _ROUND, over=1.0), times=[0.25, 0.5, 1.0])
-    yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
-
-
-def unloading(cells: int) -> Rows:
-    program = Program().load(0.8 / _ROUND, over=1.0).load(0.0, over=1.0)
-    exact = closed_forms.ting(closed_forms.Paraboloid(_ROUND), _ZENER, program)
-    ds = _press(sphere(_ROUND, _SIZE, cells), _ZENER, program, times=[0.5, 1.0, 1.5, 1.8])
-    h, smallest = _SIZE / cells, float(exact.radius(1.8))
-    yield "approach", _relative(ds.approach, exact.approach(ds.time)), _approach_error(cells)
-    yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, smallest) + _TOLERANCE
-    yield "pressure (L1)", _pressure_error(ds, exact.pressure), (h / smallest) ** 1.5 + _TOLERANCE
-
-
-def relaxation(cells: int) -> Rows:
-    program = Program().load(0.8 / _ROUND, over=0.2).hold(2.0, control="approach")
-    times = [0.1, 0.2, 0.5, 1.0, 2.2]
-    exact = closed_forms.reduced_contact(closed_forms.Paraboloid(_ROUND), _ZENER, program, times)
-    ds = _press(sphere(_ROUND, _SIZE, cells), _ZENER, program, times=times)
-    # under given approach the force takes the approach's error times d(ln W) / d(ln approach) = 3 / 2
-    expected = 1.5 * _approach_error(cells, float(exact.radius[-1]))
-    yield "force", _relative(ds.force, exact.force), expected
-    yield "work", _relative(ds.work, exact.work), expected * 5 / 3  # which is of power 5 / 2
-
-
-def wave(cells: int) -> Rows:
-    across = 3 / cells
-    mean = 2 * closed_forms.full_contact_pressure(1e-3, 1.0, 1.0, waves=1)
-    program, times = Program().load(mean * across, over=0).hold(2.0), [0.0, 0.5, 1.0, 2.0]
-    surface = wavy(1e-3, 1.0, (1.0, across), (cells, 3), waves=1)
-    ds = _press(surface, _ZENER, program, boundary="periodic", times=times)
-    exact = closed_forms.full_contact_wave(1e-3, 2 * np.pi, _ZENER, times)
-    crest = np.cos(2 * np.pi * ds.x.values)
-    error = np.mean(np.abs(ds.pressure.values[:, :, 1] - mean - exact[:, None] * crest), axis=1)
-    yield "pressure (L1)", float(np.max(error)) / mean, _TOLERANCE
-
-
 def _on(bodies: dict[str, tuple[Body, Sheet | closed_forms.ElasticLayer]]) -> Callable[[int], Rows]:
     """A ball on what is as thick as the contact comes to be wide; the base takes as much of the grid's error as of it.
 
@@ -302,24 +260,6 @@ def cycled_punch(cells: int) -> Rows:
     yield "dissipation in a cycle", _relative(found, exact), _SIZE / cells / 2 + _TOLERANCE * path
 
 
-def histories(cells: int) -> Rows:
-    """One measured material by the direct history and by a series, which is certified, on the same steps."""
-    t = np.geomspace(1e-6, 10.0, 400)
-    measured = Tabulated(tuple(t), tuple(4 * (2 - np.exp(-t))))
-    program = Program().load(0.2 / _ROUND, over=1.0).hold(1.0).load(0.1 / _ROUND, over=0.5)
-    ball, times = sphere(_ROUND, 2.0, cells), [1.0, 2.0, 2.5]
-    steps = {"times": times, "time_step": 0.05}
-    recursive = _press(ball, measured, program, **steps)
-    direct = _press(ball, measured, program, **steps, memory="direct", tolerance=1e-6)
-    certified = "in place of the compliance" in recursive.attrs["memory"]
-    yield "both histories at work", 0.0 if certified and "direct" in direct.attrs["memory"] else np.nan, 0.0
-    error = float(recursive.attrs["series_error"])
-    # what the contact solver leaves of the approach is of the order of its relative gap: far below the series' error
-    yield "approach", _relative(recursive.approach, direct.approach), error
-    pressure = abs(recursive.pressure - direct.pressure).sum(("x", "y")) / direct.pressure.sum(("x", "y"))
-    yield "pressure (L1)", float(pressure.max()), error + _TOLERANCE
-
-
 _SHEETS = {base: (sheet_of(_ZENER, 1.0, base), Sheet(1.0, _ZENER.poisson, base)) for base in get_args(Base)}
 _LAYERS = {
     f"{name} base": (
@@ -338,13 +278,16 @@ CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
     "Maxwell": ("sphere, step load, Maxwell (Lee, Radok)", _lee_radok(_MAXWELL)),
     "Zener": ("sphere, step load, Zener (Lee, Radok)", _lee_radok(_ZENER)),
     "Kelvin-Voigt": ("sphere, step load, Kelvin-Voigt (Lee, Radok)", without_jump),
-    "power law": ("sphere, ramp of load, t^0.5 (Lee, Radok)", power_law),
-    "Ting": ("sphere, triangle of load, Zener (Ting)", unloading),
-    "relaxation": ("sphere, load then fixed approach, Zener (element reduction)", relaxation),
-    "full wave": ("wave in full contact, periodic, Zener", wave),
     "sheet": ("sphere on a sheet, step load, Zener (Fredholm equation; Lee, Radok)", _on(_SHEETS)),
     "layer": ("sphere on a layer, step load, Zener (Fredholm equation; Lee, Radok)", _on(_LAYERS)),
     "punch": ("flat punch, loaded and unloaded, Zener", loaded_punch),
     "cycles": ("flat punch, cycles of approach, Zener", cycled_punch),
-    "histories": ("sphere, measured creep: series against direct history", histories),
 }
+
+
+if (
+    __name__ == "__main__"
+):  # `PYTHONPATH=tests python -m references.closed_cases` prints the table of docs/validation.md
+    for title, compare in CASES.values():
+        for row, (what, error, expected) in enumerate(compare(129)):
+            print(f"| {'' if row else title} | {what} | {error:.1e} | {expected:.1e} |")

@@ -1,1 +1,0 @@
-"""Validation against closed forms on the machine of the user."""

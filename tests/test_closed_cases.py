@@ -1,0 +1,67 @@
+"""The solver compared with closed forms; the comparison fails on a solver that is broken in any of its parts."""
+
+import pytest
+from references.closed_cases import CASES
+
+from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.hereditary.exponentials import Modes
+
+
+def compared(name, cells):
+    return list(CASES[name][1](cells))
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("cells", [33, pytest.param(52, marks=pytest.mark.thorough)])
+def test_error__is_at_most_what_the_method_explains(name, cells):
+    for what, error, expected in compared(name, cells):
+        assert error <= expected, what
+
+
+def test_expected_errors__shrink_with_the_grid_down_to_the_tolerance():
+    """No case passes by an allowance that hides everything."""
+    for name in ("Hertz", "Sneddon", "Maxwell"):
+        coarse, fine = ([expected for *_, expected in compared(name, cells)] for cells in (33, 99))
+        assert all(after < min(before, 0.02) for before, after in zip(coarse, fine, strict=True))
+
+
+def scaled_displacement(monkeypatch):
+    """A kernel one per cent too soft."""
+    sound = Operator.displacement
+    monkeypatch.setattr(Operator, "displacement", lambda self, *given: 1.01 * sound(self, *given))
+
+
+def forgetful_recursion(monkeypatch):
+    """A memory that loses two per cent of what it carries."""
+    sound = Modes.predict
+
+    def predict(self, *arguments):
+        alpha, carried = sound(self, *arguments)
+        return alpha, 0.98 * carried
+
+    monkeypatch.setattr(Modes, "predict", predict)
+
+
+def stiff_step(monkeypatch):
+    """The compliance of a step one per cent too small."""
+    sound = Modes.predict
+
+    def predict(self, *arguments):
+        alpha, carried = sound(self, *arguments)
+        return 0.99 * alpha, carried
+
+    monkeypatch.setattr(Modes, "predict", predict)
+
+
+@pytest.mark.parametrize(
+    ("fault", "cases"),
+    [
+        (scaled_displacement, ["Hertz", "Johnson", "Zener"]),
+        (forgetful_recursion, ["Maxwell", "punch"]),
+        (stiff_step, ["Hertz", "Zener", "punch"]),
+    ],
+)
+def test_broken_solver__exceeds_the_expected_error(fault, cases, monkeypatch):
+    fault(monkeypatch)
+    for name in cases:
+        assert any(not error <= expected for _, error, expected in compared(name, 65)), name
