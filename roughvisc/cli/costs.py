@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from roughvisc.cli.group import PATH, Failure, complain, say
+from roughvisc.cli.group import PATH, Failure, say
 from roughvisc.errors import printable
 
 if TYPE_CHECKING:
@@ -38,8 +38,6 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     costs = planned(study, out, workers=workers)
     if not costs["refusal"].all():
         Console().print(plan_tables(costs))
-    if costs.attrs["upgrade"]:
-        complain(costs.attrs["upgrade"])
     if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
         raise Failure(f"{study}: cannot run: {why}", 2)
 

@@ -140,23 +140,19 @@ def verify(results: Path) -> None:
 @click.command()
 @click.argument("results", type=PATH)
 @click.option("--all", "everything", is_flag=True, help="Also remove checkpoints, damaged results and failure records.")
-@click.option("--superseded", is_flag=True, help="Also remove results that this version has computed again.")
-def clean(results: Path, everything: bool, superseded: bool) -> None:
-    """Remove leftovers of interrupted runs and earlier versions.
+def clean(results: Path, everything: bool) -> None:
+    """Remove leftovers of interrupted runs.
 
-    Removes incomplete files, locks of dead runs, and checkpoints that no run can use: of finished cases, or of earlier
-    versions. Keeps results, and checkpoints of unfinished cases unless --all is given. Lists results of other versions;
-    --superseded removes those that this version has computed again. Cases in use by a run are not touched.
+    Removes incomplete files, locks of dead runs, and checkpoints of finished cases. Keeps results, and checkpoints of
+    unfinished cases unless --all is given. Cases in use by a run are not touched.
 
     \b
     Example:
       roughvisc clean results/focus_variation-study
     """
-    from roughvisc.study.storage.upkeep import clean_folder, kept_of_other_versions
+    from roughvisc.study.storage.upkeep import clean_folder
 
-    removed = clean_folder(results, everything=everything, outdated=True, superseded=superseded)
+    removed = clean_folder(results, everything=everything)
     for path in removed:
         click.echo(printable(f"removed {path.name}"))
-    for line in kept_of_other_versions(results):
-        click.echo(printable(f"kept {line}"))
     click.echo(f"{counted(len(removed), 'leftover')} removed")

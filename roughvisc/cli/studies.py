@@ -134,7 +134,6 @@ def _run_one(
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
     from roughvisc.study.storage.store import result_path, whole_result
-    from roughvisc.study.storage.upkeep import upgrade_note
     from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key)):
@@ -145,8 +144,6 @@ def _run_one(
             plots = False
     else:
         require_writable(folder, "since the case is not finished")
-        if told := upgrade_note(folder, [case]):
-            complain(told)
     end_if_interrupted()
     with Bar(console, label, case.at) as bar:
         path = run_case(case, folder, progress=bar.reached, threads=threads or threads_each(1))

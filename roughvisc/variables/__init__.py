@@ -52,9 +52,6 @@ VARIABLES: dict[str, Variable] = {
     "y_bounds": Variable(("y", "bnds"), "", "borders of the cells along y", "in files alone"),
     "step": Variable(("step",), "1", "number of the accepted step", "counted from 0", dtype="int32"),
     "case_key": Variable((), "", "key of the case", "what the file is named by", dtype="str"),
-    "roughvisc_version": Variable(
-        (), "", "version that computed the case", "of roughvisc, and the revision of its numerics", dtype="str"
-    ),
     # the surface
     "height": Variable(
         _GRID,

@@ -61,7 +61,6 @@ from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.parameters import labels_of, parameters_of
-from roughvisc.study.storage.upkeep import upgrade_note
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import unit_for
@@ -173,8 +172,8 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     xarray.Dataset
         One row per case along ``case``, with varied parameters as coordinates; a notebook shows it as a table.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
-        thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, ``refusal``,
-        empty if all cases can run, and ``upgrade``, results of another version in the folder, empty if there are none.
+        thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, and
+        ``refusal``, empty if all cases can run.
 
     Raises
     ------
@@ -215,9 +214,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     labels = labels_of(parameters, stated[0], ("case",)).values()
     coords |= dict(zip(parameters, labels, strict=True))
     dataset = Plan(columns, coords=coords)
-    dataset.attrs = {"title": cases[0].title, "upgrade": upgrade_note(folder, cases)} | totals(
-        dataset, folder, workers, there
-    )
+    dataset.attrs = {"title": cases[0].title} | totals(dataset, folder, workers, there)
     return dataset
 
 

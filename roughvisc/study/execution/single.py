@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -14,13 +13,10 @@ from roughvisc.study.execution.run import Progress, is_result_of, result_folder,
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.store import open_result, result_path
-from roughvisc.study.storage.upkeep import upgrade_note
 
 if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
-
-log = logging.getLogger("roughvisc")
 
 
 def run_stated(
@@ -34,8 +30,6 @@ def run_stated(
     folder, client = result_folder(case, out, to_write=False), default_client()
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
-        if told := upgrade_note(folder, [case]):
-            log.warning("%s", told)
     if client is None:
         path = run_case(case, folder, progress=progress, threads=threads)
     else:

@@ -27,7 +27,7 @@ from roughvisc.study.storage.failures import LOG, forget_failure, log_file, reco
 from roughvisc.study.storage.files import UNSEALED, is_writable, refuse_link, require_writable
 from roughvisc.study.storage.index import Index, index_of, warn_of
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.upkeep import clean_folder, upgrade_note
+from roughvisc.study.storage.upkeep import clean_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,8 +205,6 @@ def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], wri
     """Say what there is to say of the folder before anything is computed, each thing once."""
     if not writable:
         book.tell(f"{book.folder}: is not writable: all cases are finished, and nothing is written")
-    if told := upgrade_note(book.folder, list(todo.values()), index):
-        book.tell(told)
     problems = dict(index.problems)
     for key in index.problems.keys() & todo.keys():
         if told := set_aside_damaged(todo[key], book.folder):

@@ -283,19 +283,6 @@ def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkp
     return reached
 
 
-def checkpoint_version(folder: Path) -> tuple[int, int] | None:
-    """Revision of the numerics and format of an unfinished run's latest checkpoint; None if there is none to read."""
-    found = []
-    for path in folder.glob("checkpoint.*"):
-        try:
-            with open(path, "rb", buffering=0) as stream:
-                plain, _ = read_record(stream, only=())
-            found.append((int(plain["revision"]), int(plain.get("result_format", 1))))
-        except (Damaged, OSError, KeyError, TypeError, ValueError):
-            continue
-    return max(found, default=None)
-
-
 def _flatten(value: Any, arrays: dict[str, Any], seen: dict[int, str]) -> Any:
     """A value as JSON knows it, its arrays put aside under names, the same array once."""
     if isinstance(value, np.ndarray):

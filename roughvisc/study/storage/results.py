@@ -16,7 +16,6 @@ from roughvisc.groups import for_root, root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.variation import DRAWN, REALISATION
-from roughvisc.study.storage.files import warn_once
 from roughvisc.study.storage.index import LATEST, Entry, index_of, save_index
 from roughvisc.study.storage.parameters import (
     CASE_KEY,
@@ -27,12 +26,9 @@ from roughvisc.study.storage.parameters import (
     parameters_of,
 )
 from roughvisc.study.storage.store import no_results, read_variable
-from roughvisc.study.storage.upkeep import counted_versions, version_of
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES
 
-#: Coordinate that says which version computed each case.
-VERSION = "roughvisc_version"
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
 #: Attributes that all results of a sweep share.
@@ -84,8 +80,7 @@ def open_results(out, *, cases="last", ragged=False):
         only if heights differ. A sweep with ``realisations`` has ``realisation`` as second dimension, in which 0 is a
         measured surface itself; what has not been computed is missing there, with an empty key. Varied parameters are
         coordinates on ``case``, numbers in SI or strings, each under two names: its dotted key, and its identifier in
-        the files, ``program_0_load``. The coordinate ``roughvisc_version`` states which version computed each case; if
-        they differ, a warning lists them. In a tree the parameters are scalar coordinates of each node, whose name is
+        the files, ``program_0_load``. In a tree the parameters are scalar coordinates of each node, whose name is
         the key of the case.
 
     Raises
@@ -112,9 +107,6 @@ def open_results(out, *, cases="last", ragged=False):
     drawn = dict(index.realisations)
     if not isinstance(cases, str):
         drawn = {case.key: case.varied[REALISATION] for case in cases if REALISATION in case.varied}
-    if len({version_of(entry.attributes) for entry in entries}) > 1:
-        told = f"{folder}: results of several versions: {counted_versions(entries)}"
-        warn_once(folder / entries[0].file, f"{told}; the coordinate {VERSION} says which is which")
     parameters = parameters_of([as_realisation(entry.case, drawn.get(entry.key)) for entry in entries])
     if ragged:
         return _tree(folder, entries, parameters)
@@ -174,8 +166,6 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
     dataset = xr.Dataset(variables, coords=coords, attrs=_attributes(entries))
     dataset = annotate(dataset)
     keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
-    versions = np.array([version_of(entry.attributes) for entry in entries])
-    keys[VERSION] = (("case",), versions, VARIABLES[VERSION].attributes())
     labels = labels_of(parameters, first.case, ("case",))
     return root_of(_by_realisation(dataset.assign_coords(keys | labels), parameters))
 

@@ -1,129 +1,18 @@
-"""Upkeep of a folder of results: what is whole, which version computed what, what killed runs have left."""
+"""Upkeep of a folder of results: verify the files, and remove what killed runs have left."""
 
 from __future__ import annotations
 
 import re
 import shutil
 import time
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from roughvisc.errors import InputError, InUseError
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import NUMERICS_REVISION, program_version
-from roughvisc.study.storage.checkpoint import checkpoint_version
 from roughvisc.study.storage.files import checksum_error, is_sealed, require_folder
-from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import NETCDF, result_path, results_at
-from roughvisc.variables import RESULT_FORMAT
-
-
-def version_of(attributes: Mapping[Any, Any]) -> str:
-    """Version that computed a result, by its attributes.
-
-    Examples
-    --------
-    >>> version_of({"source": "roughvisc 0.1", "numerics_revision": 15})
-    'roughvisc 0.1 (numerics 15)'
-    >>> version_of({"source": "roughvisc 0.1"})
-    'roughvisc 0.1 (numerics not stated)'
-    """
-    revision = attributes.get("numerics_revision", "not stated")
-    return f"{attributes.get('source', 'an unknown program')} (numerics {revision})"
-
-
-def counted_versions(entries: Iterable[Entry]) -> str:
-    """How many results which versions computed, in words."""
-    counts = Counter(version_of(entry.attributes) for entry in entries)
-    return ", ".join(f"{count} by {version}" for version, count in counts.items())
-
-
-def superseded_results(entries: Iterable[Entry]) -> dict[str, str]:
-    """Results of another revision of the numerics, which no case of today finds.
-
-    Returns
-    -------
-    dict
-        Key of the result -> key that its case has today.
-    """
-    found = {}
-    for entry in entries:
-        if entry.attributes.get("numerics_revision") != NUMERICS_REVISION and (key := _key_today(entry)) != entry.key:
-            found[entry.key] = key
-    return found
-
-
-def _key_today(entry: Entry) -> str:
-    """Key that the case of a result has in this version; empty where that cannot be told, as its scan is gone."""
-    try:
-        return Case.from_json(str(entry.attributes["case"])).key
-    except InputError:
-        return "" if "numerics_revision" in entry.attributes else entry.key
-
-
-def checkpoints(folder: Path) -> dict[Path, tuple[int, int]]:
-    """Folders of unfinished runs whose checkpoints nothing in this version goes on from: their numerics and format."""
-    found = {place: checkpoint_version(place) for place in sorted(folder.glob(".*.unfinished"))}
-    return {place: version for place, version in found.items() if version is not None and version != _today()}
-
-
-def _today() -> tuple[int, int]:
-    return NUMERICS_REVISION, RESULT_FORMAT
-
-
-def upgrade_note(folder: Path, cases: Sequence[Case], index: Index | None = None) -> str:
-    """What to say before some cases are computed that another version has computed in the same folder.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the results; it need not exist.
-    cases : sequence of Case
-        Those that are to be computed if they are not finished.
-    index : Index, optional
-        Of the folder, if that is known.
-
-    Returns
-    -------
-    str
-        Empty if there is nothing to say.
-    """
-    if not folder.is_dir():
-        return ""
-    index = index or index_of(folder, warn=False)
-    todo = {case.key: case for case in cases if case.key not in index.entries}
-    if not todo:
-        return ""
-    surfaces = {case.surface_sha256 for case in todo.values()}
-    # a recipe may have come by more keys since, and another checksum with them
-    alike = [
-        entry
-        for entry in index.entries.values()
-        if entry.attributes.get("surface_sha256") in surfaces or "recipe" in entry.attributes
-    ]
-    again = [index.entries[key] for key, today in superseded_results(alike).items() if today in todo]
-    left = checkpoints(folder)
-    told = []
-    if again:
-        results, cases_told = (
-            ("1 result here is", "its case is")
-            if len(again) == 1
-            else (f"{len(again)} results here are", "their cases are")
-        )
-        told.append(
-            f"{results} of another version ({counted_versions(again)}); this is {program_version()}, whose numerics "
-            f"may give other numbers: {cases_told} computed again, and the old files are kept"
-        )
-    if left:
-        runs = "1 unfinished run" if len(left) == 1 else f"{len(left)} unfinished runs"
-        revisions = ", ".join(map(str, sorted({revision for revision, _ in left.values()})))
-        told.append(f"the checkpoints of {runs} are of numerics {revisions}: nothing goes on from them here")
-    return f"{folder}: {'; '.join(told)} (roughvisc clean {folder} says more)" if told else ""
 
 
 @dataclass(frozen=True)
@@ -199,10 +88,8 @@ _PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
 _ABANDONED = 3600.0
 
 
-def clean_folder(
-    folder: str | Path, *, everything: bool = False, outdated: bool = False, superseded: bool = False
-) -> list[Path]:
-    """Remove what is of no use to anybody: torn files, locks of dead runs, checkpoints of finished cases.
+def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
+    """Remove incomplete files, locks of dead runs, and checkpoints of finished cases.
 
     Parameters
     ----------
@@ -212,11 +99,6 @@ def clean_folder(
     everything : bool
         Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were set aside,
         and records of failures.
-    outdated : bool
-        Also remove the checkpoints of earlier versions, from which nothing in this one goes on. Those of later ones
-        stay, and so do they all where a sweep tidies up: somebody may go back to the version that wrote them.
-    superseded : bool
-        Also remove results of other revisions of the numerics whose cases this one has computed again.
 
     Returns
     -------
@@ -239,44 +121,8 @@ def clean_folder(
             others.append(path)
     if everything:
         others += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
-    former = [place for place, version in checkpoints(folder).items() if version < _today()] if outdated else []
-    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything, former)]
-    removed += [path for path in others if _removed(path)]
-    if superseded:
-        entries = index_of(folder, warn=False).entries
-        again = [key for key, today in superseded_results(entries.values()).items() if today in entries]
-        removed += [path for key in again if (path := _result_of(folder, key))]
-    return removed
-
-
-def _result_of(folder: Path, key: str) -> Path | None:
-    """Remove the result of a case, unless a run is at work on it; its path if it is gone."""
-    with suppress(InUseError, OSError), lock_case(lock_path(folder, key), patience=0.0):
-        path = result_path(folder, key)
-        return path if _removed(path) else None
-    return None
-
-
-def kept_of_other_versions(folder: Path) -> list[str]:
-    """What a folder holds of other versions of roughvisc, a line each kind."""
-    entries = index_of(folder, warn=False).entries
-    former = superseded_results(entries.values())
-    again = [entries[key] for key, today in former.items() if today in entries]
-    alone = [entries[key] for key, today in former.items() if today not in entries]
-    told = []
-    for found, what in (
-        (again, "computed again by this version; --superseded removes them"),
-        (alone, "not computed by this version, which would compute their cases again"),
-    ):
-        if found:
-            size = f"{sum(entry.stamp[0] for entry in found) / 1e6:.3g} MB"
-            results = "1 result" if len(found) == 1 else f"{len(found)} results"
-            told.append(f"{results} ({counted_versions(found)}), {size}: {what}")
-    return told + [
-        f"{place.name}: a checkpoint of a later version (numerics {version[0]})"
-        for place, version in checkpoints(folder).items()
-        if version > _today()
-    ]
+    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything)]
+    return removed + [path for path in others if _removed(path)]
 
 
 def _is_abandoned(path: Path) -> bool:
@@ -286,8 +132,8 @@ def _is_abandoned(path: Path) -> bool:
         return False
 
 
-def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdated: list[Path]) -> list[Path]:
-    """Remove what is of no use of one case, while its lock is held; with it checkpoints that are outdated."""
+def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> list[Path]:
+    """Remove what no run of one case can use, while its lock is held."""
     lock, result = lock_path(folder, key), result_path(folder, key)
     if lock.is_symlink():  # nobody's lock
         return [path for path in [lock] if _removed(path)]
@@ -295,11 +141,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool, outdat
     needed = [
         path
         for path in paths
-        if path.suffix == ".unfinished"
-        and not path.is_symlink()
-        and any(path.glob("checkpoint.*"))
-        and not finished
-        and path not in outdated
+        if path.suffix == ".unfinished" and not path.is_symlink() and any(path.glob("checkpoint.*")) and not finished
     ]
     if needed == paths:
         return []

@@ -28,7 +28,7 @@ from roughvisc.views.sweep_figures.ensembles import Band, pooled
 
 #: Quantities that span decades, and of which zero means that there is none.
 _SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")
-_NO_PARAMETERS = ("case", "case_key", "roughvisc_version")
+_NO_PARAMETERS = ("case", "case_key")
 
 
 @dataclass(frozen=True)
