@@ -57,7 +57,6 @@ from roughvisc.topography.conditioning import mask_outliers as mask_outliers
 from roughvisc.topography.conditioning import mirror as mirror
 from roughvisc.topography.conditioning import resample as resample
 from roughvisc.topography.conditioning import rotate90 as rotate90
-from roughvisc.topography.conditioning import taper as taper
 from roughvisc.topography.conditioning import without_short_waves as without_short_waves
 from roughvisc.topography.example import example_scan as example_scan
 from roughvisc.topography.parameters import parameters as parameters

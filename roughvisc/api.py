@@ -64,7 +64,7 @@ def simulate(
         periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet includes its compression.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the given
-        grid, absent cells included, or for a tapered surface over the integral of the taper's weight.
+        grid, absent cells included.
     boundary : {"auto", "free", "periodic"}
         ``free`` for an indenter, ``periodic`` for a nominally flat scan. ``auto`` is ``free`` for the indenters of
         this package, and ``periodic`` for its waves, its self-affine roughness and any surface with its mirror images

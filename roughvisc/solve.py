@@ -23,7 +23,7 @@ from roughvisc.mechanics.bodies.body import separability_error
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.problem import Problem
 from roughvisc.recorder import Checkpoint, MemoryRecorder, Recorder, RowStore
-from roughvisc.topography.grid import TAPER, checked, nominal_area
+from roughvisc.topography.grid import checked, nominal_area
 from roughvisc.variables import RESULT_FORMAT, STEPPED, of_step
 
 log = logging.getLogger("roughvisc")
@@ -162,10 +162,9 @@ def dataset_of(problem: Problem, experiment: Experiment, rows: Rows, records: Ro
     variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
     if "filled" in height.coords:
         variables["filled"] = (("x", "y"), height["filled"].values)
-    taper = {name: height[name].variable for name in TAPER if name in height.coords}
     dataset = xr.Dataset(
         variables,
-        coords={axis: (axis, stamp), "x": height["x"].values, "y": height["y"].values, **taper},
+        coords={axis: (axis, stamp), "x": height["x"].values, "y": height["y"].values},
         attrs={
             "Conventions": "CF-1.11",
             "result_format": RESULT_FORMAT,

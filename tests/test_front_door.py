@@ -171,7 +171,6 @@ def test_text__is_the_number():
     assert rv.sphere(radius="1 mm", size=("200 um", 3e-4), shape=9).identical(rv.sphere(1e-3, (2e-4, 3e-4), 9))
     assert rv.crop(h, x=("0.2 mm", 6e-4)).identical(rv.crop(h, x=(2e-4, 6e-4)))
     assert rv.gaussian_filter(h, "0.2 mm").identical(rv.gaussian_filter(h, 2e-4))
-    assert rv.taper(h, "0.1 mm").identical(rv.taper(h, 1e-4))
     assert rv.from_array(h.values, "10 um").identical(rv.from_array(h.values, 1e-5))
     rubber = rv.zener(shear_modulus="3 MPa", kelvin_modulus="1 MPa", kelvin_viscosity="0.1 MPa s")
     assert rubber == rv.zener(3e6, 1e6, 1e5)

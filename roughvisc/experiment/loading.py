@@ -302,7 +302,7 @@ class LoadingRows(Rows):
             "status": self._status(step, converged, count),
             "contact_area": area,
             "contact_area_counted": touching,
-            "contact_fraction": self.profile.contact_fraction(contact, area),
+            "contact_fraction": self.profile.contact_fraction(area),
             "mean_gap": mean_gap,
             **friction_columns(step),
         }

@@ -182,7 +182,7 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
         sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
-    return note + " Use mirror = true under [surface]; a taper also removes the step, but changes the contact."
+    return note + " Use mirror = true under [surface]."
 
 
 def edge_note(time: float) -> str:

@@ -18,7 +18,7 @@ from roughvisc.mechanics.bodies.window import Window, whole_domain, window_aroun
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Missing, Settings
 from roughvisc.topography.borders import is_mirrored
-from roughvisc.topography.grid import checked, nominal_area, spacing, taper_weights
+from roughvisc.topography.grid import checked, nominal_area, spacing
 from roughvisc.topography.indenters import grown, highest
 
 Array = NDArray[np.float64]
@@ -103,7 +103,6 @@ class Profile:
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
         self.spacing = spacing(self.height, "height")
-        self._taper = taper_weights(self.domain)
         self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
 
     @property
@@ -116,24 +115,10 @@ class Profile:
         """The body under the window's grid."""
         return Operator(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
 
-    def contact_fraction(self, contact: NDArray[np.bool_], area: float) -> float:
-        """Contact area over that of the surface; on a tapered one both are weighted by the taper.
-
-        Parameters
-        ----------
-        contact : ndarray of bool, of the window's shape
-            Cells in contact.
-        area : float
-            Contact area: those cells, over all of the surface, counted or corrected for the grid. [m2]
-        """
+    def contact_fraction(self, area: float) -> float:
+        """Contact area over the area of the surface. [-]"""
         dx, dy = self.spacing
-        fraction = area / (dx * dy * self.height.size)
-        if self._taper is None or area == 0:
-            return fraction
-        along_x, along_y = self._taper
-        rows, columns = self.window.cells
-        weighted = along_x[rows] @ contact @ along_y[columns] / (along_x.sum() * along_y.sum())
-        return fraction * float(weighted) * self.domain.size / np.count_nonzero(contact)
+        return area / (dx * dy * self.height.size)
 
     def can_grow(self) -> bool:
         """Whether the profile is known beyond its grid: its recipe still gives the heights."""

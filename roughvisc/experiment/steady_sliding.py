@@ -246,7 +246,7 @@ class SlidingRows(Rows):
             "approach": found.approach,
             "contact_area": area,
             "contact_area_counted": counted,
-            "contact_fraction": profile.contact_fraction(contact, area),
+            "contact_fraction": profile.contact_fraction(area),
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,

@@ -95,7 +95,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
 
     Attributes stay through selection and arithmetic. Therefore a recipe is believed only where it gives the heights
     again, and :func:`mirror <roughvisc.mirror>` only where the heights still are their own mirror images. Anything
-    else that was done to a surface, a taper too, leaves open what lies beyond its border.
+    else that was done to a surface leaves open what lies beyond its border.
 
     Parameters
     ----------

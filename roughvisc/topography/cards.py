@@ -3,7 +3,7 @@
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
 Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
 their order in the file: crop, rotate90, invert, level, outliers, fill, filter, shortest_wave, realisation, band_limit,
-resample, taper, mirror.
+resample, mirror.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
         cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate, or a table of ``number`` and ``seed``), ``band_limit`` and ``resample`` (cells), ``taper`` (width)
+        a surrogate, or a table of ``number`` and ``seed``), ``band_limit`` and ``resample`` (cells),
         and ``mirror``. They act in this order; false leaves a step out.
 
     Returns
@@ -307,7 +307,6 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "realisation": _realisation,
     "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
-    "taper": lambda h, value: conditioning.taper(h, _quantities(value, "m", "taper")),
     "mirror": _switch("mirror", conditioning.mirror),
 }
 #: Steps that leave a surface that repeats one that does.

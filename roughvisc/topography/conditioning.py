@@ -5,7 +5,7 @@ NaN, and stay so until :func:`fill`.
 """
 
 from roughvisc.topography.bandwidth import gaussian_filter, level
-from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90, taper
+from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.missing_points import fill, mask_outliers
 from roughvisc.topography.resampling import band_limit, resample, without_short_waves
 
@@ -20,7 +20,6 @@ __all__ = [
     "rotate90",
     "invert",
     "combine",
-    "taper",
     "mirror",
     "without_short_waves",
 ]

@@ -1,4 +1,4 @@
-"""Framing of scans: cropping, rotation, inversion, combination, taper and mirror extension."""
+"""Framing of scans: cropping, rotation, inversion, combination and mirror extension."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import TURNS
-from roughvisc.topography.blocks import mean_of, row_blocks
 from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
@@ -17,13 +16,9 @@ from roughvisc.topography.grid import (
     like,
     noted,
     number,
-    pair,
-    require_heights,
     spacing,
-    taper_weights,
     with_coordinates,
     with_filled_points,
-    with_taper_weights,
 )
 from roughvisc.topography.resampling import Cells, lay_on_cells, marked
 from roughvisc.units import Quantity, quantities
@@ -93,11 +88,9 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
     axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
-    weights, filled = taper_weights(h), filled_points(h)
-    for _ in range(turns % 4 if weights is not None else 0):
-        weights = weights[1][::-1], weights[0]
+    filled = filled_points(h)
     filled = None if filled is None else np.rot90(filled, turns)
-    grid = with_coordinates(heights, *axes, h.attrs, taper=weights, filled=filled)
+    grid = with_coordinates(heights, *axes, h.attrs, filled=filled)
     kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
     return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
 
@@ -149,7 +142,7 @@ def combine(
     -------
     xarray.DataArray
         Sum of heights on the grid of the first face, missing where either face is missing, and marked as filled where
-        either was filled. It counts as tapered if both faces are. [m]
+        either was filled. [m]
 
     Raises
     ------
@@ -190,8 +183,6 @@ def combine(
     both.attrs = {key: value for key, value in h1.attrs.items() if key not in lost}
     if _absent_only(h1) and _absent_only(h2) and np.isnan(both.values).any():
         both.attrs["missing"] = "absent"
-    tapers = taper_weights(h1), taper_weights(h2)
-    both = with_taper_weights(both, None if None in tapers else tuple(map(np.maximum, *tapers)))
     marks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
     both = with_filled_points(both, np.logical_or.reduce(marks) if marks else None)
     methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
@@ -243,11 +234,8 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataAr
         cells.append(Cells(lower[covered], side, n2))
     first = h1.isel(kept)
     heights, way = lay_on_cells(h2, *cells)
-    weights = taper_weights(h2)
-    if weights is not None:
-        weights = cells[0].weights() @ weights[0], cells[1].weights() @ weights[1]
     x, y = (first[axis].values for axis in ("x", "y"))
-    return first, with_coordinates(heights, x, y, h2.attrs, taper=weights, filled=marked(h2, *cells)), way
+    return first, with_coordinates(heights, x, y, h2.attrs, filled=marked(h2, *cells)), way
 
 
 def _absent_only(h: xr.DataArray) -> bool:
@@ -266,55 +254,6 @@ def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
             f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
             "(see also resample and crop)"
         )
-
-
-@quantities(width="m")
-def taper(h: xr.DataArray, width: Quantity | tuple[Quantity, Quantity]) -> xr.DataArray:
-    """Let heights fall to their mean at the border, so that the surface repeats without a step.
-
-    Parameters
-    ----------
-    h : xarray.DataArray
-        Height over (x, y). [m]
-    width : float or str, or pair of them
-        Width of the margin along each border, at most half a side. [m]
-
-    Returns
-    -------
-    xarray.DataArray
-        Mean plus the deviation times a raised cosine, which is zero on the border and one inside the margin. The
-        coordinates ``taper_x`` and ``taper_y`` contain these weights along each axis. [m]
-
-    Notes
-    -----
-    A taper is not equivalent to :func:`mirror`, which does not change the roughness. The margin is smooth, and more of
-    it touches under a higher load. The nominal area of a tapered surface is the integral of the weight, and in the
-    contact fraction of a result each cell counts by its weight. On periodic self-affine surfaces, whose true contact is
-    known without a taper, and with margins of up to 10 % of the side, this fraction is accurate to 3 % for true
-    fractions of up to 0.2, and 6 % too small at 0.4. The contact area over the area of the whole grid is 8 % too small
-    at a margin of 3 %, and 17 % at 10 %, where the mean gap has the same error. An audit has a row ``window``: doubtful
-    from a margin of 3 % of the side, broken from 10 %.
-    """
-    h = checked(h, "taper")
-    widths = pair("width", width)
-    require_heights(h, "taper")
-    mean = mean_of(h.values)
-    profiles = []
-    for w, d, n in zip(widths, spacing(h), h.shape, strict=True):
-        if w > n * d / 2 * (1 + 1e-9):
-            raise InputError(f"taper: width is {w!r}: expected at most half a side, {n * d / 2:.6g} [m]")
-        from_border = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5) * d
-        profiles.append(np.sin(np.pi / 2 * np.minimum(from_border / w, 1)) ** 2)
-    heights = np.empty_like(h.values)
-    for rows in row_blocks(h.shape):
-        heights[rows] = mean + (h.values[rows] - mean) * (profiles[0][rows, None] * profiles[1])
-    before = taper_weights(h)
-    weights = (profiles[0], profiles[1])
-    if before is not None:
-        weights = (profiles[0] * before[0], profiles[1] * before[1])
-    tapered = with_taper_weights(like(h, heights), weights)
-    line = f"tapered over {widths[0]:.6g} x {widths[1]:.6g} m"
-    return noted(tapered, line, period=period_of(h))
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
@@ -344,10 +283,6 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     }
     alone = {name: one.variable for name, one in h.coords.items() if not one.dims}
     doubled = xr.DataArray(_with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
-    weights = taper_weights(h)
-    if weights is not None:
-        weights = (np.r_[weights[0], weights[0][::-1]], np.r_[weights[1], weights[1][::-1]])
-    doubled = with_taper_weights(doubled, weights)
     return noted(doubled, MIRRORED, period=period_of(doubled))
 
 

@@ -22,9 +22,6 @@ from roughvisc.variables import VARIABLES
 #: Attributes of numbers as a file packs them, before xarray decodes them.
 _PACKED = {"scale_factor", "add_offset", "_FillValue", "missing_value"}
 
-#: Coordinates that hold the weights of a taper along x and along y; a surface that was not tapered has none.
-TAPER = ("taper_x", "taper_y")
-
 #: 16384 squared: a field of doubles takes 2 GB.
 MOST_CELLS = 1 << 28
 
@@ -52,7 +49,6 @@ def with_coordinates(
     y: Any,
     attrs: dict[str, Any] | None = None,
     *,
-    taper: tuple[np.ndarray, np.ndarray] | None = None,
     filled: np.ndarray | None = None,
 ) -> xr.DataArray:
     """Height over the given coordinates of the cell centres, with the declared attributes.
@@ -65,8 +61,6 @@ def with_coordinates(
         Cell centres. [m]
     attrs : dict, optional
         Attributes beside the declared ones.
-    taper : pair of ndarray, optional
-        Weights along each axis, see :func:`taper_weights`. [-]
     filled : ndarray of bool, shape (nx, ny), optional
         See :func:`filled_points`.
     """
@@ -78,7 +72,6 @@ def with_coordinates(
         name="height",
         attrs={**VARIABLES["height"].attributes(), **(attrs or {})},
     )
-    h = h if taper is None else with_taper_weights(h, taper)
     return h if filled is None else with_filled_points(h, filled)
 
 
@@ -190,29 +183,6 @@ def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float,
     return axis_step(h, "x", step), axis_step(h, "y", step)
 
 
-def taper_weights(h: xr.DataArray | xr.Dataset) -> tuple[np.ndarray, np.ndarray] | None:
-    """Weights along x and along y by which a taper multiplied the heights, None if it never did. [-]
-
-    The weight of a cell is the product of both: one where the taper left the heights alone, zero on the border.
-    """
-    if not all(name in h.coords for name in TAPER):
-        return None
-    along_x, along_y = (np.asarray(h[name].values, dtype=float) for name in TAPER)
-    return along_x, along_y
-
-
-def with_taper_weights(h: xr.DataArray, weights: tuple[np.ndarray, np.ndarray] | None) -> xr.DataArray:
-    """The same grid with these taper weights, without any if there are none."""
-    if weights is None:
-        return h.drop_vars(TAPER, errors="ignore")
-    return h.assign_coords(
-        {
-            name: (axis, along, VARIABLES[name].attributes())
-            for name, axis, along in zip(TAPER, ("x", "y"), weights, strict=True)
-        }
-    )
-
-
 def filled_points(h: xr.DataArray) -> np.ndarray | None:
     """Mask over (x, y) of the points that were missing and filled in, None if nothing was ever filled."""
     return h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else None
@@ -225,27 +195,9 @@ def with_filled_points(h: xr.DataArray, filled: np.ndarray | None) -> xr.DataArr
     return h.assign_coords(filled=(("x", "y"), filled, {"long_name": "height was missing and filled in"}))
 
 
-def resampled_taper(h: xr.DataArray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Taper weights of a grid on another number of cells over the same domain: linear between the cell centres."""
-    weights = taper_weights(h)
-    if weights is None:
-        return None
-    along_x, along_y = (
-        np.interp((np.arange(new) + 0.5) / new, (np.arange(old.size) + 0.5) / old.size, old)
-        for old, new in zip(weights, shape, strict=True)
-    )
-    return along_x, along_y
-
-
 def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
-    """Area that the nominal pressure on a surface refers to. [m2]
-
-    That of the whole grid, absent cells included. Of a tapered surface it is the integral of the taper's weight: a
-    margin counts by half.
-    """
-    weights = taper_weights(h)
-    cells = h.sizes["x"] * h.sizes["y"] if weights is None else float(weights[0].sum() * weights[1].sum())
-    return cells * math.prod(spacing(h, "height"))
+    """Area of the whole grid, absent cells included, to which the nominal pressure refers. [m2]"""
+    return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))
 
 
 def axis_step(h: xr.DataArray | xr.Dataset, axis: str, step: str) -> float:

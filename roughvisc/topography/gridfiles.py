@@ -16,7 +16,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
 from roughvisc.topography.blocks import row_blocks
-from roughvisc.topography.grid import metres_in, taper_weights, unit_of, with_coordinates
+from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
 
@@ -79,7 +79,7 @@ def open_grid(
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
     if heights and metres != 1.0:
         values *= metres  # of which the grid is a view
-    grid = with_coordinates(h.values, *axes, attrs, taper=taper_weights(h))
+    grid = with_coordinates(h.values, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:

@@ -26,7 +26,6 @@ from roughvisc.topography.grid import (
     noted,
     number,
     require_complete,
-    resampled_taper,
     spacing,
     with_coordinates,
 )
@@ -49,8 +48,8 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     shape : int or pair of int
         New number of cells ``(nx, ny)``.
     periodic : bool, optional
-        Whether the surface is periodic in x and in y. Default: whether :func:`self_affine`, :func:`wavy`,
-        :func:`mirror` or :func:`taper` made it periodic and it is still one period (attribute ``period``).
+        Whether the surface is periodic in x and in y. Default: whether :func:`self_affine`, :func:`wavy` or
+        :func:`mirror` made it periodic and it is still one period (attribute ``period``).
 
     Returns
     -------
@@ -398,7 +397,7 @@ def _on_cells(
     axes = []
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, heights.shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
-    grid = with_coordinates(heights, *axes, h.attrs, taper=resampled_taper(h, heights.shape), filled=filled)
+    grid = with_coordinates(heights, *axes, h.attrs, filled=filled)
     stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
     line = f"{done}: {h.shape[0]} x {h.shape[1]} to {heights.shape[0]} x {heights.shape[1]} cells, {way}"
     return noted(grid, line, **stated)

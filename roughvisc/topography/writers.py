@@ -34,7 +34,7 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
     h : xarray.DataArray
         Height over (x, y), NaN where missing. [m]
     path : path
-        ``.nc`` stores everything: coordinates, attributes, the mask of filled points and the weights of a taper.
+        ``.nc`` stores everything: coordinates, attributes and the mask of filled points.
         ``.x3p`` and ``.sdf`` store heights in full precision and the spacing; their grids begin at zero. X3P stores the
         history as its comment.
 
@@ -145,7 +145,7 @@ def surface_table(
     for key, value in steps.items():
         if key == "crop":
             entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
-        elif key in ("filter", "taper"):
+        elif key == "filter":
             entries[key] = _lengths(value)
         else:
             entries[key] = json.dumps(value)

@@ -61,13 +61,6 @@ VARIABLES: dict[str, Variable] = {
         "as conditioned; missing where absent; attribute `highest`: its highest point [m], between cells or in one",
         may_be_missing=True,
     ),
-    "taper_x": Variable(
-        ("x",),
-        "1",
-        "weight of the taper along x",
-        "of a tapered surface: heights less their mean were multiplied by taper_x times taper_y",
-    ),
-    "taper_y": Variable(("y",), "1", "weight of the taper along y", "as taper_x"),
     "filled": Variable(
         _GRID,
         "",
@@ -132,8 +125,7 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "Pa",
         "nominal pressure",
-        "force over the nominal area: that of the surface as given, absent cells included; of a tapered surface the "
-        "integral of taper_x times taper_y over it",
+        "force over the nominal area: that of the surface as given, absent cells included",
         in_table="last",
     ),
     "work": Variable(
@@ -199,8 +191,7 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "1",
         "contact fraction",
-        "contact_area over the area of the whole grid, absent cells included; on a tapered surface each cell counts by "
-        "its weight, taper_x times taper_y, in both areas",
+        "contact_area over the area of the whole grid, absent cells included",
         every_step=True,
         in_table="last",
     ),
@@ -515,7 +506,7 @@ FLAGS = {name: variable.meanings for name, variable in VARIABLES.items() if vari
 #: Dimensions that a result of one case may have beside that of its rows.
 OTHER_DIMS = ("step", "x", "y", "bnds")
 #: Of the surface, whatever the rows lie over.
-_SURFACE = ("x", "y", "x_bounds", "y_bounds", "height", "filled", "taper_x", "taper_y")
+_SURFACE = ("x", "y", "x_bounds", "y_bounds", "height", "filled")
 #: What is derived of a row alone, whatever the rows lie over.
 OF_A_ROW = (
     *(name for name in VARIABLES if name.startswith(("cluster_", "pressure_", "gap_")) and "error" not in name),

@@ -62,7 +62,7 @@ class Stack(Experiment):
                 "approach": found.approach,
                 "contact_area": area,
                 "contact_area_counted": counted,
-                "contact_fraction": profile.contact_fraction(contact, area),
+                "contact_fraction": profile.contact_fraction(area),
                 "mean_gap": float(gap.mean()),
                 "stated_error": found.error,
                 "iterations": found.iterations,

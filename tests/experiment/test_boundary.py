@@ -38,7 +38,6 @@ def test_auto__asks_of_anything_else_and_nothing_is_computed(monkeypatch):
     for height, name in (
         (SCAN, "height"),
         (SCAN.assign_attrs(source_file="ground.x3p"), "ground.x3p"),
-        (rv.taper(ROUGH, 2e-4), "height"),
         (BALL + ROUGH, "height"),
     ):
         with pytest.raises(rv.InputError) as asked:

@@ -417,7 +417,7 @@ def same(said, taken, last, key):
         if last == "fields":
             return sorted(set(said)) == sorted(taken)
         if not isinstance(said, list):
-            return last in ("size", "shape", "spacing", "resample", "band_limit", "taper", "offset") and all(
+            return last in ("size", "shape", "spacing", "resample", "band_limit", "offset") and all(
                 same(said, one, last, key) for one in taken
             )
         if isinstance(taken[0] if taken else None, dict):

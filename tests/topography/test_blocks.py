@@ -71,7 +71,6 @@ def test_blocks__numbers_of_a_map_are_those_of_numpy(values, most):
         lambda h: rv.gaussian_filter(h.fillna(0), 5e-6, periodic=True),
         lambda h: rv.resample(h, (11, 50)),
         lambda h: rv.resample(rv.fill(h), 23),
-        lambda h: rv.taper(h, 4e-6),
         rv.mirror,
     ],
 )

@@ -24,13 +24,11 @@ from roughvisc.topography.conditioning import (
     mirror,
     resample,
     rotate90,
-    taper,
 )
-from roughvisc.topography.grid import nominal_area, spacing
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
-from roughvisc.topography.writers import save_scan
 
 SCANS = Path(__file__).parents[3] / "shared" / "scans"
 CELL = (2e-6, 3e-6)
@@ -60,7 +58,6 @@ ALL_STEPS = {
     "rotate90": rotate90,
     "invert": invert,
     "combine": lambda h: combine(h, h, flip="x"),
-    "taper": lambda h: taper(h, 1e-5),
     "mirror": mirror,
 }
 
@@ -392,17 +389,6 @@ def test_combine__adds_the_faces_and_refuses_unequal_grids():
         combine(a, b, flip="z")
 
 
-def test_taper__makes_the_border_repeat_and_leaves_the_middle():
-    h = level(rough()) + 1e-4 * (rough().x + rough().y) + 2e-6
-    done = taper(h, (2e-5, 3e-5))
-    inside = (h.x > 2e-5) & (h.x < 7e-5) & (h.y > 3e-5) & (h.y < 8.4e-5)
-    np.testing.assert_allclose(done.where(inside, 0), h.where(inside, 0), rtol=1e-12)
-    step = abs(done[0] - done[-1]).max()
-    assert float(step) < 0.02 * float(abs(h[0] - h[-1]).max())
-    with pytest.raises(InputError, match="half a side"):
-        taper(h, 5e-5)
-
-
 def test_mirror__repeats_without_a_step():
     h = rough((8, 5))
     doubled = mirror(h)
@@ -416,7 +402,7 @@ def test_mirror__repeats_without_a_step():
 def test_conditioning__is_the_same_in_nanometres():
     h = rough(missing=0.05)
     small = (h * 1e-3).assign_coords(x=h.x * 1e-3, y=h.y * 1e-3)
-    done, tiny = (taper(gaussian_filter(fill(mask_outliers(level(g, 2))), c), c) for g, c in ((h, 2e-5), (small, 2e-8)))
+    done, tiny = (gaussian_filter(fill(mask_outliers(level(g, 2))), c) for g, c in ((h, 2e-5), (small, 2e-8)))
     np.testing.assert_allclose(tiny * 1e3, done.values, rtol=1e-9, atol=1e-16)
 
 
@@ -431,56 +417,9 @@ def test_filled__goes_with_its_points_through_later_steps():
     np.testing.assert_array_equal(doubled["filled"], np.isnan(mirror(h)))
     coarse = resample(done, (10, 8))
     np.testing.assert_array_equal(coarse["filled"], np.isnan(h.values).reshape(10, 2, 8, 2).any(axis=(1, 3)))
-    for step in (part, doubled, coarse, rotate90(done), level(done), taper(done, 1e-5), gaussian_filter(done, 2e-5)):
+    for step in (part, doubled, coarse, rotate90(done), level(done), gaussian_filter(done, 2e-5)):
         assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
         assert step.attrs["fill_method"] == "harmonic"
-
-
-def weights_of(h):
-    """Weight of each cell of a tapered surface."""
-    return np.outer(h["taper_x"], h["taper_y"])
-
-
-def test_taper__keeps_its_weights_through_later_steps(tmp_path):
-    """The weights are what the deviations from the mean were multiplied by."""
-    h = rough((20, 16))
-    done = taper(h, (4e-6, 6e-6))
-    mean = float(h.mean())
-    weights = (done - mean) / (h - mean)
-    np.testing.assert_allclose(weights_of(done), weights, rtol=1e-9)
-    part = crop(done, x=(3e-6, 2.5e-5), y=(0, 1e-5))
-    np.testing.assert_allclose(weights_of(part), crop(weights, x=(3e-6, 2.5e-5), y=(0, 1e-5)), rtol=1e-9)
-    for turns in range(-1, 4):
-        np.testing.assert_allclose(
-            weights_of(rotate90(part, turns)), np.rot90(weights_of(part), turns), rtol=1e-12, err_msg=str(turns)
-        )
-    np.testing.assert_allclose(weights_of(mirror(part)), mirror(crop(weights, (3e-6, 2.5e-5), (0, 1e-5))), rtol=1e-9)
-    np.testing.assert_allclose(weights_of(taper(done, 5e-6)), weights_of(done) * weights_of(taper(h, 5e-6)), rtol=1e-12)
-    for fewer in ((10, 8), (33, 31)):
-        coarse = resample(done, fewer)
-        np.testing.assert_allclose(nominal_area(coarse), nominal_area(done), rtol=0.02)
-    for kept in (level(done), invert(done), gaussian_filter(done, 2e-5)):
-        np.testing.assert_array_equal(weights_of(kept), weights_of(done))
-    save_scan(part, tmp_path / "part.nc")
-    np.testing.assert_array_equal(weights_of(open_scan(tmp_path / "part.nc")), weights_of(part))
-
-
-def test_taper__of_both_faces_is_one_of_their_sum():
-    a, b = rough((20, 16)), rough((20, 16), seed=1)
-    assert "taper_x" not in combine(taper(a, 4e-6), b).coords
-    assert "taper_x" not in combine(a, taper(b, 4e-6)).coords
-    both = combine(taper(a, 4e-6), taper(b, 6e-6), flip="x", align="centre")
-    np.testing.assert_allclose(both["taper_x"], taper(a, 4e-6)["taper_x"], rtol=1e-12)
-
-
-@pytest.mark.parametrize("cells", [(2, 3), (10, 8)])
-def test_nominal_area__of_a_tapered_surface_counts_the_margin_by_half(cells):
-    """Two margins of so many cells along each axis, with an integral of half of each; up to half a side."""
-    h = rough((20, 16))
-    widths = tuple(n * d for n, d in zip(cells, CELL, strict=True))
-    area = (20 - cells[0]) * (16 - cells[1]) * CELL[0] * CELL[1]
-    np.testing.assert_allclose(nominal_area(taper(h, widths)), area, rtol=1e-12)
-    np.testing.assert_allclose(nominal_area(h), 20 * 16 * CELL[0] * CELL[1], rtol=1e-12)
 
 
 def test_filled__of_either_face_stays_in_the_combination():

@@ -104,7 +104,6 @@ DOORS = {
     "invert": rv.invert,
     "combine": lambda h: rv.combine(H, h),
     "combine, below": lambda h: rv.combine(h, H),
-    "taper": lambda h: rv.taper(h, 6e-6),
     "mirror": rv.mirror,
     "parameters": rv.parameters,
     "psd": rv.psd,

@@ -454,7 +454,6 @@ def test_card__every_step_acts(tmp_path):
     steps = """
 [conditioning]
 mirror = true
-taper = "3 um"
 resample = [12, 10]
 filter = { cutoff = "12 um", keep = "short" }
 fill = "nearest"
@@ -466,7 +465,7 @@ crop = { x = ["0 um", "22 um"] }
 """
     h = open_scan(file_card(tmp_path, steps))
     lines = [line.split()[0].rstrip(":") for line in h.attrs["history"].splitlines()]
-    order = "read cropped rotated inverted levelled outliers filled Gaussian resampled tapered mirrored"
+    order = "read cropped rotated inverted levelled outliers filled Gaussian resampled mirrored"
     assert lines == order.split()
     assert h.shape == (24, 20)
     off = steps.replace("mirror = true", "mirror = false").replace("invert = true", "invert = false")

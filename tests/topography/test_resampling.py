@@ -170,7 +170,6 @@ MADE = {
     "self_affine": rv.self_affine(SIZE, (21, 16), hurst=0.9, rms_slope=0.1, seed=1),
     "wavy": rv.wavy(1e-6, 1e-4, SIZE, (50, 48)),
     "mirror": rv.mirror(sum_of_waves((13, 9)).isel(x=slice(7))),
-    "taper": rv.taper(sum_of_waves((31, 26)) + 0.1 * sum_of_waves((31, 26)).x, 1.2e-4),
 }
 
 

@@ -328,8 +328,7 @@ class Program:
     def pressure(self, value: float | str, *, over: float | str) -> Program:
         """Ramp linearly to a nominal pressure, the load over the nominal area of the surface.
 
-        :func:`roughvisc.simulate` uses the whole area of the given grid, absent cells included, or for a tapered
-        surface the integral of the taper's weight.
+        :func:`roughvisc.simulate` uses the whole area of the given grid, absent cells included.
 
         Parameters
         ----------

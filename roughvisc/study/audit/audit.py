@@ -32,7 +32,6 @@ _VERDICTS = (
     of_body.coupling,
     of_surface.resolution,
     of_surface.border,
-    of_surface.window,
 )
 #: Of the printed table: what a page of the documentation holds.
 _WIDTH = 98

@@ -160,14 +160,6 @@ LIMITS: dict[str, Limit] = {
         "a step is visible; on 100 rows the seam has as much of the mean square slope as all other rows",
         "topography.borders; arithmetic: the square of the number over the number of rows",
     ),
-    "window": Limit(
-        "The roughness reaches to the border of the scan.",
-        "margin of the taper over the side",
-        0.03,
-        0.1,
-        "contact area over the area of the grid 8 % too small; 17 %, and the mean gap likewise",
-        "tests/experiment/test_taper.py: periodic surfaces pressed as they are and tapered",
-    ),
 }
 #: Shown as nothing.
 _LEAST = 1e-9

@@ -178,19 +178,6 @@ def border(evidence: Evidence, given: AuditInputs) -> Finding | None:
     return Finding("border", number, f"{seam}: they differ {number:.2g} times as much as neighbouring rows.{advice}")
 
 
-def window(evidence: Evidence, given: AuditInputs) -> Finding | None:
-    """What part of the side a taper has changed; None of a surface that was not tapered."""
-    if evidence.texture is None or not evidence.texture.taper > 0:
-        return None
-    number = evidence.texture.taper
-    advice = "" if number < LIMITS["window"].doubtful else " Use mirror = true instead of taper."
-    return Finding(
-        "window",
-        number,
-        f"A taper removes the roughness from a margin of {percent(number)} of the side along each border.{advice}",
-    )
-
-
 def _tabor(evidence: Evidence, radius: float, w: float) -> float:
     """Tabor parameter by the modulus at the end; NaN where there is none."""
     if math.isnan(evidence.modulus):

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.topography.borders import border_mismatch
-from roughvisc.topography.grid import spacing, taper_weights
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import parameters, rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.topography.synthesis import is_analytic
@@ -57,8 +57,6 @@ class Texture:
         Longest wavelength of that octave. [m]
     mismatch : float
         Difference of opposite borders over that of neighbouring rows, along the worse axis. [-]
-    taper : float
-        Margin of a taper over the side, along the worse axis; zero of a surface that was not tapered. [-]
     stated : Stated or None
         The shortest wave by the recipe, if it has waves and there are no shorter ones.
     """
@@ -71,7 +69,6 @@ class Texture:
     last_octave: float
     shortest: float
     mismatch: float
-    taper: float = 0.0
     stated: Stated | None = None
 
     @property
@@ -109,18 +106,8 @@ def texture_of(height: xr.DataArray, boundary: str, recipe: str = "") -> Texture
         slope=float(measures["rms_slope"]),
         laplacian=2 * float(measures["rms_curvature"]),
         mismatch=max(border_mismatch(height).of_neighbours),
-        taper=_taper_margin(height),
         **whole,
     )
-
-
-def _taper_margin(height: xr.DataArray) -> float:
-    """Margin of a taper over the side, along the worse axis, to two digits. [-]
-
-    A margin ``w`` along each of two borders takes ``w`` off the integral of the weight along a side.
-    """
-    weights = taper_weights(height)
-    return 0.0 if weights is None else float(f"{max(1 - one.mean() for one in weights):.2g}")
 
 
 def loaded_slope(height: xr.DataArray, boundary: str, approach: float) -> float:

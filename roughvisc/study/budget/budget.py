@@ -199,8 +199,7 @@ def _of_quantity(asked: Asked, quantity: Observable, readings: Mapping[str, Read
     value = values["fine" if asked.sharp else "own"]
     case = asked.variants.case
     found = assembled(case, asked.population, quantity, judged, value, own.places, seconds)
-    has_surrogates = asked.draws and not case.settings.surface.taper  # which have none
-    return _with_own_statistics(found, asked, values) if has_surrogates else found
+    return _with_own_statistics(found, asked, values) if asked.draws else found
 
 
 def assembled(

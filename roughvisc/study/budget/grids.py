@@ -229,7 +229,7 @@ class Around:
         grids = {level: one.at(places).values[quantity.name] for level, one in self.solves.items()}
         found = {"own": grids[self.level + 1], "coarse": grids[self.level + 2], "fine": grids[self.level]}
         compared = self.asked.compared
-        origin = {"smooth": "fine", "mirrored": "own", "stiffer": compared, "slower": compared}
+        origin = {"smooth": "fine", "stiffer": compared, "slower": compared}
         for name, one in self.parts.items():
             value = one.at(places).values[quantity.name]
             if name in origin:
@@ -301,8 +301,6 @@ class Around:
             better = math.expm1(math.log1p(error) * room / part)
             what = "moduli" if name == "modulus" else "times of the material"
             return f"; {what} known to {percent(better)} would help (a DMA table)"
-        if name == "window":
-            return "; mirror = true in place of the taper would help"
         return ""
 
     def short_of_time(self, targets: Mapping[str, float], limit: float, wait: float) -> str:

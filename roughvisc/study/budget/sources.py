@@ -92,8 +92,6 @@ class Asked:
             found["smooth"] = variants.without_last_octave(found["fine" if self.sharp else "own"])
         if self.draws:
             found |= {name: variants.other_patch(number) for number, name in enumerate(SURROGATES, 1)}
-        if variants.case.settings.surface.taper:
-            found["mirrored"] = variants.mirrored()
         return found
 
     @property
@@ -354,12 +352,6 @@ def _creeps(case: Case) -> bool:
     return float(material.contact_compliance(end)) > at_once or later > at_once
 
 
-def _window(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
-    if "mirrored" not in values:
-        return _no_source("the surface is not tapered")
-    return Found(np.abs(_apart(values, "own", "mirrored")), "mirror images in place of the taper", solves=("mirrored",))
-
-
 #: Name -> what it makes of a quantity from the values of the solves and the stated errors, in the order of a table.
 SOURCES: dict[str, Callable[[Asked, Observable, Values, Array], Found]] = {
     "time steps and solver": _time_and_solver,
@@ -370,7 +362,6 @@ SOURCES: dict[str, Callable[[Asked, Observable, Values, Array], Found]] = {
     "modulus": _modulus,
     "time scale": _time_scale,
     "material fit": _material_fit,
-    "window": _window,
 }
 
 

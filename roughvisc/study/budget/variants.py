@@ -97,12 +97,8 @@ class Variants:
         """
         mirrored = 2 if self.case.settings.surface.mirror else 1
         cells = [max(2, round(n / mirrored / 2)) for n in self.shape]
-        changes = {"surface.taper": None, "surface.resample": None, "surface.band_limit": cells}
+        changes = {"surface.resample": None, "surface.band_limit": cells}
         return vary(self.case, changes | {"surface.realisation": number})
-
-    def mirrored(self) -> Case:
-        """With its mirror images in place of a taper."""
-        return vary(self.case, {"surface.taper": None, "surface.mirror": True})
 
 
 def stiffer(case: Case) -> Case:

@@ -33,7 +33,7 @@ from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.settings import Settings
 from roughvisc.study.cost.press import MOST_PRESSED, Pressed, Push, copy_to_press, press, width_of
 from roughvisc.study.statement.case import Case
-from roughvisc.topography.grid import axis_step, nominal_area, resampled_taper, spacing, with_taper_weights
+from roughvisc.topography.grid import axis_step, nominal_area, spacing
 from roughvisc.topography.indenters import grown, grown_shape, remade
 from roughvisc.variables import STEPPED
 
@@ -306,8 +306,7 @@ def coarse(height: xr.DataArray, side: int) -> xr.DataArray:
         length = axis_step(height, axis, "height") * count
         coords[axis] = (np.arange(few) + 0.5) * length / few
     kept = {"missing": height.attrs["missing"]} if "missing" in height.attrs else {}
-    few = xr.DataArray(height.values[np.ix_(*picks)], dims=("x", "y"), coords=coords, attrs=kept)
-    return with_taper_weights(few, resampled_taper(height, few.shape))
+    return xr.DataArray(height.values[np.ix_(*picks)], dims=("x", "y"), coords=coords, attrs=kept)
 
 
 def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> CostEstimate:

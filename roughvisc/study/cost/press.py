@@ -104,7 +104,7 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     periodic = boundary == "periodic" and not operator.mirrored
     counted = np.count_nonzero(touching) * operator.cell_area
     area = max(counted - staircase(touching, free, operator.cell_area, periodic), 0.0)
-    fraction = profile.contact_fraction(touching, area)
+    fraction = profile.contact_fraction(area)
     return Pressed(shape, fraction, found.approach, width_of(touching, profile), _at_border(touching, profile.mirrored))
 
 

@@ -125,7 +125,7 @@ def is_data(case: Case) -> bool:
 def _treated(case: Case) -> bool:
     """Whether the heights are no longer those of the recipe."""
     surface = case.settings.surface
-    steps = ("crop", "rotate90", "invert", "filter", "taper", "mirror", "second")
+    steps = ("crop", "rotate90", "invert", "filter", "mirror", "second")
     return any(getattr(surface, step) for step in steps) or any(
         getattr(surface, step) is not False for step in ("level", "outliers", "fill")
     )

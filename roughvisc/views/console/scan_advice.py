@@ -110,10 +110,9 @@ def _borders(found: Inspection) -> tuple[str, str]:
         "difference of neighbouring rows"
     )
     if not found.borders.jumps:
-        return seen, 'boundary = "periodic" needs neither mirror nor taper'
+        return seen, 'boundary = "periodic" needs no mirror'
     return seen, (
         'for boundary = "periodic" set mirror = true, at no extra cost; otherwise the step at the seam carries '
-        "load (taper removes the step too, but changes the contact near the border)"
     )
 
 

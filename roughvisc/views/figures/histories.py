@@ -105,7 +105,7 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
         return
     ratios = 100 * steps["contact_fraction"].values[touching] / area[touching]
     ratio = float(np.nanmean(ratios))
-    if ratio > 0 and float(np.nanmax(np.abs(ratios - ratio))) < 1e-6 * ratio:  # not so on a tapered surface
+    if ratio > 0 and float(np.nanmax(np.abs(ratios - ratio))) < 1e-6 * ratio:
         right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
         right.set_ylabel("of nominal\n[%]")
 

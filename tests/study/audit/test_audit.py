@@ -289,7 +289,7 @@ def test_resolution__of_a_ball_that_was_measured_is_that_of_its_form(ball):
 
 
 def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
-    pressed = [name for name in LIMITS if name not in ("heating", "window", STATED)]
+    pressed = [name for name in LIMITS if name not in ("heating", STATED)]
     assert [one.name for one in rv.audit(rough)] == pressed
     assert [one.name for one in rv.audit(ball)] == [name for name in pressed if name not in ("stickiness", "border")]
     with pytest.raises(KeyError, match="'border': expected one of adhesion, yielding"):

@@ -92,7 +92,7 @@ def test_budget__holds_hertz(tmp_path):
 def test_budget__of_an_indenter_says_that_samples_and_waves_have_no_meaning(tmp_path):
     found = stated(case(BALL, tmp_path), tmp_path, "contact_area", population="ensemble", cutoff=1e-6)
     states = dict(zip(found["source"].values.tolist(), found["state"].values.tolist(), strict=True))
-    assert [states[name] for name in ("sample", "next octave of waves", "longest waves", "window")] == ["none"] * 4
+    assert [states[name] for name in ("sample", "next octave of waves", "longest waves")] == ["none"] * 3
     assert "no sample" in str(found["method"].sel(source="sample").values)
     assert states["time scale"] == "none"
     assert found.attrs["open"] == "modulus"
@@ -216,13 +216,6 @@ def test_budget__of_a_surface_with_absent_cells_is_of_no_sample(tmp_path):
 def test_budget__warns_of_a_solve_that_did_not_converge(tmp_path, caplog, stubborn):
     stated(case(BALL, tmp_path), tmp_path, "contact_area")
     assert "budget: the solve 'own': unconverged" in caplog.text
-
-
-def test_budget__of_a_tapered_surface_compares_with_its_mirror_images(tmp_path):
-    study = case(ROUGH, tmp_path, **{"surface.taper": ["0.1 mm", "0.1 mm"]})
-    found = stated(study, tmp_path, "contact_area")
-    assert width(found, "window") > 0.01
-    assert str(found["state"].sel(source="window").values) == "counted"
 
 
 def test_budget__of_a_mirrored_scan_takes_patches_of_its_own_size(tmp_path):

@@ -69,10 +69,8 @@ def test_key__holds_the_word_that_auto_stands_for(study, text, word):
     [
         SCAN,
         SCAN + "level = 1\n",
-        SCAN + 'taper = "0.1 mm"\n',
         SCAN + '[solve]\nboundary = "auto"\n',
         ROUGH + "level = 1\n",
-        ROUGH + 'taper = "0.1 mm"\n',
         ROUGH + 'crop = { x = [0, "0.5 mm"] }\n',
         BALL + "level = 0\n",
         BALL + SECOND,

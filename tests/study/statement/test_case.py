@@ -530,8 +530,6 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 [material]  =>  crop = { x = 3 }\n[material]
 | surface.crop.x: found 3: expected a list of two lengths, the lower and the upper limit
 
-[material]  =>  taper = [1, 2, 3]\n[material]
-| surface.taper: found [1, 2, 3]: expected a length, or a list of two, along x and along y
 """
 
 
@@ -748,13 +746,13 @@ def test_recipes__are_those_of_surface_cards():
 
 def test_height__is_conditioned_as_asked_for(study):
     steps = (
-        'level = true\noutliers = true\nfill = "nearest"\nfilter = "200 um"\nresample = 16\ntaper = "100 um"\n'
+        'level = true\noutliers = true\nfill = "nearest"\nfilter = "200 um"\nresample = 16\n'
         'mirror = true\ninvert = true\nrotate90 = 1\ncrop = { x = ["100 um", "0.9 mm"] }\n[material]'
     )
     case = read_study(study(BALL, ("[material]", steps)))
     h = case.height()
     assert h.shape == (32, 32)
-    for step in ("cropped", "levelled", "outliers", "filter", "resampled", "tapered", "mirrored"):
+    for step in ("cropped", "levelled", "outliers", "filter", "resampled", "mirrored"):
         assert step in h.attrs["history"]
     again = Case.from_json(case.to_json())
     assert again == case

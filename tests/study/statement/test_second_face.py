@@ -54,7 +54,7 @@ def test_second__is_the_sum_of_both_faces_the_second_turned_over(one, two):
 
 
 def test_second__each_face_is_conditioned_and_what_is_pressed_is_framed(one, two):
-    """Steps of a face come before the sum; resampling, taper and mirror after it."""
+    """Steps of a face come before the sum; resampling and mirror after it."""
     case = vary(
         two, {"surface.invert": True, "surface.second.level": 2, "surface.resample": 20, "surface.mirror": True}
     )

@@ -43,7 +43,7 @@ def test_unit_of__words_counts_and_unknown_keys_have_none():
 
 def test_unit_of__a_number_or_a_word_a_list_and_what_is_inside():
     assert unit_of("solve.time_step") == "s"
-    assert [unit_of(f"surface.{key}") for key in ("size", "taper", "spacing", "crop.x", "crop.x.0")] == ["m"] * 5
+    assert [unit_of(f"surface.{key}") for key in ("size", "spacing", "crop.x", "crop.x.0")] == ["m"] * 4
     assert [unit_of(f"material.{key}") for key in ("moduli", "times", "times.0", "fluidity")] == [
         "Pa",
         "s",

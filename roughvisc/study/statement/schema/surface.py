@@ -132,7 +132,6 @@ class Conditioned(Prepared):
     realisation: nullable(whole(1)) = None
     band_limit: nullable(SHAPE) = None
     resample: nullable(SHAPE) = None
-    taper: nullable(SIZE) = None
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 
