@@ -15,7 +15,6 @@ import click
 import matplotlib
 import pytest
 from experiment.stack import LOADS, Stack, StackSection
-from test_layers import ALLOWED
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -275,18 +274,6 @@ def test_functions__that_pages_name_beside_a_file_are_in_it():
                     assert call[1] in names_in(file), f"{named(page)}: {span} in {file}"
                     tried += 1
     assert tried > 40
-
-
-def test_imports__are_as_the_page_on_a_solve_has_them():
-    rows = re.findall(r"^\| `([\w/.]+)` \| (.*?) \|", (DOCS / "how-a-solve-runs.md").read_text(encoding="utf-8"), re.M)
-    labels = {"errors", "units", "variables", "labels", "groups", "notebook"}
-    for file, said in rows:
-        room = file.removesuffix("/").removesuffix(".py").replace("/", ".")
-        others = {name for other in re.findall(r"what `([\w.]+)` may", said) for name in ALLOWED[other]}
-        stated = set(_SPAN.findall(re.sub(r"what `[\w.]+` may", "", said)))
-        omitted = {"errors"} if file.startswith("mechanics") else labels
-        assert stated | (others - omitted) == ALLOWED[room] - omitted, file
-    assert len(rows) > 8
 
 
 def test_code__fits_its_page():

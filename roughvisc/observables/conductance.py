@@ -13,7 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.observables.connectivity import label_clusters
 from roughvisc.observables.frozen import over_frames
-from roughvisc.study.statement.resistivity import Kind, resistivities
+from roughvisc.observables.resistivity import Kind, resistivities
 
 
 def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Kind | None = None) -> xr.Dataset:

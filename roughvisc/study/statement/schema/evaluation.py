@@ -9,8 +9,8 @@ from pydantic import Field, WithJsonSchema, create_model, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Base
-from roughvisc.study.statement.resistivity import WANTED as RESISTIVITIES
-from roughvisc.study.statement.resistivity import Kind, resistivities
+from roughvisc.observables.resistivity import WANTED as RESISTIVITIES
+from roughvisc.observables.resistivity import Kind, resistivities
 from roughvisc.study.statement.schema.section import Section, choice, literal_or, measured, nullable, refuse
 from roughvisc.study.statement.schema.surface import LENGTH
 
