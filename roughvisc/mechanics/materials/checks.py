@@ -24,7 +24,8 @@ def tensile_to_shear(kind: Kind, poisson: float) -> float:
     """Shear compliance over the compliance measured, ``2 (1 + nu)`` in tension; so the modulus measured over ``G``."""
     check_poisson(poisson)
     if kind not in ("shear", "tensile"):
-        raise InputError(f"kind is {kind!r}: expected 'shear' or 'tensile'")
+        wanted = "'shear' or 'tensile'"
+        raise InputError(f"kind is {kind!r}: expected {wanted}", key="kind", found=kind, expected=wanted)
     return 2 * (1 + poisson) if kind == "tensile" else 1.0
 
 
@@ -32,7 +33,8 @@ def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> flo
     """The value, if it is a positive number, or zero where that is allowed."""
     good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
     if not good:
-        raise InputError(f"{name} is {value!r}: expected a {'non-negative' if zero else 'positive'} number [{unit}]")
+        wanted = f"a {'non-negative' if zero else 'positive'} number [{unit}]"
+        raise InputError(f"{name} is {value!r}: expected {wanted}", key=name, found=value, expected=wanted)
     return value
 
 

@@ -63,14 +63,15 @@ def _spring(
     """
     of_shear, of_young = (f"{part or 'shear_'}modulus", f"{part}young_modulus")
     if (shear is None) == (young is None):
-        raise InputError(f"{of_shear} is {shear!r} and {of_young} is {young!r}: expected one of them")
+        message = f"{of_shear} is {shear!r} and {of_young} is {young!r}: expected one of them"
+        raise InputError(message, key=of_young, found=young, expected=f"{of_shear} or {of_young}")
     if young is None:
         return check_number(of_shear, shear, "Pa")
     young = check_number(of_young, young, "Pa")
     if bulk_modulus is not None:
-        raise InputError(
-            f"{of_young} is {young!r} and bulk_modulus is {bulk_modulus!r}: expected {of_shear}, or a Poisson ratio"
-        )
+        wanted = f"{of_shear}, or a Poisson ratio"
+        message = f"{of_young} is {young!r} and bulk_modulus is {bulk_modulus!r}: expected {wanted}"
+        raise InputError(message, key="bulk_modulus", found=bulk_modulus, expected=wanted)
     return young / tensile_to_shear("tensile", 0.5 if poisson is None else poisson)
 
 

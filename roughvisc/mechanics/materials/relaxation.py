@@ -65,9 +65,9 @@ def from_relaxation(
         check_number(f"moduli[{i}]", modulus, "Pa", zero=True)
         check_number(f"times[{i}]", time, "s")
     if kind == "tensile" and bulk_modulus is not None:
-        raise InputError(
-            f"kind is 'tensile' and bulk_modulus is {bulk_modulus!r}: expected shear moduli, or a Poisson ratio"
-        )
+        wanted = "shear moduli, or a Poisson ratio"
+        message = f"kind is 'tensile' and bulk_modulus is {bulk_modulus!r}: expected {wanted}"
+        raise InputError(message, key="bulk_modulus", found=bulk_modulus, expected=wanted)
     factor = tensile_to_shear(kind, 0.5 if poisson is None else poisson)
     weights, rates = merged(moduli, times)
     equilibrium, weights = equilibrium / factor, weights / factor
