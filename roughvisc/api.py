@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from roughvisc.errors import InputError, former_arguments
+from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
-from roughvisc.groups import root_of
 from roughvisc.mechanics.bodies.body import Body, body_of
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
@@ -27,13 +25,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, float], None]
 
-_BODY = "give a body in place of the material: rv.sheet(material, thickness, base)"
-_OWN = "give a body in place of the material: rv.Body(material, kernel)"
-_FORMER = {"thickness": _BODY, "base": _BODY, "kernel": _OWN}
-_NUMERICS = {one.name: f"write numerics=rv.Numerics({one.name}=...)" for one in fields(Numerics)}
 
-
-@former_arguments(**_FORMER, **_NUMERICS)
 def simulate(
     height: xr.DataArray,
     material: Material | Body,
@@ -72,7 +64,7 @@ def simulate(
     tolerance : float
         Relative tolerance on ``stated_error`` at each output time: the error of pressure (L1), force and approach from
         time steps, contact solver and exponential series, over the largest force and approach so far. Rows that exceed
-        it state their error, and ``accuracy_note`` counts them. The grid error is not included.
+        it state their error, and the attribute ``warnings`` counts them. The grid error is not included.
     times : int or sequence of float or str, optional
         Output times, reached exactly: a number of times (the corners of the program, and the others where the result
         changes most); a list; or None for all corners and every accepted step that meets the tolerance. [s]
@@ -82,7 +74,7 @@ def simulate(
         Whether missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
         Whether contact may reach the border of the grid in free space. With "accept" the scan outline is treated as a
-        punch: the attribute ``edge`` of the result says so, and ``edge_note`` if contact reached the border.
+        punch; the attribute ``warnings`` of the result says so if contact reached the border.
     grid_error : bool
         Whether to estimate the grid error from two more runs, on cells twice and four times as long: ``grid_error``,
         ``grid_error_area`` and the bounds ``contact_area_lower`` and ``contact_area_upper`` at the output times.
@@ -136,10 +128,9 @@ def simulate(
         grid_error=grid_error,
     )
     problem = Problem(height, body_of(material), settings)
-    return root_of(solve(problem, Loading(program), progress=progress, threads=threads))
+    return solve(problem, Loading(program), progress=progress, threads=threads)
 
 
-@former_arguments(**_FORMER)
 @quantities(speeds="m/s", load="N", pressure="Pa")
 def friction(
     height: xr.DataArray,
@@ -224,7 +215,7 @@ def friction(
     )
     problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
-    return root_of(found.assign_attrs(title="Steady sliding"))
+    return found.assign_attrs(title="Steady sliding")
 
 
 def run(

@@ -4,13 +4,7 @@ Every error that roughvisc raises on purpose is a :class:`RoughviscError`; the c
 without a traceback.
 """
 
-import functools
 import unicodedata
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
-
-_Given = ParamSpec("_Given")
-_Found = TypeVar("_Found")
 
 #: Characters of one message on the screen, at most.
 ON_SCREEN = 600
@@ -172,24 +166,3 @@ def _inner(text: str, longest: int) -> str:
         return text
     half = (longest - 5) // 2
     return f"{text[:half]} ... {text[-half:]}"
-
-
-def former_arguments(**told: str) -> Callable[[Callable[_Given, _Found]], Callable[_Given, _Found]]:
-    """Decorator of a function that says, of arguments that it had once, what to write in their place.
-
-    Parameters
-    ----------
-    **told : str
-        Name of the argument -> what to write.
-    """
-
-    def decorate(function: Callable[_Given, _Found]) -> Callable[_Given, _Found]:
-        @functools.wraps(function)
-        def called(*args: _Given.args, **given: _Given.kwargs) -> _Found:
-            for name in filter(given.__contains__, told):
-                raise InputError(f"{name} is no argument of {function.__name__} any more: {told[name]}")
-            return function(*args, **given)
-
-        return called
-
-    return decorate

@@ -6,14 +6,14 @@ A variable that is not declared, or whose dimensions differ, is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity, shown
-from roughvisc.variables import FLAGS, NAMES_OF_TODAY, OLDER_NAMES, RESULT_FORMAT, VARIABLES, Variable
+from roughvisc.units import quantity
+from roughvisc.variables import FLAGS, VARIABLES, Variable
 from roughvisc.variables.axes import AXES, axis_of
 
 if TYPE_CHECKING:
@@ -68,6 +68,12 @@ def annotate(dataset: xr.Dataset) -> xr.Dataset:
     return annotated
 
 
+def in_order(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a result with its variables in the order of their declaration: main results first."""
+    known = list(AXES[axis_of(dataset.variables)].variables)
+    return dataset[sorted(dataset.data_vars, key=lambda name: known.index(name) if name in known else len(known))]
+
+
 def _flags(name: str) -> dict[str, Any]:
     """CF attributes that say what the values of a status mean."""
     meanings = FLAGS[name]
@@ -100,59 +106,28 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
     return described
 
 
+def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
+    """Return the warnings of a result by subject.
+
+    Examples
+    --------
+    >>> warnings_of({"warnings": "slope: too steep"})
+    {'slope': 'too steep'}
+    """
+    lines = str(attributes.get("warnings", "")).splitlines()
+    return {subject: text for subject, _, text in (line.partition(": ") for line in lines)}
+
+
+def warnings_text(warnings: Mapping[str, str]) -> str:
+    """Return the attribute that states some warnings, one per line; empty ones are left out."""
+    return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
+
+
 def expect_history(dataset: xr.Dataset) -> None:
     """Refuse a result over another axis than time, where what happened before a row matters."""
     axis = axis_of(dataset.dims)
     if axis != "time":
         raise InputError(f"the result lies over {axis}: expected a history over time")
-
-
-def format_of(names: Container[Hashable], attributes: Mapping[Any, Any]) -> int:
-    """Format of a result.
-
-    Without a number it is 1 if it has the attributes or the names that results of format 1 have. What a user has put
-    together without attributes has the names of today.
-
-    Parameters
-    ----------
-    names : container of hashable
-        Variables that it holds.
-    attributes : mapping
-        Of the result.
-
-    Raises
-    ------
-    InputError
-        If the number is none that this version can read.
-    """
-    if "result_format" in attributes:
-        found = attributes["result_format"]
-        found = found.item() if isinstance(found, np.generic) else found
-        if isinstance(found, int) and 1 <= found <= RESULT_FORMAT:
-            return found
-        raise InputError(
-            f"result_format is {shown(found)}: expected 1 to {RESULT_FORMAT}, the formats that this version of "
-            "roughvisc reads"
-        )
-    if "contact_area_counted" in names:
-        return RESULT_FORMAT
-    return 1 if "tolerance" in attributes or any(name in names for name in OLDER_NAMES) else RESULT_FORMAT
-
-
-def expect_current_names(dataset: xr.Dataset) -> None:
-    """Refuse a result of a former version as xarray alone opens it: its names have other meanings.
-
-    Raises
-    ------
-    InputError
-        If its format is one in which names have other meanings.
-    """
-    found = format_of(dataset.variables, dataset.attrs)
-    if found < NAMES_OF_TODAY:
-        raise InputError(
-            f"the result is of format {found}, in which 'contact_area' and other names have another meaning than today "
-            f"(from format {NAMES_OF_TODAY} on): expected it as rv.open_result opens its file"
-        )
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:
@@ -161,23 +136,17 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
     Raises
     ------
     InputError
-        If a declared variable states a unit that is not the declared one in other words, or holds a pint array; or if
-        the result is of a former format, in which names have other meanings.
+        If a declared variable states another unit than the declared one.
     """
-    expect_current_names(dataset)
     for name, variable in dataset.variables.items():
         declared = VARIABLES[str(name)].units if name in VARIABLES else ""
-        if declared and "units" not in variable.attrs and hasattr(variable.data, "magnitude"):
-            raise InputError(
-                f"the result holds {name!r} as a pint array: expected numbers, as ds.pint.dequantify() gives"
-            )
         found = str(variable.attrs.get("units", declared))
         if declared and found != declared and not _same_unit(found, declared):
             raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
 
 
 def _same_unit(found: str, declared: str) -> bool:
-    """Whether two texts are one unit: ``m2``, as UDUNITS and earlier results write it, is ``m^2``."""
+    """Whether two texts are one unit: ``m2``, as UDUNITS writes it, is ``m^2``."""
     try:
         factor = quantity("1 " + re.sub(r"(?<=[a-zA-Z])(-?\d)", r"^\1", found), declared)
     except InputError:

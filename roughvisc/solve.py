@@ -17,14 +17,15 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.protocol import Experiment, Rows
 from roughvisc.experiment.resources import retain_arena, threads_for
-from roughvisc.labels import annotate
+from roughvisc.labels import annotate, in_order, warnings_of, warnings_text
 from roughvisc.mechanics.arrays import reused
 from roughvisc.mechanics.bodies.body import separability_error
 from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.problem import Problem
 from roughvisc.recorder import Checkpoint, MemoryRecorder, Recorder, RowStore
+from roughvisc.steps import TITLE, with_steps
 from roughvisc.topography.grid import checked, nominal_area
-from roughvisc.variables import RESULT_FORMAT, STEPPED, of_step
+from roughvisc.variables import RESULT_FORMAT, STEPPED
 
 log = logging.getLogger("roughvisc")
 Progress = Callable[[float, float], None]
@@ -94,7 +95,7 @@ def solve(
         apart = np.abs(found[experiment.axis].values[:, None] - places)  # a slide has others, by half a longer cell
         return found.isel({experiment.axis: apart.argmin(axis=0)})
 
-    return annotate(with_grid_error(dataset, height, on_coarser)).drop_vars(needed)
+    return annotate(in_order(with_grid_error(dataset, height, on_coarser))).drop_vars(needed)
 
 
 def _solve_once(
@@ -152,9 +153,6 @@ def dataset_of(problem: Problem, experiment: Experiment, rows: Rows, records: Ro
     columns = rows.columns(columns)
     stamp = columns.pop(axis)
     variables: dict[str, Any] = {name: ((axis,), column) for name, column in columns.items()}
-    if len(kept) < len(values):
-        for name in (axis, *(name for name in STEPPED if name in columns)):
-            variables[of_step(name)] = (("step",), np.array([row[name] for row in values]))
     for name in settings.fields:
         frames = records.stacked(partial(rows.field, records, name), kept, (height.shape[0], height.shape[1]))
         variables[name] = ((axis, "x", "y"), frames)
@@ -172,10 +170,19 @@ def dataset_of(problem: Problem, experiment: Experiment, rows: Rows, records: Ro
             "history": str(height.attrs.get("history", "")),
         },
     )
-    dataset = annotate(dataset)
-    said = _of_the_scene(problem, experiment) | rows.attributes(dataset)
-    dataset.attrs |= {name: value for name, value in said.items() if value != ""}
-    return dataset
+    dataset = annotate(in_order(dataset))
+    stated = _of_the_scene(problem, experiment) | rows.attributes(dataset)
+    stated["warnings"] = warnings_text(warnings_of(stated) | {"material": _complaint(problem)})
+    dataset.attrs |= {name: value for name, value in stated.items() if value != ""}
+    return with_steps(dataset, _steps(values)) if axis == "time" else dataset
+
+
+def _steps(values: list[dict[str, Any]]) -> xr.Dataset:
+    """Histories of every accepted step, over ``step``."""
+    names = [name for name in STEPPED if name in values[0]]
+    columns = {name: ("time", np.array([row[name] for row in values])) for name in names}
+    steps = annotate(xr.Dataset(columns, coords={"time": [row["time"] for row in values]}, attrs={"title": TITLE}))
+    return steps.drop_indexes("time").rename_dims(time="step")
 
 
 def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
@@ -190,7 +197,6 @@ def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
         "poisson": "" if separability_error(body.material) else material.poisson,
         "time_scale": experiment.time_scale,
         "recipe": str(height.attrs.get("recipe", "")),
-        "measurement_note": _complaint(problem),
     }
 
 

@@ -74,7 +74,7 @@ def _work(force, approach):
 
 def _attributes(dataset, title, boundary):
     dataset = annotate(dataset)
-    dataset.attrs.update(title=title, boundary=boundary, tolerance=1e-3, Conventions="CF-1.11", result_format=2)
+    dataset.attrs.update(title=title, boundary=boundary, tolerance=1e-3, Conventions="CF-1.11", result_format=1)
     return dataset
 
 

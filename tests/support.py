@@ -10,14 +10,13 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import roughvisc as rv
-from roughvisc.groups import whole_of
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.units import quantity
 
 RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
@@ -71,7 +70,7 @@ def numbers(folder):
     """Every variable but the wall time of every result in a folder."""
     found = {}
     for path in sorted(folder.glob("*.nc")):
-        with whole_result(path) as ds:
+        with open_result(path) as ds:
             found[path.name] = ds.drop_vars("wall_time").load()
     return found
 
@@ -231,21 +230,6 @@ def text_boxes(figure):
     for legend in figure.legends:
         found += legend.get_texts()
     return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]
-
-
-def simulate_whole(*given, **settings):
-    """What ``rv.simulate`` gives, with all its groups in one Dataset."""
-    return whole_of(rv.simulate(*given, **settings))
-
-
-def friction_whole(*given, **settings):
-    """What ``rv.friction`` gives, with all its groups in one Dataset."""
-    return whole_of(rv.friction(*given, **settings))
-
-
-def run_whole(*given, **settings):
-    """What ``rv.run`` gives, with all its groups in one Dataset."""
-    return whole_of(rv.run(*given, **settings))
 
 
 def changed_package(folder, page, test, places):

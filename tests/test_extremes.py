@@ -10,7 +10,6 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.groups import whole_of
 from roughvisc.mechanics.bodies import operator as operators
 
 long = pytest.mark.long
@@ -41,7 +40,6 @@ def cell_area(ds):
 
 def assert_a_contact_state(ds, tolerance=TOLERANCE):
     """Everything finite, force balanced, no tension, no penetration beyond what the solver's tolerance leaves."""
-    ds = whole_of(ds)
     present = np.isfinite(ds.height.values)
     for name in set(ds.variables) - {"time_error", "gap", "height"}:
         assert np.isfinite(ds[name].values).all(), name
@@ -110,7 +108,7 @@ def test_exponentials_over_24_decades(count, duration):
     material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, times)
     ds, exact = step_load(material, duration)
     assert_follows(ds, exact)
-    assert ds.roughvisc.attributes["memory"].startswith(f"{count} exponential")
+    assert ds.attrs["memory"].startswith(f"{count} exponential")
 
 
 def test_steps_of_all_sizes_in_one_program():
@@ -161,7 +159,7 @@ def test_cycles__settle(count):
     ds = simulate(punch, ZENER, program, times=ends, tolerance=1e-2)
     assert_a_contact_state(ds)
     assert ds.force.values[2:] == pytest.approx(ds.force.values[-1], rel=1e-2)
-    work = np.diff(ds.roughvisc.energy.work.values)
+    work = np.diff(ds.work.values)
     assert work[1:] == pytest.approx(work[-1], rel=1e-2)
     exact = closed_forms.punch_dissipation(1.0, ZENER, 5e-3, 1.0) * count / 4
     # a punch of cells has a radius right to half a cell; the error of the force acts over the path of all cycles
@@ -228,11 +226,10 @@ def test_lengths__are_neutral(scale):
         runs.append(simulate(ball, ZENER, program, times=5, tolerance=1e-4))
     one, other = runs
     # an error that is at its limit, to rounding, costs an iteration more or less
-    counts = [int(run.roughvisc.cost.convolutions.sum()) for run in runs]
+    counts = [int(run.convolutions.sum()) for run in runs]
     assert counts[0] == pytest.approx(counts[1], rel=0.01)
     for name, power in (("pressure", 0), ("approach", 1), ("contact_area", 2), ("work", 3), ("gap", 1)):
-        expected, found = (run.roughvisc.energy if name == "work" else run for run in (one, other))
-        expected, found = expected[name].values * scale**power, found[name].values
+        expected, found = one[name].values * scale**power, other[name].values
         # rounding of the coordinates, 1e-14 of the kernel, comes through 200 steps of chosen length
         assert np.abs(found - expected).max() <= 1e-7 * np.abs(expected).max(), name
 
@@ -366,18 +363,18 @@ def test_slopes_that_are_not_small__warn(slope, warns, caplog):
     with caplog.at_level(logging.WARNING, "roughvisc"):
         ds = simulate(height, ELASTIC, rv.Program().load(0.01 * slope, over=0), boundary="periodic")
     assert ("rms slope of the loaded surface is" in caplog.text) is warns
-    assert ("slope_note" in ds.roughvisc.attributes) is warns
+    assert ("slope:" in ds.attrs.get("warnings", "")) is warns
 
 
 def test_slopes_that_are_not_loaded__do_not_warn():
     """A ball whose flanks are steep, pressed at its tip; a flat punch whose sides are absent."""
     ball = rv.sphere(1.0, 1.9, (65, 65))
     tip = simulate(ball, ELASTIC, rv.Program().load(1e-3, over=0))
-    assert "slope_note" not in tip.roughvisc.attributes
+    assert "slope:" not in tip.attrs.get("warnings", "")
     deep = simulate(ball, ELASTIC, rv.Program().load(0.5, over=0))
-    assert "slope_note" in deep.roughvisc.attributes
+    assert "slope:" in deep.attrs.get("warnings", "")
     punch = simulate(rv.flat_punch(1.0, SIZE, SHAPE), ELASTIC, rv.Program().load(1.0, over=0))
-    assert "slope_note" not in punch.roughvisc.attributes
+    assert "slope:" not in punch.attrs.get("warnings", "")
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -428,8 +425,7 @@ def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
     ds, steps = counted(BALL, ELASTIC, rv.Program().load(0.1, over=1.0).load(0.01, over=1.0), times=5)
     assert set(kept) == {0}
     assert steps == 5
-    assert ds.roughvisc.attributes["memory"] == "no memory: elastic"
-    assert "past pressures: not needed, the material is elastic" in ds.roughvisc.attributes["left_out"]
+    assert ds.attrs["memory"] == "no memory: elastic"
 
 
 def test_constant_load__takes_few_steps_once_relaxed():
@@ -439,7 +435,7 @@ def test_constant_load__takes_few_steps_once_relaxed():
     longer, more = counted(BALL, ZENER, load.hold(3000.0), times=[3000.0])
     assert more <= steps + 10
     late, _ = counted(BALL, ZENER, load.hold(30.0).hold(2970.0), times=[30.0, 3000.0])
-    assert int(late.roughvisc.cost.convolutions[1]) < int(late.roughvisc.cost.convolutions[0])
+    assert int(late.convolutions[1]) < int(late.convolutions[0])
     assert float(longer.approach[-1]) == pytest.approx(float(late.approach[-1]), rel=TOLERANCE)
 
 
@@ -447,12 +443,7 @@ def test_fields_not_kept__are_neither_stored_nor_paid_for():
     program = rv.Program().load(0.05, over=0.2).hold(1.0)
     none, every = (simulate(BALL, ZENER, program, fields=f) for f in ((), ("pressure", "gap", "displacement")))
     assert not {"pressure", "gap", "displacement"} & set(none.variables)
-    assert int(none.roughvisc.cost.convolutions.sum()) == int(every.roughvisc.cost.convolutions.sum())
-    assert "pressure and gap and displacement: not kept" in none.roughvisc.attributes["left_out"]
-    assert "not kept" not in every.roughvisc.attributes["left_out"].replace(
-        "fields between the kept times: not kept", ""
-    )
-    assert "past pressures: remembered by 1 exponential, at no cost" in every.roughvisc.attributes["left_out"]
+    assert int(none.convolutions.sum()) == int(every.convolutions.sum())
 
 
 def test_periodic__is_not_padded(monkeypatch):
@@ -464,28 +455,8 @@ def test_periodic__is_not_padded(monkeypatch):
         of_rows=lambda *a, **kw: pytest.fail("a padded transform"),
     )
     monkeypatch.setattr(operators, "transforms", lambda mirrored: watched)
-    ds = simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
+    simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
     assert sizes == {ROUGH.shape}
-    assert "padding" in ds.roughvisc.attributes["left_out"]
-
-
-def test_left_out__is_what_plan_says(tmp_path):
-    study = tmp_path / "study.toml"
-    study.write_text(
-        '[surface]\ngenerate = "wavy"\namplitude = 1e-6\nwavelength = 1e-4\nsize = 1e-4\nshape = 16\n'
-        '[material]\nmodel = "elastic"\nshear_modulus = 1e6\n[[program]]\nload = 1e-4\nover = 0.1\n'
-        '[solve]\nboundary = "periodic"\n[keep]\nfields = ["gap"]\ntimes = 2\n'
-    )
-    case = rv.read_study(study)
-    ds = rv.run(case, tmp_path / "out", progress=False)
-    planned = str(rv.plan([case], tmp_path / "out").left_out.values[0])
-    assert ds.roughvisc.attributes["left_out"] == planned
-    assert planned == (
-        "past pressures: not needed, the material is elastic; "
-        "padding of the transforms: not needed, the surface repeats; "
-        "three quarters of the surface: not computed, they are mirror images of the fourth; "
-        "pressure and displacement: not kept; fields between the kept times: not kept"
-    )
 
 
 @pytest.mark.parametrize("material", [rv.elastic(1e6), rv.zener(3e6, 1e6, 1e5), rv.maxwell(1e6, 1e6)])
@@ -497,4 +468,4 @@ def test_a_flat_periodic_surface_in_full_contact_has_no_residual(material):
             surface = rv.wavy(1.0, 1e-3, 1e-3, (12, 9)) * amplitude
             ds = simulate(surface, material, program, boundary="periodic", numerics=rv.Numerics(time_step=step))
             np.testing.assert_allclose(ds.pressure[-1], 1e-3 / 1e-6, rtol=1e-9)
-            assert ds.roughvisc.accuracy.residual.max() < 1e-9
+            assert ds.residual.max() < 1e-9

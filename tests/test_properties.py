@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import boundaries, decades, of_whole_runs, stiffened, surfaces
-from support import simulate_whole
 
 import roughvisc as rv
 
@@ -21,7 +20,7 @@ def load_for(material):
 
 def simulate(height, material, program, boundary, **options):
     settings = {"edge": "accept", "times": 4, "tolerance": TOLERANCE, "progress": False}
-    return simulate_whole(height, material, program, boundary=boundary, **{**settings, **options})
+    return rv.simulate(height, material, program, boundary=boundary, **{**settings, **options})
 
 
 def ramp(load):

@@ -14,7 +14,6 @@ from scipy import fft
 from support import assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.groups import whole_of
 from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.study.execution.run import run_case
@@ -119,10 +118,8 @@ def computed(case, body=None, **settings):
     body = case.body() if body is None else body
     asked = case.settings.friction
     if asked is not None:
-        return whole_of(rv.friction(case.height(), body, speeds=asked.speeds, pressure=asked.pressure, **shared))
-    return whole_of(
-        rv.simulate(case.height(), body, case.program(), boundary="periodic", times=solving.times, **shared)
-    )
+        return rv.friction(case.height(), body, speeds=asked.speeds, pressure=asked.pressure, **shared)
+    return rv.simulate(case.height(), body, case.program(), boundary="periodic", times=solving.times, **shared)
 
 
 def test_run__gives_rows_over_the_axis(kind, done):
@@ -143,7 +140,7 @@ def test_plan__foresees_rows_and_work(kind, done):
     planned = rv.plan([done.case]).isel(case=0)
     assert str(planned.refusal.values) == ""
     assert int(planned.rows) == ROWS
-    work = int(done.result.roughvisc.cost.convolutions.sum())
+    work = int(done.result.convolutions.sum())
     assert 0.4 * work < float(planned.convolutions) < 2.5 * work
     largest = float(done.result.contact_fraction.max())
     assert 0.7 * largest < float(planned.contact_fraction) < 2 * largest, "of a press, beneath which nothing moves"
@@ -215,7 +212,7 @@ def test_report__tells_what_was_done(kind, done, tmp_path, coarse_pictures):
     assert len(view["frames"]) == ROWS
     assert len({frame["maps"][0] for frame in view["frames"]}) == ROWS, "each row has a map of its own"
     assert ("Friction coefficient" in {chart["label"] for chart in view["charts"]}) == kind.moves
-    whole = whole_of(done.result)
+    whole = done.result
     numbers = {name: f"{float(whole[name].max()):.2g}" for name in ("stated_error", "time_error") if name in whole}
     for number in ("10 kPa", str(int(whole.convolutions.sum())), *numbers.values()):
         assert f"<td>{number}</td>" in page or f">{number}<" in page, number
@@ -320,5 +317,5 @@ def test_own_body__is_what_its_kernel_says(kind, done):
     softer = computed(done.case, rv.zener(0.5e6, 0.25e6, 0.5e3))
     for name in ("contact_area", "approach", kind.curve):
         np.testing.assert_allclose(own[name], softer[name], rtol=1e-9)
-    plain = whole_of(done.result)
+    plain = done.result
     assert float(own.contact_area[-1]) > 1.5 * float(plain.contact_area[-1])

@@ -47,7 +47,7 @@ def test_unloading_and_reloading__follow_the_element_reduction(profile, material
     ds = rv.simulate(height, material, program, times=times, tolerance=3e-4, progress=False)
     assert ds.approach.values == pytest.approx(exact.approach, abs=1e-3 * np.max(exact.approach))
     assert radius_of(ds)[1:] == pytest.approx(exact.radius[1:], rel=1.5e-2)
-    assert ds.roughvisc.energy.work.values == pytest.approx(exact.work, abs=4e-3 * np.max(exact.work))
+    assert ds.work.values == pytest.approx(exact.work, abs=4e-3 * np.max(exact.work))
 
 
 @pytest.mark.long
@@ -58,7 +58,7 @@ def test_settled_cycles__dissipate_as_the_element_reduction_does():
     exact = closed_forms.reduced_contact(closed_forms.Paraboloid(1.0), ZENER, program, ends, steps=200)
     sphere = rv.sphere(1.0, size=3.4, shape=(65, 63))
     ds = rv.simulate(sphere, ZENER, program, times=ends, fields=(), tolerance=1e-3, progress=False)
-    found, expected = np.diff(ds.roughvisc.energy.work.values), np.diff(exact.work)
+    found, expected = np.diff(ds.work.values), np.diff(exact.work)
     assert found[-1] == pytest.approx(expected[-1], rel=1e-2)
     assert expected[-1] == pytest.approx(0.3089, rel=2e-3)  # printed as .30881, of 200 steps a cycle
 
@@ -101,4 +101,4 @@ def test_work__is_never_negative_from_rest():
     rough = rv.self_affine(1.0, (31, 28), hurst=0.8, rms_slope=0.1, seed=3)
     program = rv.Program().load(0.02, over=0.3).load(0.0, over=0.2).hold(0.4).load(0.03, over=0.3).load(0.001, over=0.2)
     ds = rv.simulate(rough, ZENER, program, boundary="periodic", fields=(), tolerance=1e-3, progress=False)
-    assert (ds.roughvisc.energy.work > -1e-9 * float(ds.roughvisc.energy.work.max())).all()
+    assert (ds.work > -1e-9 * float(ds.work.max())).all()

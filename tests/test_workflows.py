@@ -33,7 +33,7 @@ def test_study__runs(path, tmp_path):
         ds = run(case, tmp_path, progress=False)
         assert float(ds.force[-1]) > 0
         assert (np.diff(ds.contact_area) >= 0).all(), "under a load that is held, the contact grows"
-        assert float(ds.roughvisc.accuracy.time_error.max()) <= 1.1 * case.settings.solve.tolerance
+        assert float(ds.time_error.max()) <= 1.1 * case.settings.solve.tolerance
         assert 0.01 < float(ds.contact_fraction[-1]) < 0.6
 
 
@@ -48,7 +48,7 @@ def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     assert first.max() < 1.02 * ends[0]
     assert again.max() > 1.04 * ends[0], "contact has grown in the rest"
     assert np.trapezoid(steps.friction_force, steps.sliding_distance) == pytest.approx(
-        float(ds.roughvisc.energy.friction_work[-1]), rel=0.01
+        float(ds.friction_work[-1]), rel=0.01
     )
     assert float(ds.sliding_distance[-1]) == pytest.approx(1.8e-3)
     assert float(ds.force.min()) == 0
@@ -105,7 +105,7 @@ def test_friction__rises_and_falls_as_the_rubber_stiffens(tmp_path):
     assert (np.diff(friction[: most + 1]) > 0).all()
     assert (np.diff(friction[most:]) < 0).all()
     assert (np.diff(curve.contact_area) < 0).all(), "the area falls with the speed"
-    accuracy = curve.roughvisc.accuracy
+    accuracy = curve
     assert ((accuracy.last_octave_friction > 0) & (accuracy.last_octave_friction < 1)).all()
     assert (accuracy.last_octave_area < 0).all(), "finer roughness takes area away"
 
@@ -221,7 +221,7 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatc
     monkeypatch.syspath_prepend(str(FOLDER))
     seal = importlib.import_module("creeping_seal").main(tmp_path / "seal.png")
     assert (tmp_path / "seal.png").stat().st_size > 10_000
-    stated = float(seal.roughvisc.accuracy.time_error.max())
+    stated = float(seal.time_error.max())
     assert stated <= 1.1 * seal.tolerance  # what is stated is some three times the error
     rate = seal.leak_rate.values
     closed = rate == 0

@@ -29,7 +29,7 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import results_at, whole_result
+    from roughvisc.study.storage.store import open_result, results_at
     from roughvisc.study.trade.files import is_trade, open_trade
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
@@ -44,7 +44,7 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
             drawn.append(write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png"))
             continue
         stem, title = names.get(path, (path.stem, ""))
-        with whole_result(path) as dataset:
+        with open_result(path) as dataset:
             drawn += save_figures(dataset, out or path.parent, stem, title=title, every=every)
     together = results_of(result) if len(paths) > 1 else None
     drawn += save_sweep_figures(together, out or result) if together is not None else ()
@@ -97,14 +97,14 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.audit.given import from_options, of_study
-    from roughvisc.study.storage.store import results_at, whole_result
+    from roughvisc.study.storage.store import open_result, results_at
     from roughvisc.views.console.accuracy_tables import audit_table
 
     given = from_options(stated).over(of_study(study) if study is not None else {})
     paths = results_at(result)
     console = Console()
     for path in paths:
-        with whole_result(path) as dataset:
+        with open_result(path) as dataset:
             console.print(audit_table(audited(dataset, **given.stated())))
 
 

@@ -133,7 +133,7 @@ def _run_one(
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
-    from roughvisc.study.storage.store import result_path, whole_result
+    from roughvisc.study.storage.store import open_result, result_path
     from roughvisc.views.console.result_tables import result_table
 
     if is_result_of(case, result_path(folder, case.key)):
@@ -148,7 +148,7 @@ def _run_one(
     with Bar(console, label, case.at) as bar:
         path = run_case(case, folder, progress=bar.reached, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
-    with whole_result(path) as dataset:
+    with open_result(path) as dataset:
         console.print(result_table(dataset))
         say(console, "Result", path)
         if plots:

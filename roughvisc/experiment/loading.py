@@ -15,13 +15,10 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.notes import (
     accuracy_note,
-    body_note,
     border_note,
     contact_stands_alone,
     creep_left,
     edge_note,
-    layer_note,
-    omitted_effects,
     slope_note,
     surface_stands_alone,
     wake_note,
@@ -38,9 +35,9 @@ from roughvisc.experiment.stated import (
     meets_tolerance,
     staircase_area,
 )
+from roughvisc.labels import warnings_text
 from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
@@ -357,38 +354,29 @@ class LoadingRows(Rows):
         return out
 
     def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
-        """How it was modelled, what an audit asks for, and notes on what is beyond the model; these are logged too."""
+        """Return the memory model, numbers for an audit, and warnings; warnings are logged too."""
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
-        force, approach = (float(np.fmax.reduce(dataset[name].values)) for name in ("force", "approach"))
-        (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
+        approach = float(np.fmax.reduce(dataset["approach"].values))
         repeats = settings.boundary == "periodic"
         warnings = {
-            "slope_note": slope_note(
+            "slope": slope_note(
                 profile.height[profile.window.surface_cells],
                 settings.boundary,
                 approach - profile.least_gap,  # below the highest cell
             ),
-            "border_note": border_note(profile.height, dataset) if repeats and not profile.mirrored else "",
-            "edge_note": "" if self._border is None else edge_note(self._border),
-            "wake_note": self._wake_note(dataset),
+            "border": border_note(profile.height, dataset) if repeats and not profile.mirrored else "",
+            "edge": "" if self._border is None else edge_note(self._border),
+            "wake": self._wake_note(dataset),
+            "slide": slide_note(scene.program, profile.spacing),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
-        body, ages = self._problem.body, (0.0, scene.program.duration)
         # of what was pressed, a series or not; of layers those of the top one
         pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.final}
         return {
             "memory": choice.note,
             "series_error": choice.series_error,
-            "body_note": body_note(profile.kernel, settings, (nx * dx, ny * dy), scene.final, force, approach)
-            or layer_note(body, settings.tolerance, wave_limits((nx, ny), (dx, dy)), ages),
-            "material_note": self._problem.body.note,
-            "program_note": scene.program.note,
-            "slide_note": slide_note(scene.program, profile.spacing),
-            "accuracy_note": accuracy_note(scene, dataset),
-            "edge": "accept" if settings.edge == "accept" else "",
-            "left_out": omitted_effects(choice, settings, self._followed, profile.mirrored),
-            **warnings,
+            "warnings": warnings_text({"accuracy": accuracy_note(scene, dataset), **warnings}),
             **({} if isinstance(choice.memory, WaveMemory) else pressed),
         }
 

@@ -1,28 +1,20 @@
-"""Notes on what is beyond the model: steep slopes, borders that do not meet, wakes, bases, omitted effects."""
+"""Warnings about a result: missed tolerances, steep slopes, borders that do not meet, wakes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.layer import LayeredBody
-from roughvisc.mechanics.bodies.sheet import Sheet, complement
-from roughvisc.mechanics.hereditary.choice import Choice, terms
-from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.settings import Settings
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.indenters import grown
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.synthesis import is_analytic
 from roughvisc.units import said
-from roughvisc.variables import FIELDS
 
 Array = NDArray[np.float64]
 #: Part of all creep that is still to recover after a period, from which on a result says so. Friction of a sphere on a
@@ -112,27 +104,6 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def omitted_effects(choice: Choice, settings: Settings, window: bool = False, mirrored: bool = False) -> str:
-    """What costs nothing, and why: what nothing asks for is not modelled, computed or kept."""
-    out = []
-    if choice.note.startswith("no memory"):
-        out.append("past pressures: not needed, the material is elastic")
-    elif isinstance(choice.memory, Modes) and choice.memory.acts_on != "pressure" and settings.method == "fast":
-        out.append(f"past pressures: remembered by {terms(choice.memory.material)}, at no cost")
-    if settings.boundary == "periodic":
-        out.append("padding of the transforms: not needed, the surface repeats")
-    if window:
-        out.append("cells too deep to be touched: not computed")
-    if mirrored:
-        out.append("three quarters of the surface: not computed, they are mirror images of the fourth")
-    absent = [name for name in FIELDS if name not in settings.fields]
-    if absent:
-        out.append(f"{' and '.join(absent)}: not kept")
-    if settings.times is not None and settings.fields:
-        out.append("fields between the kept times: not kept")
-    return "; ".join(out)
-
-
 def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
     """Where the tolerance is not promised, or was not reached; empty if it is."""
     notes = []
@@ -196,86 +167,6 @@ def edge_note(time: float) -> str:
     return (
         f"Contact reached the border of the surface, first in the step to {time:.3g} s: there the surface acts as "
         'a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "accept").'
-    )
-
-
-def body_note(
-    kernel: Kernel, settings: Settings, size: tuple[float, float], compliance: float, force: float, approach: float
-) -> str:
-    """What the base of a sheet does to this contact, and whether a half-space would have done; empty without a base.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        Of the body.
-    settings : Settings
-        Boundary and tolerance.
-    size : tuple of float
-        Of the surface. [m]
-    compliance : float
-        Contact compliance at the end. [1/Pa]
-    force, approach : float
-        The largest. [N], [m]
-
-    Notes
-    -----
-    In free space the base raises the surface by no more than ``c(0) C F``, with the correction ``c(0)`` of the
-    kernel right under the load, :attr:`~roughvisc.mechanics.bodies.sheet.Sheet.relief`.
-    """
-    if not isinstance(kernel, Sheet) or not (force > 0 and approach > 0):
-        return ""
-    if settings.boundary == "free":
-        more = kernel.relief * compliance * force / approach
-        if more < settings.tolerance:
-            return (
-                f"A half-space would be accurate enough: its approach is at most {percent(more)} larger, less than the "
-                "tolerance."
-            )
-        larger = "much" if more > 1 else f"up to {percent(more)}"  # the bound says little where it is wide
-        return f"The base matters: on a half-space the approach would be {larger} larger."
-    longest = max(size)
-    lost = float(complement(2 * np.pi * kernel.thickness / longest, kernel.poisson, kernel.base))
-    note = f"The base holds back {percent(lost)} of the longest wave, of {longest:.3g} m" + (
-        ": a half-space would be accurate enough." if lost < settings.tolerance else "."
-    )
-    if kernel.uniform_displacement > 0:
-        share = kernel.uniform_displacement * compliance * force / (size[0] * size[1]) / approach
-        note += (
-            " The approach includes the compression of the sheet itself, mean pressure times compliance times "
-            f"{kernel.uniform_displacement:.3g} m: up to {percent(min(share, 1.0))} of it."
-        )
-    return note
-
-
-#: Part of the tolerance that a body may be off with which it would be accurate enough on every wave.
-_ENOUGH = 0.1
-
-
-def layer_note(body: Body, tolerance: float, waves: tuple[float, float], ages: Sequence[float]) -> str:
-    """Whether one of the materials of a layered body would do alone; empty for another body.
-
-    Parameters
-    ----------
-    body : Body
-    tolerance : float
-        Of the solve.
-    waves : tuple of float
-        Wave numbers of the longest and of the shortest wave of the grid. [1/m]
-    ages : sequence of float
-        At which the materials are compared. [s]
-    """
-    if not isinstance(body, LayeredBody):
-        return ""
-    apart = body.apart(waves, ages)
-    for off, name in zip(apart, ("the top layer", "the lowest material"), strict=True):
-        if off < _ENOUGH * tolerance:
-            return (
-                f"A half-space of {name} alone would be accurate enough: it differs by at most {percent(off)} on every "
-                "wave of the grid."
-            )
-    return (
-        f"The layers matter: a half-space of the top layer alone would be off by up to {percent(apart[0])} on a wave "
-        f"of the grid, and one of the lowest material by up to {percent(apart[1])}."
     )
 
 

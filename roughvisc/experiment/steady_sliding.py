@@ -17,7 +17,6 @@ from roughvisc.experiment.notes import (
     border_note,
     contact_stands_alone,
     creep_left,
-    layer_note,
     octave_note,
     slope_note,
     surface_stands_alone,
@@ -27,8 +26,8 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.resources import curve_bytes, require_memory_of_curve
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
+from roughvisc.labels import warnings_text
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
@@ -43,11 +42,6 @@ log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
-#: What every result on sliding says of its model.
-MODEL = (
-    "Normal contact alone: friction is that of pressure on inclined faces, which the material's losses make uneven. "
-    "No shear at the interface, no adhesion, no heating."
-)
 #: Speeds of a plan's coarse curves: of more, evenly spread ones.
 _FEW = 7
 
@@ -200,10 +194,8 @@ class SlidingRows(Rows):
         #: Part of the creep that is left where the next contact comes, by the speed.
         self._creep_left: dict[float, float] = {}
         self._smooth: SlidingGrid | None = None
-        self._octave = ""
         if curve.last_octave:
-            self._smooth, shortest = self._face.smooth()
-            self._octave = f"waves shorter than {shortest:.4g} m"
+            self._smooth, _ = self._face.smooth()
         self._coarser = CoarserFaces(self._face) if problem.settings.grid_error else None
 
     def __iter__(self) -> Iterator[Row]:
@@ -286,25 +278,15 @@ class SlidingRows(Rows):
         return [int(place) for place in np.argsort([one["number"] for one in facts])]
 
     def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
-        """What was modelled, and notes on what is beyond the model; these are logged too."""
+        """Return the direction, and warnings; these are logged too."""
         warnings = {
-            "slope_note": slope_note(self.height, "periodic", np.inf),
-            "border_note": border_note(self.height, xr.Dataset()),
-            "wake_note": wake_note(self._creep_left, self._face.period),
+            "slope": slope_note(self.height, "periodic", np.inf),
+            "border": border_note(self.height, xr.Dataset()),
+            "wake": wake_note(self._creep_left, self._face.period),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         return {
-            "model_note": MODEL,
             "direction": self._curve.direction,
-            "body_note": layer_note(
-                self._body,
-                self._settings.tolerance,
-                wave_limits(self._face.gap.shape, self._face.spacing),
-                (0.0, self._face.period / min(self._curve.asked)),
-            ),
-            "material_note": self._body.note,
-            "octave_note": octave_note(dataset),
-            "last_octave": self._octave,
-            **warnings,
+            "warnings": warnings_text({**warnings, "octave": octave_note(dataset)}),
         }

@@ -10,7 +10,6 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import material_of, need_history
 from roughvisc.observables.response import history
@@ -76,7 +75,7 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
     if dataset.attrs.get("boundary") != "periodic":
         raise InputError("the theories are of surfaces without borders: expected a result with periodic boundaries")
-    attributes = attributes_of(dataset.attrs)
+    attributes = dataset.attrs
     for body in ("thickness", "kernel"):
         if body in attributes:
             raise InputError(f"the theories are of a half-space: found a result with the {body} {attributes[body]}")

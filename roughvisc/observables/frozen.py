@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import frame_by_frame, material_of
 from roughvisc.observables.spots import contact
@@ -90,7 +89,7 @@ def _kernel_of(dataset: xr.Dataset, kernel: Any) -> Any:
     """Kernel of the body of a result; None: a half-space."""
     if kernel is not None:
         return kernel
-    attributes = attributes_of(dataset.attrs)
+    attributes = dataset.attrs
     if "kernel" in attributes:
         raise InputError(f"the result is of the kernel {attributes['kernel']}: give kernel=")
     if "thickness" not in attributes:

@@ -6,10 +6,11 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.groups import group_of
 from roughvisc.labels import describe
 from roughvisc.observables.derived import along_time, need_history
+from roughvisc.steps import steps_of
 from roughvisc.units import Quantity, quantities
+from roughvisc.variables import STEPPED
 
 
 def history(dataset: xr.Dataset) -> xr.Dataset:
@@ -23,8 +24,8 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Force, approach, area, mean gap, work, energies and stated errors over ``time`` at every accepted step. If the
-        result contains only the kept times, or keeps every step, these are returned.
+        Force, approach, area, mean gap and work over ``time`` at every accepted step. If the Dataset carries no steps,
+        its rows are returned.
 
     Raises
     ------
@@ -34,8 +35,11 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     need_history(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
-    steps = group_of(dataset, "steps")
-    return steps.isel(step=np.isfinite(steps["time"].values)).swap_dims(step="time").drop_attrs(deep=False)
+    steps = steps_of(dataset)
+    if steps is not None:
+        return steps.swap_dims(step="time").drop_attrs(deep=False)
+    rows = dataset[[name for name in STEPPED if name in dataset]].drop_attrs(deep=False)
+    return rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
 
 
 def _slope(value: np.ndarray, over: np.ndarray) -> np.ndarray:

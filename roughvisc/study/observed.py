@@ -20,7 +20,7 @@ from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.store import result_path, whole_result, write_result
+from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
@@ -84,7 +84,7 @@ def observe(
 def _add(case: Case, path: Path) -> bool:
     """Add to one file what it lacks; whether it lacked anything."""
     wanted: Mapping[str, Any] = case.settings.observe.stated()
-    with whole_result(path) as result:
+    with open_result(path) as result:
         before = json.loads(result.attrs.get(OBSERVED, "{}"))
         lacking = {name: values for name, values in wanted.items() if before.get(name) != values}
         if not lacking:

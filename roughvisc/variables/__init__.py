@@ -7,7 +7,6 @@ through the gap and of the contact spots have files of their own.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -21,15 +20,8 @@ from roughvisc.variables.transport import TRANSPORT
 STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
 
-#: Number of the meaning that the names below have, and of their groups; results state it in the attribute
-#: ``result_format``. Raised by whoever gives a name another meaning or another group:
-#: :mod:`roughvisc.study.storage.formats` then reads what was written before.
-RESULT_FORMAT = 4
-#: Format from which on names have the meaning that they have today; groups came with format 3, with format 4 a group
-#: of energies and few attributes.
-NAMES_OF_TODAY = 2
-#: Older names of variables, which may be given until release 0.1.0, and what they are called now.
-OLDER_NAMES = {"contact_area_corrected": "contact_area"}
+#: Number of the format of result files, stated in their attribute ``result_format``.
+RESULT_FORMAT = 1
 
 _GRID = ("x", "y")
 _FRAME = ("time", "x", "y")
@@ -50,7 +42,6 @@ VARIABLES: dict[str, Variable] = {
     "y": Variable(("y",), "m", "y", "of the cell centre", axis="Y"),
     "x_bounds": Variable(("x", "bnds"), "", "borders of the cells along x", "in files alone"),
     "y_bounds": Variable(("y", "bnds"), "", "borders of the cells along y", "in files alone"),
-    "step": Variable(("step",), "1", "number of the accepted step", "counted from 0", dtype="int32"),
     "case_key": Variable((), "", "key of the case", "what the file is named by", dtype="str"),
     # the surface
     "height": Variable(
@@ -137,7 +128,6 @@ VARIABLES: dict[str, Variable] = {
         "dissipated_energy, with that of the friction force in a slide; a jump is quasi-static; with periodic "
         "boundaries without the uniform displacement",
         ancillary=("work_error",),
-        group="energy",
         short="work",
         every_step=True,
     ),
@@ -147,7 +137,6 @@ VARIABLES: dict[str, Variable] = {
         "stored energy",
         "in the springs of the material; "
         "exact for pressure linear in each step; missing where the memory is the direct history",
-        group="energy",
         every_step=True,
         may_be_missing=True,
     ),
@@ -158,7 +147,6 @@ VARIABLES: dict[str, Variable] = {
         "in the material since the start; "
         "exact for pressure linear in each step; missing where the memory is the direct history",
         ancillary=("dissipated_energy_error",),
-        group="energy",
         every_step=True,
         may_be_missing=True,
     ),
@@ -219,9 +207,7 @@ VARIABLES: dict[str, Variable] = {
     ),
     **SLIDES,
     # accuracy and cost
-    "iterations": Variable(
-        _SERIES, "1", "solver iterations", "since the previous kept time", dtype="int32", group="cost"
-    ),
+    "iterations": Variable(_SERIES, "1", "solver iterations", "since the previous kept time", dtype="int32"),
     "convolutions": Variable(
         _SERIES,
         "1",
@@ -229,7 +215,6 @@ VARIABLES: dict[str, Variable] = {
         "since the previous kept time: "
         "displacements and preconditioner applications, each one forward and one inverse transform",
         dtype="int32",
-        group="cost",
     ),
     "stated_error": Variable(
         _SERIES,
@@ -247,7 +232,6 @@ VARIABLES: dict[str, Variable] = {
         "error due to time steps",
         "part of stated_error, "
         "from the difference to a companion march in steps twice as long; over what is largest so far",
-        group="accuracy",
         every_step=True,
         may_be_missing=True,
         in_table="largest",
@@ -257,7 +241,6 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "error due to the contact solver",
         "part of stated_error: estimated error of the pressure (L1), over its sum",
-        group="accuracy",
         may_be_missing=True,
         in_table="largest",
     ),
@@ -267,7 +250,6 @@ VARIABLES: dict[str, Variable] = {
         "bound on the contact solver's error",
         "of the pressure, relative, in the energy norm: "
         "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
-        group="accuracy",
         may_be_missing=True,
     ),
     "pressure_error": Variable(
@@ -275,31 +257,24 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "stated error of the pressure",
         "its absolute values summed (L1), over the largest force so far",
-        group="accuracy",
         may_be_missing=True,
     ),
-    "force_error": Variable(
-        _SERIES, "N", "stated error of the force", "zero where the force is prescribed", group="accuracy"
-    ),
+    "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),
     "approach_error": Variable(
         _SERIES,
         "m",
         "stated error of the approach",
         "zero where the approach is prescribed",
-        group="accuracy",
         may_be_missing=True,
     ),
-    "work_error": Variable(_SERIES, "J", "stated error of the work", group="accuracy", may_be_missing=True),
-    "dissipated_energy_error": Variable(
-        _SERIES, "J", "stated error of the dissipated energy", group="accuracy", may_be_missing=True
-    ),
+    "work_error": Variable(_SERIES, "J", "stated error of the work", may_be_missing=True),
+    "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy", may_be_missing=True),
     "contact_area_lower": Variable(
         _SERIES,
         "m^2",
         "lower bound on the contact area",
         "in practice: "
         "contact_area_solver_lower less the error of the grid: grid_error_area times the largest contact area",
-        group="accuracy",
         may_be_missing=True,
         in_table="last",
     ),
@@ -309,7 +284,6 @@ VARIABLES: dict[str, Variable] = {
         "upper bound on the contact area",
         "in practice: "
         "contact_area_solver_upper and the error of the grid: grid_error_area times the largest contact area",
-        group="accuracy",
         may_be_missing=True,
         in_table="last",
     ),
@@ -319,7 +293,6 @@ VARIABLES: dict[str, Variable] = {
         "lower bound on this grid's contact area",
         "the contact area without the cells that time steps and contact solver leave in doubt; without the error of "
         "the grid, which is mostly larger",
-        group="accuracy",
         may_be_missing=True,
         in_table="last",
     ),
@@ -329,7 +302,6 @@ VARIABLES: dict[str, Variable] = {
         "upper bound on this grid's contact area",
         "the contact area with the cells that time steps and contact solver leave in doubt; without the error of the "
         "grid, which is mostly larger",
-        group="accuracy",
         may_be_missing=True,
         in_table="last",
     ),
@@ -338,13 +310,12 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "error due to the grid",
         "the larger one of grid_error_pressure and grid_error_approach, as stated_error is of the errors on this grid",
-        group="accuracy",
         may_be_missing=True,
         short="grid error",
     ),
     **grid_errors("time", "the largest value of all rows", in_table="largest"),
     "status": Variable(_SERIES, "", "how the step ended", dtype="int8", every_step=True, meanings=STATUS_MEANINGS),
-    "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run", group="cost"),
+    "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run"),
     # derived from a result: see roughvisc.observables
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
@@ -469,42 +440,15 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = tuple(name for name, variable in VARIABLES.items() if variable.dims == _FRAME and name not in TRANSPORT)
 
 
-def current_name(name: str) -> str:
-    """Name of a variable today; of an older one, with a warning that says so.
-
-    Examples
-    --------
-    >>> current_name("contact_area")
-    'contact_area'
-    """
-    if name not in OLDER_NAMES:
-        return name
-    warnings.warn(f"{name} is now {OLDER_NAMES[name]}: the older name goes with release 0.1.0", FutureWarning, 3)
-    return OLDER_NAMES[name]
-
-
 #: Histories of every accepted step, also of those between the kept times.
 STEPPED = tuple(name for name, variable in VARIABLES.items() if variable.every_step)
 
 
-def of_step(name: str) -> str:
-    """Name of a variable over the accepted steps."""
-    return f"step_{name}"
-
-
-def _over_steps(name: str) -> Variable:
-    """The same variable over the accepted steps."""
-    one = VARIABLES[name]
-    stated = tuple(of_step(other) for other in one.ancillary if other in STEPPED)
-    return replace(one, dims=("step",), axis="", ancillary=stated, group="steps", in_table="")
-
-
-VARIABLES |= {of_step(name): _over_steps(name) for name in ("time", *STEPPED)}
 #: Variables whose values are words, and these in order.
 FLAGS = {name: variable.meanings for name, variable in VARIABLES.items() if variable.meanings}
 
 #: Dimensions that a result of one case may have beside that of its rows.
-OTHER_DIMS = ("step", "x", "y", "bnds")
+OTHER_DIMS = ("x", "y", "bnds")
 #: Of the surface, whatever the rows lie over.
 _SURFACE = ("x", "y", "x_bounds", "y_bounds", "height", "filled")
 #: What is derived of a row alone, whatever the rows lie over.

@@ -20,8 +20,6 @@ class Variable:
         What it is called where there is no room for `long_name`.
     axis : str
         The axis that a coordinate lies on.
-    group : {"", "accuracy", "cost", "energy", "steps"}
-        Group of the file that holds it; empty: the root, which holds what a user wants first.
     may_be_missing : bool
         Whether NaN says that a value is missing: a fill value is declared of no other variable.
     every_step : bool
@@ -42,7 +40,6 @@ class Variable:
     ancillary: tuple[str, ...] = ()
     short: str = ""
     axis: str = ""
-    group: Literal["", "accuracy", "cost", "energy", "steps"] = ""
     may_be_missing: bool = False
     every_step: bool = False
     in_table: Literal["", "last", "largest"] = ""

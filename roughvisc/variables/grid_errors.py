@@ -57,7 +57,6 @@ def grid_errors(
             f"error of the {quantity} due to the grid",
             f"{comment}; {more}" if more else comment,
             short=f"grid error of {quantity.removeprefix('contact ').removeprefix('mean ')}",
-            group="accuracy",
             may_be_missing=True,
             in_table=in_table,
         )

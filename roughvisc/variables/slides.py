@@ -37,14 +37,6 @@ SLIDES: dict[str, Variable] = {
         every_step=True,
         in_table="last",
     ),
-    "slope_friction_force": Variable(
-        _SERIES,
-        "N",
-        "friction force by the slope",
-        "pressure times slope of the profile; "
-        "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
-        may_be_missing=True,
-    ),
     "friction_coefficient": Variable(
         _SERIES,
         "1",
@@ -59,7 +51,6 @@ SLIDES: dict[str, Variable] = {
         "N",
         "stated error of the friction force",
         "of steps of one cell, by a companion march in steps of two; the rest of the grid's error comes on top",
-        group="accuracy",
         may_be_missing=True,
     ),
     "friction_work": Variable(
@@ -69,7 +60,6 @@ SLIDES: dict[str, Variable] = {
         "since the start, "
         "by the balance of energy: what the body has stored and dissipated in slides, less the work of the normal "
         "force; the integral of friction_force over sliding_distance checks it",
-        group="energy",
         every_step=True,
     ),
 }

@@ -58,18 +58,10 @@ SLIDING: dict[str, Variable] = {
         "towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force is its component forwards",
         in_table="last",
     ),
-    "slope_friction_force": Variable(
-        ("speed",),
-        "N",
-        "friction force by the slope",
-        "pressure times slope of the profile; "
-        "of results of earlier versions only: at low speed it is the rest of two large forces, and no measure of error",
-        may_be_missing=True,
-    ),
     **over_axis("speed", _SHARED),
     "dissipated_power": Variable(("speed",), "W", "dissipated power", "in the material"),
     "loss_tangent": Variable(("speed",), "1", "largest loss tangent", "over the waves of the grid"),
-    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32", group="cost"),
+    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32"),
     "stated_error": Variable(
         ("speed",),
         "1",
@@ -84,7 +76,6 @@ SLIDING: dict[str, Variable] = {
         "1",
         "iteration's error of the pressure",
         "estimated, L1, over the load",
-        group="accuracy",
         in_table="largest",
     ),
     "friction_residual": Variable(
@@ -92,7 +83,6 @@ SLIDING: dict[str, Variable] = {
         "1",
         "iteration's error of the friction",
         "estimated, relative",
-        group="accuracy",
         in_table="largest",
     ),
     "persson_friction_coefficient": Variable(
@@ -112,7 +102,6 @@ SLIDING: dict[str, Variable] = {
         "1",
         "friction by the shortest octave",
         "part that the shortest octave of waves adds",
-        group="accuracy",
         may_be_missing=True,
         in_table="last",
     ),
@@ -121,7 +110,6 @@ SLIDING: dict[str, Variable] = {
         "1",
         "contact area by the shortest octave",
         "part that the shortest octave of waves adds",
-        group="accuracy",
         may_be_missing=True,
     ),
 }

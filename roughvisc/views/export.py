@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from roughvisc.groups import whole_of
 from roughvisc.labels import heading
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.units import Quantity, quantities
@@ -44,7 +43,6 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     """
     rows = axis_of(dataset)
     require(dataset, rows)
-    dataset = whole_of(dataset)
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
     table = dataset[names].reset_coords(drop=True).to_dataframe().replace([np.inf, -np.inf], np.nan)
     for name in FLAGS.keys() & set(table):

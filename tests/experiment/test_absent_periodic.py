@@ -70,7 +70,7 @@ def test_approach__is_what_the_force_works_on():
     settings = {"boundary": "periodic", "missing": "absent", "tolerance": 1e-5, "progress": False}
     ds = rv.simulate(rough(), UNIT, rv.Program().load(1.0, over=1.0), times=401, **settings)
     work = np.trapezoid(ds.force, ds.approach)
-    assert float(ds.roughvisc.energy.work[-1]) == pytest.approx(work, rel=2e-3)
+    assert float(ds.work[-1]) == pytest.approx(work, rel=2e-3)
 
 
 def test_punches_side_by_side__take_any_approach():

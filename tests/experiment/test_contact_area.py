@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import boundaries, examples, of_whole_runs, surfaces
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
@@ -29,7 +28,7 @@ TIMES = tuple(0.1 * n for n in range(1, 21))
 
 
 def pressed(material, program, **settings):
-    return simulate_whole(
+    return rv.simulate(
         BALL, material, program, **{"boundary": "free", "fields": (), "tolerance": 1e-2, "progress": False} | settings
     )
 
@@ -85,7 +84,7 @@ def test_interval__holds_what_the_contact_solver_leaves_in_doubt():
     scan = rv.self_affine((1.0, 1.1), (40, 44), hurst=0.8, rms_slope=0.2, shortcut=0.1, seed=10)
     loads = {"boundary": "periodic", "times": [1.0], "fields": (), "progress": False}
     found, true = (
-        simulate_whole(scan, rv.elastic(1.0), rv.Program().load(0.06, over=1.0), tolerance=tolerance, **loads)
+        rv.simulate(scan, rv.elastic(1.0), rv.Program().load(0.06, over=1.0), tolerance=tolerance, **loads)
         for tolerance in (2e-2, 1e-6)
     )
     assert float(found.contact_area[-1]) != float(true.contact_area[-1]), "it is put to the test"
@@ -98,7 +97,7 @@ def test_corrected_area__is_that_of_the_closed_form_within_its_error(material):
     """Under a constant load a ball's contact grows as Hertz's with the compliance of that time (Lee and Radok)."""
     load, times = 0.03, np.array([0.1, 0.4, 1.5])
     ball = rv.sphere(1.0, (1.3, 1.2), (35, 31))
-    ds = simulate_whole(
+    ds = rv.simulate(
         ball, material, rv.Program().load(load, over=0).hold(1.5), times=times, grid_error=True, progress=False
     )
     exact = np.pi * closed_forms.lee_radok_step(1.0, material, load).radius(times) ** 2
@@ -116,7 +115,7 @@ def hertz_errors(cells, count=12):
         x, y = ((np.arange(n) - n / 2 + at) * d for n, at, d in zip((cells, cells - 1), place, sides, strict=True))
         ball = rv.from_array(-(x[:, None] ** 2 + y**2) / 20.0, sides)
         press = rv.Program().load(load, over=0)
-        ds = simulate_whole(ball, rv.elastic(0.25), press, boundary="free", fields=(), progress=False)
+        ds = rv.simulate(ball, rv.elastic(0.25), press, boundary="free", fields=(), progress=False)
         found.append([float(ds[name][0]) / exact - 1 for name in ("contact_area", "contact_area_counted")])
     return np.sqrt(np.mean(np.square(found), axis=0))
 
@@ -162,7 +161,7 @@ def test_bounds__hold_the_area_whichever_cells_in_doubt_touch(seed, periodic, pa
 def test_area__lies_within_its_bounds(height, boundary, soft):
     material = rv.zener(1.0, 0.2, 0.1) if soft else rv.elastic(1.0)
     load = rv.Program().load(0.02, over=0.5).hold(0.5).load(0.005, over=0.5)
-    ds = simulate_whole(
+    ds = rv.simulate(
         height, material, load, boundary=boundary, edge="accept", grid_error=True, times=5, fields=(), progress=False
     )
     np.testing.assert_allclose(ds.contact_fraction, ds.contact_area / nominal_area(height), rtol=1e-12)

@@ -4,7 +4,6 @@ import gc
 import tracemalloc
 
 import pytest
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.experiment import loading
@@ -17,7 +16,7 @@ from roughvisc.mechanics.bodies import operator
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.topography.grid import nominal_area
 
 ROUGH = """
@@ -82,7 +81,7 @@ def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
         taken = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    with whole_result(path) as ds:
+    with open_result(path) as ds:
         contact = float(ds.contact_area_counted.max()) / nominal_area(ds)
         rows, cells = ds.sizes["time"], ds.sizes["x"] * ds.sizes["y"]
         steps = ds.sizes.get("step", 0)
@@ -142,7 +141,7 @@ def test_march_with_one_exponential__holds_few_fields_beside_gap_and_heights(ove
     material = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
     program = rv.Program().pressure(6e3, over=over).hold(0.5)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": [0.5 + over], "fields": (), "progress": False}
-    simulate_whole(surface, material, program, **settings)
+    rv.simulate(surface, material, program, **settings)
     assert held["most"] == fields
     gc.collect()
     assert held["now"] == 0

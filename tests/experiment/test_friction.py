@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rich.console import Console
-from support import friction_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transforms
 from roughvisc.mechanics.materials import frequency
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding import steady
-from roughvisc.study.storage.store import whole_result, write_result
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.console.result_tables import result_table
@@ -29,7 +26,7 @@ PRESS = {"pressure": 2e4, "speeds": [0.2, 2e-3, 20.0]}
 
 @pytest.fixture(scope="module")
 def curve():
-    return friction_whole(ROUGH, RUBBER, **PRESS, fields=("pressure", "gap"))
+    return rv.friction(ROUGH, RUBBER, **PRESS, fields=("pressure", "gap"))
 
 
 def test_dataset__is_labelled_and_in_the_order_given(curve):
@@ -41,8 +38,7 @@ def test_dataset__is_labelled_and_in_the_order_given(curve):
     assert curve.friction_coefficient.attrs["units"] == "1"
     assert curve.status.attrs["flag_meanings"].split()[0] == "converged"
     assert (curve.status == 0).all()
-    assert curve.roughvisc.attributes["direction"] == "x"
-    assert "No shear at the interface" in curve.roughvisc.attributes["model_note"]
+    assert curve.attrs["direction"] == "x"
     assert float(curve.friction_coefficient[0]) == float(curve.friction_coefficient.max())
 
 
@@ -68,7 +64,7 @@ def test_area__shrinks_as_the_material_stiffens(curve):
 
 
 def test_load_and_pressure__are_the_same(curve):
-    same = friction_whole(ROUGH, RUBBER, load=2e4 * 0.8e-6, speeds=[0.2, 2e-3, 20.0])
+    same = rv.friction(ROUGH, RUBBER, load=2e4 * 0.8e-6, speeds=[0.2, 2e-3, 20.0])
     np.testing.assert_allclose(
         same.friction_coefficient, curve.friction_coefficient, rtol=1e-11
     )  # the loads differ by rounding
@@ -79,10 +75,10 @@ def test_directions__are_those_of_a_turned_surface():
     one = {"pressure": 2e4, "speeds": 0.2, "fields": ("pressure",)}
     turned = {"y": lambda z: z[::-1].T, "-x": lambda z: z[::-1, ::-1], "-y": lambda z: z.T[::-1]}
     for direction, turn in turned.items():
-        found = friction_whole(ROUGH, RUBBER, **one, direction=direction)
+        found = rv.friction(ROUGH, RUBBER, **one, direction=direction)
         sides = (1e-3 / 40, 0.8e-3 / 36)
         surface = rv.from_array(turn(ROUGH.values), spacing=sides if direction == "-x" else sides[::-1])
-        along_x = friction_whole(surface, RUBBER, **one)
+        along_x = rv.friction(surface, RUBBER, **one)
         for name in ("friction_coefficient", "friction_force_across"):
             np.testing.assert_allclose(found[name], along_x[name], rtol=1e-12)
         np.testing.assert_allclose(turn(found.pressure.values[0]), along_x.pressure[0], rtol=1e-9)
@@ -91,7 +87,7 @@ def test_directions__are_those_of_a_turned_surface():
 def test_mirror_image_across_the_motion__is_pushed_to_the_other_side():
     mirrored = ROUGH.copy(data=ROUGH.values[:, ::-1])
     one = {"pressure": 2e4, "speeds": 0.2, "tolerance": 1e-7}
-    here, there = (friction_whole(surface, RUBBER, **one) for surface in (ROUGH, mirrored))
+    here, there = (rv.friction(surface, RUBBER, **one) for surface in (ROUGH, mirrored))
     np.testing.assert_allclose(there.friction_force, here.friction_force, rtol=1e-6)
     np.testing.assert_allclose(there.friction_force_across, -here.friction_force_across, rtol=1e-5)
     assert abs(float(here.friction_force_across[0])) > 0.01 * float(here.friction_force[0])
@@ -102,7 +98,7 @@ def test_force_across__is_to_the_left_of_the_motion(direction, across):
     """An oblique wave in full contact is pushed along its normal, q_y / q_x = 2.5; left of y lies -x."""
     x, y = (2 * np.pi * k * (np.arange(n) + 0.5) / n for n, k in ((15, 1), (21, 2)))
     wave = rv.from_array(1e-6 * np.cos(x[:, None] + y), spacing=(1e-3 / 15, 0.8e-3 / 21))
-    found = friction_whole(wave, RUBBER, pressure=1e5, speeds=[0.05, 0.2], direction=direction, tolerance=1e-7)
+    found = rv.friction(wave, RUBBER, pressure=1e5, speeds=[0.05, 0.2], direction=direction, tolerance=1e-7)
     assert (found.status == STATUS_MEANINGS.index("full_contact")).all()
     np.testing.assert_allclose(found.friction_force_across, across * found.friction_force, rtol=1e-5)
     assert (found.friction_force > 0).all()
@@ -129,29 +125,16 @@ def _summary(dataset):
     return [tuple(row) for row in rows if len(row) == 2]
 
 
-def test_slope_friction_force__of_results_on_disk_is_still_shown(curve, tmp_path):
-    """Earlier versions wrote it: over speed, and over time where the program slides."""
-    program = rv.Program().pressure(1e4, over=0).slide(1e-4, speed=0.1)
-    slid = simulate_whole(ROUGH, RUBBER, program, boundary="periodic", tolerance=1e-2, times=2, progress=False)
-    for dataset, row in ((curve, "speed"), (slid, "time")):
-        old = dataset.assign(slope_friction_force=(row, np.linspace(0, 1, dataset.sizes[row])))
-        write_result(annotate(old.drop_vars("friction_force_across")), tmp_path / f"{row}.nc")
-        with whole_result(tmp_path / f"{row}.nc") as found:
-            np.testing.assert_array_equal(found.slope_friction_force, old.slope_friction_force)
-            assert "earlier versions" in found.slope_friction_force.attrs["comment"]
-            assert _summary(found)
-
-
 def test_temperature__shifts_the_speed(curve):
-    warm = friction_whole(ROUGH, rv.shifted(RUBBER, 0.01), pressure=2e4, speeds=20.0)
+    warm = rv.friction(ROUGH, rv.shifted(RUBBER, 0.01), pressure=2e4, speeds=20.0)
     assert float(warm.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
 
 
 def test_sheet__rubs_less_as_it_is_thinner(curve):
-    thin = friction_whole(ROUGH, rv.sheet(RUBBER, 2e-5), pressure=2e4, speeds=0.2)
-    assert (thin.roughvisc.attributes["thickness"], thin.roughvisc.attributes["base"]) == (2e-5, "bonded")
+    thin = rv.friction(ROUGH, rv.sheet(RUBBER, 2e-5), pressure=2e4, speeds=0.2)
+    assert (thin.attrs["thickness"], thin.attrs["base"]) == (2e-5, "bonded")
     assert float(thin.contact_area[0]) < 0.9 * float(curve.contact_area[0])
-    thick = friction_whole(ROUGH, rv.sheet(RUBBER, 1e-2), pressure=2e4, speeds=0.2)
+    thick = rv.friction(ROUGH, rv.sheet(RUBBER, 1e-2), pressure=2e4, speeds=0.2)
     assert float(thick.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
 
 
@@ -159,7 +142,7 @@ def test_persson__is_that_of_the_surface_as_it_slides(curve):
     """In full contact the theory is exact, whichever the direction; in partial contact its area is not far off."""
     pressed = {"pressure": 1e7, "speeds": [0.02, 0.2], "tolerance": 1e-6}
     for direction in ("x", "-y"):
-        full = friction_whole(ROUGH, RUBBER, **pressed, direction=direction)
+        full = rv.friction(ROUGH, RUBBER, **pressed, direction=direction)
         assert (full.status == STATUS_MEANINGS.index("full_contact")).all()
         np.testing.assert_allclose(full.persson_friction_coefficient, full.friction_coefficient, rtol=1e-5)
     np.testing.assert_allclose(curve.persson_contact_fraction, curve.contact_fraction, rtol=0.5)
@@ -171,31 +154,29 @@ def test_last_octave__is_the_change_from_a_surface_without_it():
     both = 1e-6 * (np.cos(k * x) + 0.4 * np.cos(5 * k * x + 1))
     long, two = (rv.from_array(np.repeat(z[:, None], 3, 1), spacing=1e-3 / 63) for z in (1e-6 * np.cos(k * x), both))
     press = {"pressure": 1e6, "speeds": [0.02, 0.2], "tolerance": 1e-6}
-    found, less = friction_whole(two, RUBBER, **press, last_octave=True), friction_whole(long, RUBBER, **press)
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
     exact = 1 - less.friction_coefficient / found.friction_coefficient
     assert (exact > 0.2).all()
     np.testing.assert_allclose(found.last_octave_friction, exact, rtol=1e-6)
     np.testing.assert_allclose(found.last_octave_area, 0, atol=1e-12)
-    assert found.roughvisc.attributes["last_octave"] == "waves shorter than 0.0004 m"
-    assert "last_octave" not in less.roughvisc.attributes
     assert set(found.variables) <= set(SLIDING)
     press["pressure"] = 1e3
-    found, less = friction_whole(two, RUBBER, **press, last_octave=True), friction_whole(long, RUBBER, **press)
+    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
     np.testing.assert_allclose(found.last_octave_area, 1 - less.contact_area / found.contact_area, rtol=1e-9)
     assert (found.last_octave_area < -0.1).all(), "finer roughness takes area away"
     with pytest.raises(rv.InputError, match="no wavelengths above its shortest octave"):
-        friction_whole(long, RUBBER, **press, last_octave=True)
+        rv.friction(long, RUBBER, **press, last_octave=True)
 
 
 def test_last_octave__of_a_body_without_friction_is_not_known():
-    found = friction_whole(ROUGH, rv.elastic(1e6), pressure=2e4, speeds=0.2, last_octave=True)
+    found = rv.friction(ROUGH, rv.elastic(1e6), pressure=2e4, speeds=0.2, last_octave=True)
     assert np.isnan(found.last_octave_friction).all()
 
 
 def test_measured_material__by_its_series(curve):
     t = np.geomspace(1e-9, 1e4, 1400)
     table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
-    found = friction_whole(ROUGH, table, **PRESS)
+    found = rv.friction(ROUGH, table, **PRESS)
     # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
     np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
 
@@ -205,16 +186,13 @@ def test_measured_material__is_fitted_once_a_speed(monkeypatch):
     monkeypatch.setattr(frequency, "series_of", lambda *asked: fitted.append(asked) or fit(*asked))
     t = np.geomspace(1e-7, 1e3, 60)
     table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
-    friction_whole(ROUGH, table, pressure=2e4, speeds=[0.1, 0.2], tolerance=1e-2)
+    rv.friction(ROUGH, table, pressure=2e4, speeds=[0.1, 0.2], tolerance=1e-2)
     assert len(fitted) == 2
 
 
 def test_seam__is_told():
     tilted = ROUGH.copy(data=ROUGH.values + 1e-4 * np.arange(40)[:, None] / 40)
-    assert (
-        "repeats with a step"
-        in friction_whole(tilted, RUBBER, pressure=2e3, speeds=1e-2).roughvisc.attributes["border_note"]
-    )
+    assert "repeats with a step" in rv.friction(tilted, RUBBER, pressure=2e3, speeds=1e-2).attrs["warnings"]
 
 
 @pytest.mark.parametrize(
@@ -229,24 +207,20 @@ def test_seam__is_told():
         ({"direction": "z"}, "direction is 'z': expected 'x' or '-x' or 'y' or '-y'"),
         ({"fields": ("displacement",)}, "fields is 'displacement': of steady sliding expected some of pressure, gap"),
         ({"tolerance": 2.0}, r"tolerance is 2\.0"),
-        (
-            {"base": "bonded"},
-            r"base is no argument of friction any more: give a body .* rv\.sheet\(material, thickness, base\)",
-        ),
     ],
 )
 def test_friction__refuses(settings, message):
     with pytest.raises(rv.InputError, match=message):
-        friction_whole(ROUGH, RUBBER, **{**PRESS, **settings})
+        rv.friction(ROUGH, RUBBER, **{**PRESS, **settings})
 
 
 def test_missing_points_and_fluids__are_refused():
     with pytest.raises(rv.InputError, match="height is missing"):
-        friction_whole(ROUGH.where(ROUGH.x > 1e-4), RUBBER, **PRESS)
+        rv.friction(ROUGH.where(ROUGH.x > 1e-4), RUBBER, **PRESS)
     with pytest.raises(rv.InputError, match="expected none, because the surface repeats"):
-        friction_whole(rv.flat_punch(1e-4, 4e-4, 15), RUBBER, **PRESS)
+        rv.friction(rv.flat_punch(1e-4, 4e-4, 15), RUBBER, **PRESS)
     with pytest.raises(rv.InputError, match="creeps without end"):
-        friction_whole(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)
+        rv.friction(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)
 
 
 @pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.PowerLaw(1e-7, 1e-6, 0.3)], ids=["maxwell", "power law"])
@@ -259,7 +233,7 @@ def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(mater
         wave = wave.transpose().rename(x="y", y="x")
     modulus = 1 / complex(complex_compliance(material, k * speed))
     pressure = 3 * amplitude * k * abs(modulus)
-    ds = friction_whole(
+    ds = rv.friction(
         wave,
         material,
         pressure=pressure,
@@ -279,7 +253,7 @@ def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(mater
 def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion():
     rough = rv.self_affine((1e-3, 1e-3), (15, 11), hurst=0.8, rms_slope=0.1, seed=1)
     with pytest.raises(InputError, match="creeps without end"):
-        friction_whole(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
+        rv.friction(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
 
 
 @pytest.mark.parametrize("last_octave", [False, True])
@@ -292,6 +266,6 @@ def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
         return plain.of_field(*given, **named)
 
     monkeypatch.setattr(steady, "transforms", lambda mirrored: replace(plain, of_field=counted))
-    ds = friction_whole(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
+    ds = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
     assert int(ds.convolutions.sum()) == len(forward)
     assert (ds.convolutions > 2 * ds.iterations).all()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support import friction_whole
 
 import roughvisc as rv
 from roughvisc.experiment.profile import Profile
@@ -20,7 +19,7 @@ NOISE = 5e-4
 def judged(scan, fine, pressure):
     """Stated and true errors of friction, of area, and of the mean gap."""
     asked = {"pressure": pressure, "speeds": SPEEDS, "tolerance": 1e-4, "progress": False}
-    found, exact = friction_whole(scan, RUBBER, **asked, grid_error=True), friction_whole(fine, RUBBER, **asked)
+    found, exact = rv.friction(scan, RUBBER, **asked, grid_error=True), rv.friction(fine, RUBBER, **asked)
     true = abs(found / exact - 1)
     return (
         (found.grid_error_friction.values, true.friction_coefficient.values),
@@ -50,7 +49,7 @@ def test_grid_error__bounds_the_true_one_of_a_rough_surface(hurst, seed, pressur
 def test_grid_error__falls_with_the_grid_and_is_labelled():
     surface = {"hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 2e-4, "seed": 1}
     found = [
-        friction_whole(
+        rv.friction(
             rv.self_affine(1e-3, cells, **surface), RUBBER, pressure=5e4, speeds=0.1, grid_error=True, progress=False
         )
         for cells in (24, 96)
@@ -63,9 +62,9 @@ def test_grid_error__falls_with_the_grid_and_is_labelled():
 def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
     rough = rv.self_affine(1e-3, 24, hurst=0.8, rms_slope=0.1, seed=1)
     asked = {"pressure": 1e4, "speeds": 0.1, "grid_error": True, "progress": False}
-    assert np.isnan(friction_whole(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
+    assert np.isnan(rv.friction(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
     few = rv.from_array(1e-6 * np.array([[0.0, 1.0], [2.0, 0.5]]), 1e-3)
-    assert np.isnan(friction_whole(few, RUBBER, **asked).grid_error_area).all()
+    assert np.isnan(rv.friction(few, RUBBER, **asked).grid_error_area).all()
 
 
 def test_coarser_face__has_the_same_waves_where_its_cells_can_hold_them():

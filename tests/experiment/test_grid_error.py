@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, run_whole, simulate_whole, true_errors
+from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
@@ -16,7 +16,7 @@ from roughvisc.topography.indenters import grown
 
 def pressed(shape, **settings):
     settings = {"times": TIMES, "tolerance": 1e-3, "progress": False, "grid_error": True, **settings}
-    return simulate_whole(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
+    return rv.simulate(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, **settings)
 
 
 @pytest.mark.parametrize("shape", [(47, 60), (33, 31), 64])
@@ -32,7 +32,7 @@ def test_grid_error__is_one_for_each_quantity(control):
     """Under a ball; that of the approach is much smaller than that of the pressure, and of what is given it is zero."""
     exact = closed_forms.hertz(RADIUS, 4e6, LOAD)
     program = getattr(rv.Program(), control)(LOAD if control == "load" else exact.approach, over=0)
-    ds = simulate_whole(rv.sphere(RADIUS, SIZE, (47, 60)), rv.elastic(1e6), program, grid_error=True, progress=False)
+    ds = rv.simulate(rv.sphere(RADIUS, SIZE, (47, 60)), rv.elastic(1e6), program, grid_error=True, progress=False)
     found, given = ("approach", "force") if control == "load" else ("force", "approach")
     off = abs(float(ds[found][0]) / {"approach": exact.approach, "force": LOAD}[found] - 1)
     assert off < float(ds[f"grid_error_{found}"][0]) < 0.2 * float(ds.grid_error_pressure[0])
@@ -47,9 +47,7 @@ def test_grid_error__of_a_punch_holds_what_its_cells_are_short_of_a_circle(contr
     exact = closed_forms.flat_punch(radius, 4e6, LOAD)
     program = getattr(rv.Program(), control)(LOAD if control == "load" else exact.approach, over=0)
     punch = rv.flat_punch(radius, cells * radius / across, cells)
-    ds = simulate_whole(
-        punch, rv.elastic(1e6), program, grid_error=True, progress=False, missing="absent", tolerance=1e-4
-    )
+    ds = rv.simulate(punch, rv.elastic(1e6), program, grid_error=True, progress=False, missing="absent", tolerance=1e-4)
     found, true = ("approach", exact.approach) if control == "load" else ("force", LOAD)
     assert 0.003 < abs(float(ds[found][0]) / true - 1) < float(ds[f"grid_error_{found}"][0]) < 0.1
 
@@ -60,8 +58,8 @@ def test_grid_error__of_the_gap_of_a_rough_surface_is_small():
     few, many = (rv.self_affine(1e-3, n, **made) for n in ((33, 30), (99, 90)))
     settings = {"boundary": "periodic", "tolerance": 1e-4, "progress": False}
     program = rv.Program().pressure(2e4, over=0)
-    ds = simulate_whole(few, rv.elastic(1e6), program, grid_error=True, **settings)
-    exact = simulate_whole(many, rv.elastic(1e6), program, **settings)
+    ds = rv.simulate(few, rv.elastic(1e6), program, grid_error=True, **settings)
+    exact = rv.simulate(many, rv.elastic(1e6), program, **settings)
     for name, most in (("approach", 1.0), ("mean_gap", 0.05)):
         stated = float(ds["grid_error_approach" if name == "approach" else "grid_error_gap"][0])
         assert abs(float(exact[name][0] / ds[name][0]) - 1) < stated < most
@@ -78,7 +76,7 @@ def test_grid_error__is_large_where_no_grid_sees_the_contact():
     for shape in (15, 16):
         few = rv.Program().load(LOAD * (0.4 * SIZE[0] / 15 / float(EXACT.radius(0.0))) ** 3, over=0)
         ball = rv.sphere(RADIUS, SIZE[0], shape)
-        ds = simulate_whole(ball, rv.elastic(3e6), few, grid_error=True, progress=False)
+        ds = rv.simulate(ball, rv.elastic(3e6), few, grid_error=True, progress=False)
         assert int((ds.pressure > 0).sum()) <= 4
         assert float(ds.grid_error[0]) > 0.8
         assert float(ds.grid_error_area[0]) > 0.3
@@ -95,7 +93,7 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     program = rv.Program().load(np.pi / 2 * slope, over=0)
     if control == "approach":
         program = rv.Program().approach(exact.approach, over=0)
-    ds = simulate_whole(height, rv.elastic(0.25), program, boundary="free", grid_error=True, progress=False)
+    ds = rv.simulate(height, rv.elastic(0.25), program, boundary="free", grid_error=True, progress=False)
     force = abs(float(ds.force[0]) / (np.pi / 2 * slope) - 1)
     approach = abs(float(ds.approach[0]) / exact.approach - 1)
     assert float(ds.grid_error[0]) > max(force, approach)
@@ -225,7 +223,7 @@ def test_grid_error__is_missing_where_the_coarser_solve_fails():
     height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
     at_border = {"boundary": "free", "times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
     load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
-    ds = simulate_whole(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
+    ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
     assert np.isnan(ds.grid_error).all()
     assert np.isnan(ds.grid_error_area).all()
 
@@ -234,7 +232,7 @@ def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
     file = tmp_path / "ball.toml"
     file.write_text(BALL.replace("[keep]", "grid_error = true\n[keep]"))
     case = read_study(file)
-    with run_whole(case, tmp_path / "out", progress=False) as ds:
+    with rv.run(case, tmp_path / "out", progress=False) as ds:
         assert (ds.grid_error > 0).all()
         assert ds.grid_error.attrs["long_name"].endswith("due to the grid")
     file.write_text(BALL)
@@ -245,14 +243,14 @@ def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
 def test_direct_memory__gives_the_same_contact():
     settings = {"grid_error": False, "tolerance": 1e-4}
     series, direct = pressed((33, 31), **settings), pressed((33, 31), numerics=rv.Numerics(memory="direct"), **settings)
-    assert "direct history" in direct.roughvisc.attributes["memory"]
+    assert "direct history" in direct.attrs["memory"]
     assert direct.approach.values == pytest.approx(series.approach.values, rel=2e-4)
 
 
 def test_direct_memory__is_refused_where_it_would_ring():
     soft = rv.kelvin_voigt(1e6, 1e5)
     with pytest.raises(rv.InputError, match="memory='direct'"):
-        simulate_whole(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, numerics=rv.Numerics(memory="direct"), progress=False)
+        rv.simulate(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, numerics=rv.Numerics(memory="direct"), progress=False)
 
 
 def test_coarser__makes_an_indenter_anew_and_averages_where_points_are_missing():

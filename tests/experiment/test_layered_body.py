@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from layered_ball import POISSONS, RATIOS, WIDTHS, errors
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.mechanics.closed_forms import Cone, ElasticLayer, OnSheet, Paraboloid, PunchOnSheet, StepLoad
@@ -15,7 +14,7 @@ THICKNESS = 1e-4
 
 
 def pressed(height, body, program, **settings):
-    return simulate_whole(height, body, program, **{"progress": False, **settings})
+    return rv.simulate(height, body, program, **{"progress": False, **settings})
 
 
 @pytest.mark.parametrize("poissons", POISSONS)

@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from layered import GrowingOnLayer, relaxation_of_wave, sliding_symbol
-from support import friction_whole, simulate_whole
 
 import roughvisc as rv
 
@@ -25,7 +24,7 @@ SIDE = 1e-3
 
 def simulated(height, pair, thickness, program, **settings):
     body = rv.layer(pair[0], thickness, on=pair[1])
-    return simulate_whole(height, body, program, **{"progress": False, **settings})
+    return rv.simulate(height, body, program, **{"progress": False, **settings})
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -77,7 +76,7 @@ def test_equal_materials__are_the_half_space(boundary):
     program = rv.Program().load(0.02, over=0.1).hold(0.3).load(0.01, over=0.1)
     edge = {"edge": "accept"} if boundary == "free" else {}
     settings = {"boundary": boundary, "times": [0.1, 0.4, 0.5], "tolerance": 1e-3, **edge}
-    half = simulate_whole(height, RUBBER, program, progress=False, **settings)
+    half = rv.simulate(height, RUBBER, program, progress=False, **settings)
     found = simulated(height, (RUBBER, nearly), 1e-4, program, **settings)
     assert float((abs(found.pressure - half.pressure).sum(["x", "y"]) / half.pressure.sum(["x", "y"])).max()) < 1e-3
     np.testing.assert_allclose(found.approach, half.approach, rtol=1e-3)
@@ -89,7 +88,7 @@ def test_rigid_base__is_the_sheet(boundary):
     program = rv.Program().load(0.02, over=0.1).hold(0.3).load(0.01, over=0.1)
     edge = {"edge": "accept"} if boundary == "free" else {}
     settings = {"boundary": boundary, "times": [0.1, 0.4, 0.5], "tolerance": 1e-3, **edge}
-    sheet = simulate_whole(height, rv.sheet(RUBBER, 1.2e-4), program, progress=False, **settings)
+    sheet = rv.simulate(height, rv.sheet(RUBBER, 1.2e-4), program, progress=False, **settings)
     found = simulated(height, (RUBBER, rv.elastic(1e11)), 1.2e-4, program, **settings)
     assert float((abs(found.pressure - sheet.pressure).sum(["x", "y"]) / sheet.pressure.sum(["x", "y"])).max()) < 1e-3
 
@@ -125,7 +124,7 @@ def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair, cell
     errors = []
     for count in cells:
         height = rv.wavy(4e-6, SIDE, (SIDE, 3 * SIDE / count), (count, 3), waves=1)
-        steady = friction_whole(height, rv.layer(pair[0], 1.5e-4, on=pair[1]), speeds=SPEED, pressure=1.2e4)
+        steady = rv.friction(height, rv.layer(pair[0], 1.5e-4, on=pair[1]), speeds=SPEED, pressure=1.2e4)
         program = rv.Program().pressure(1.2e4, over=0).slide(5 * SIDE, speed=SPEED)
         ds = simulated(height, pair, 1.5e-4, program, boundary="periodic", times=1, fields=(), tolerance=1e-5)
         errors.append(abs(float(ds.friction_coefficient[-1] / steady.friction_coefficient[0]) - 1))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support import simulate_whole
 
 import roughvisc as rv
 
@@ -24,7 +23,7 @@ def bump(shape, shift=0.0):
 
 
 def pressed(h, **options):
-    return simulate_whole(h, RUBBER, PRESS, **{"boundary": "free", "times": [0.4], "progress": False} | options)
+    return rv.simulate(h, RUBBER, PRESS, **{"boundary": "free", "times": [0.4], "progress": False} | options)
 
 
 @pytest.mark.parametrize("shape", [(25, 28), (97, 101)])  # the second follows the contact with a window

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from support import run_whole, simulate_whole
 
 import roughvisc as rv
 from roughvisc.experiment import loading
@@ -49,15 +48,13 @@ def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch
     height, program, settings = MIRRORED[name]
     usual = {"times": 5, "tolerance": 1e-6, "numerics": rv.Numerics(time_step=0.05), "fields": FIELDS}
     given = {**usual, "progress": False, **settings}
-    found = simulate_whole(height, ZENER, program, **given)
+    found = rv.simulate(height, ZENER, program, **given)
     monkeypatch.setattr("roughvisc.experiment.profile.is_mirrored", lambda height: False)
-    whole = simulate_whole(height, ZENER, program, **given)
+    whole = rv.simulate(height, ZENER, program, **given)
     assert [profile.mirrored for profile in profiles] == [True, False]
     if name == "grown":
         assert whole.sizes["x"] > height.sizes["x"]
     assert found.sizes == whole.sizes
-    assert "mirror images" in found.roughvisc.attributes["left_out"]
-    assert "mirror images" not in whole.roughvisc.attributes["left_out"]
     # the contact of each step is solved to 3e-8 in energy, 2e-4 in the norm of energy
     scales = dict.fromkeys(("gap", "displacement", "mean_gap"), float(whole.displacement.max()))
     for field in FIELDS:
@@ -80,13 +77,13 @@ def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch
 
 def test_quarter__is_all_that_is_solved(solved_on):
     settings = {"times": 2, "tolerance": 1e-2, "progress": False, "boundary": "periodic"}
-    simulate_whole(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    rv.simulate(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
     assert set(solved_on) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
     solved_on.clear()
-    simulate_whole(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
+    rv.simulate(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
     assert set(solved_on) == {(22, 17)}
     solved_on.clear()
-    simulate_whole(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
+    rv.simulate(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
     assert set(solved_on) == {(24, 21)}, "the middle of 21 cells is a cell"
 
 
@@ -94,13 +91,13 @@ def test_border__of_a_quarter_is_that_of_the_surface():
     """Its inner sides are not."""
     ball = rv.from_array(rv.sphere(1.0, 0.2, (20, 24)).values, 0.01)
     with pytest.raises(rv.EdgeContactError, match="20 x 24 cells"):
-        simulate_whole(ball, ZENER, LOADED_TWICE, boundary="free", progress=False)
+        rv.simulate(ball, ZENER, LOADED_TWICE, boundary="free", progress=False)
 
 
 def test_seed_method__solves_all_of_it(profiles):
     numerics = rv.Numerics(method="seed", time_step=0.1)
     settings = {"numerics": numerics, "edge": "accept", "tolerance": 1e-2, "progress": False}
-    simulate_whole(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
+    rv.simulate(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
     assert not profiles[0].mirrored
 
 
@@ -143,7 +140,7 @@ def test_checkpoint__goes_on_with_a_quarter(tmp_path):
         "[keep]\ntimes = 9\n"
     )
     case = rv.read_study(study)
-    whole = run_whole(case, tmp_path / "whole", progress=False)
+    whole = rv.run(case, tmp_path / "whole", progress=False)
 
     class Enough(Exception):
         pass
@@ -153,8 +150,8 @@ def test_checkpoint__goes_on_with_a_quarter(tmp_path):
             raise Enough
 
     with pytest.raises(Enough):
-        run_whole(case, tmp_path / "part", progress=stop)
-    resumed = run_whole(case, tmp_path / "part", progress=False)
+        rv.run(case, tmp_path / "part", progress=stop)
+    resumed = rv.run(case, tmp_path / "part", progress=False)
     assert whole.sizes["x"] > 16, "it grew"
     for name in ("pressure", "gap", "approach", "iterations"):
         assert resumed[name].values.tobytes() == whole[name].values.tobytes(), name

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from rich.console import Console
-from support import run_whole, simulate_whole
 from support import told as words_of
 
 import roughvisc as rv
@@ -46,8 +45,8 @@ def printed(table):
 def test_pressure__is_the_load_over_the_whole_area():
     height = rv.self_affine((3e-4, 2e-4), (15, 12), hurst=0.8, rms_slope=0.1, seed=2)
     options = {"boundary": "periodic", "progress": False, "fields": ("pressure",)}
-    by_pressure = simulate_whole(height, RUBBER, rv.Program().pressure("0.1 MPa", over=0).hold("1 s"), **options)
-    by_load = simulate_whole(height, RUBBER, rv.Program().load(0.1e6 * 6e-8, over=0).hold(1.0), **options)
+    by_pressure = rv.simulate(height, RUBBER, rv.Program().pressure("0.1 MPa", over=0).hold("1 s"), **options)
+    by_load = rv.simulate(height, RUBBER, rv.Program().load(0.1e6 * 6e-8, over=0).hold(1.0), **options)
     np.testing.assert_allclose(by_pressure.pressure, by_load.pressure, rtol=1e-9)
     np.testing.assert_allclose(by_pressure.nominal_pressure, 0.1e6, rtol=1e-9)
     np.testing.assert_allclose(by_pressure.pressure.mean(("x", "y")), 0.1e6, rtol=1e-9)
@@ -55,13 +54,13 @@ def test_pressure__is_the_load_over_the_whole_area():
 
 def test_pressure__counts_absent_cells():
     punch = rv.flat_punch(2e-5, (9e-5, 6e-5), (9, 6))
-    ds = simulate_whole(punch, RUBBER, rv.Program().pressure(1e3, over=0), times=[0], progress=False)
+    ds = rv.simulate(punch, RUBBER, rv.Program().pressure(1e3, over=0), times=[0], progress=False)
     assert float(ds.force[0]) == pytest.approx(1e3 * 9e-5 * 6e-5)
 
 
 def test_pressure__refers_to_the_surface_as_given_where_the_grid_grows():
     ball = rv.sphere(1e-3, 1e-4, 16)
-    ds = simulate_whole(ball, RUBBER, rv.Program().pressure("0.2 MPa", over=0), times=[0], progress=False)
+    ds = rv.simulate(ball, RUBBER, rv.Program().pressure("0.2 MPa", over=0), times=[0], progress=False)
     assert ds.sizes["x"] > 16
     assert float(ds.force[0]) == pytest.approx(0.2e6 * 1e-8)
     assert float(ds.nominal_pressure[0]) == pytest.approx(0.2e6)
@@ -70,7 +69,7 @@ def test_pressure__refers_to_the_surface_as_given_where_the_grid_grows():
 def test_grid_error__presses_coarser_grids_by_the_same_load():
     wave = rv.wavy(1e-6, 1e-4, (1e-4, 1e-4), (25, 9), waves=1)
     ds = [
-        simulate_whole(wave, RUBBER, program, boundary="periodic", times=[0], grid_error=True, progress=False)
+        rv.simulate(wave, RUBBER, program, boundary="periodic", times=[0], grid_error=True, progress=False)
         for program in (rv.Program().pressure(3e4, over=0), rv.Program().load(3e4 * 1e-8, over=0))
     ]
     np.testing.assert_allclose(ds[0].grid_error, ds[1].grid_error, rtol=1e-6)
@@ -79,7 +78,7 @@ def test_grid_error__presses_coarser_grids_by_the_same_load():
 def test_study__sweeps_over_surfaces_of_different_sizes(tmp_path):
     study = tmp_path / "study.toml"
     study.write_text(STUDY + '[sweep]\n"surface.size" = [["0.2 mm", "0.1 mm"], ["0.4 mm", "0.1 mm"]]')
-    results = [run_whole(case, tmp_path / "out", progress=False) for case in read_cases(study)]
+    results = [rv.run(case, tmp_path / "out", progress=False) for case in read_cases(study)]
     assert [float(ds.nominal_pressure[-1]) for ds in results] == pytest.approx([2e4, 2e4])
     assert [float(ds.force[-1]) for ds in results] == pytest.approx([2e4 * 2e-8, 2e4 * 4e-8])
 
@@ -98,7 +97,7 @@ def test_key__is_as_it_was_without_pressures(tmp_path):
 def test_result__tells_it(tmp_path):
     study = tmp_path / "study.toml"
     study.write_text(STUDY)
-    ds = run_whole(study, tmp_path / "out", progress=False)
+    ds = rv.run(study, tmp_path / "out", progress=False)
     lines = printed(result_table(ds)).splitlines()
     assert next(line for line in lines if line.startswith("Nominal pressure at the end")).split()[-2:] == ["20", "kPa"]
     told = ds.drop_vars([name for name in ds.data_vars if name not in ("force", "nominal_pressure")])  # quick to draw

@@ -1,4 +1,4 @@
-"""What a result says of its own accuracy, in words."""
+"""Warnings of a result: which, when, and with which numbers."""
 
 import re
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.labels import warnings_of
 from roughvisc.study.execution.run import unconverged
 from roughvisc.views.figures.sections import cut_position
 
@@ -17,44 +18,33 @@ def press(material, **settings):
     return rv.simulate(BALL, material, PRESS, **{"times": 3, "tolerance": 1e-2, "progress": False, **settings})
 
 
-def test_note__is_left_out_where_every_row_keeps_the_tolerance():
+def test_accuracy__is_no_warning_if_every_row_keeps_the_tolerance():
     ds = press(rv.zener(3e6, 1e6, 1e5))
     assert (ds.stated_error <= 1e-2).all()
-    assert "accuracy_note" not in ds.roughvisc.attributes
+    assert "warnings" not in ds.attrs
 
 
-@pytest.mark.parametrize(
-    ("material", "says"),
-    [
-        (rv.kelvin_voigt(1e6, 1e5), "no instantaneous compliance"),
-        (rv.zener(1e8, 1e6, 1e5), "% of the compliance is instantaneous"),
-    ],
-)
-def test_note__names_what_jumps(material, says):
-    note = press(material).roughvisc.attributes["accuracy_note"]
-    assert says in note
-    assert "The approach meets the tolerance" in note
+@pytest.mark.parametrize("material", [rv.kelvin_voigt(1e6, 1e5), rv.zener(1e8, 1e6, 1e5)])
+def test_accuracy__warns_of_materials_with_little_instantaneous_compliance(material):
+    assert "instantaneous" in warnings_of(press(material).attrs)["accuracy"]
 
 
-def test_note__counts_the_rows_that_state_more_than_the_tolerance():
+def test_accuracy__counts_the_rows_that_state_more_than_the_tolerance():
     ds = press(rv.zener(3e6, 1e6, 1e5), numerics=rv.Numerics(time_step=0.05))
     errors = ds.stated_error.values
     missed = np.count_nonzero(errors > 1e-2)
     assert missed
-    assert f"{missed} of 3 rows state" in ds.roughvisc.attributes["accuracy_note"]
-    assert f"{errors.max():.2g} at worst" in ds.roughvisc.attributes["accuracy_note"]
-    assert "time step is fixed" in ds.roughvisc.attributes["accuracy_note"]
+    assert warnings_of(ds.attrs)["accuracy"].startswith(f"{missed} of 3 rows")
+    assert f"{errors.max():.2g}" in warnings_of(ds.attrs)["accuracy"]
 
 
-@pytest.mark.parametrize(
-    ("residual", "says"), [(0.02, "(estimated error of the pressure up to 0.02)"), (np.nan, "s: try")]
-)
-def test_unconverged__quotes_the_error_where_it_is_known(residual, says):
-    histories = {"status": np.array([0, 1]), "time": np.array([0.0, 0.5]), "residual": np.array([0.0, residual])}
-    told = unconverged(histories)
-    assert told.startswith("1 of 2 kept times did not converge, first at t = 500 ms")
-    assert says in told
-    assert "nan" not in told
+def test_unconverged__counts_rows_and_names_the_first():
+    histories = {"status": np.array([0, 1]), "time": np.array([0.0, 0.5]), "residual": np.array([0.0, 0.02])}
+    found = unconverged(histories)
+    assert found.startswith("1 of 2 kept times")
+    assert "t = 500 ms" in found
+    assert "0.02" in found
+    assert "nan" not in unconverged(histories | {"residual": np.array([0.0, np.nan])})
     assert unconverged(histories | {"status": np.array([0, 0])}) == ""
 
 
@@ -68,16 +58,15 @@ def pressed(height, boundary="periodic"):
     )
 
 
-def test_border_note__is_of_periodic_surfaces_that_repeat_with_a_step(caplog):
+def test_border__is_a_warning_for_periodic_surfaces_that_repeat_with_a_step(caplog):
     part = ROUGH.isel(x=slice(0, 33), y=slice(0, 25))
     ds = pressed(part)
-    note = ds.roughvisc.attributes["border_note"]
-    assert "repeats with a step" in note
-    assert note in caplog.text
+    warning = warnings_of(ds.attrs)["border"]
+    assert warning in caplog.text
     seam = [ds.pressure[-1].isel({axis: [0, -1]}).mean() for axis in ("x", "y")]
-    assert f"carry {float(max(seam) / ds.pressure[-1].mean()):.2g} times the mean pressure" in note
+    assert f"{float(max(seam) / ds.pressure[-1].mean()):.2g} times the mean pressure" in warning
     for height, boundary in ((ROUGH, "periodic"), (rv.mirror(part), "periodic"), (part, "free")):
-        assert "border_note" not in pressed(height, boundary).attrs
+        assert "border" not in warnings_of(pressed(height, boundary).attrs)
 
 
 def ball_pressed(depth, **options):
@@ -88,31 +77,23 @@ def ball_pressed(depth, **options):
     return rv.simulate(ball, rv.elastic(1e6), program, progress=False, **with_defaults)
 
 
-def test_edge_note__says_when_contact_came_to_the_border(caplog):
+def test_edge__states_when_contact_reached_the_border(caplog):
     """A ball reaches the middle of its nearer side, at 7 um, when its approach is ``a^2 / R``: Hertz."""
     depth = 4 * (7e-6) ** 2 / 1e-3
     ds = ball_pressed(depth, edge="accept")
-    assert ds.roughvisc.attributes["edge"] == "accept"
     assert float(ds.pressure[0, :, [0, -1]].max()) == 0.0  # at the kept times it is not at the border
     assert float(ds.pressure[-1, :, [0, -1]].max()) == 0.0
-    began = float(re.search(r"first in the step to ([\d.]+) s", ds.roughvisc.attributes["edge_note"])[1])
-    assert 0.2 < began < 0.35
-    assert "there the surface acts as a punch of its outline" in ds.roughvisc.attributes["edge_note"]
-    assert ds.roughvisc.attributes["edge_note"] in caplog.text
-    caplog.clear()
-    inside = ball_pressed(0.2 * depth, edge="accept")
-    assert inside.roughvisc.attributes["edge"] == "accept"
-    assert "edge_note" not in inside.roughvisc.attributes
-    assert "edge" not in ball_pressed(0.2 * depth).attrs
-    periodic = ball_pressed(0.05 * depth, edge="accept", boundary="periodic")
-    assert (periodic.roughvisc.attributes["edge"], "edge_note" in periodic.roughvisc.attributes) == ("accept", False)
-    assert "punch" not in caplog.text
+    warning = warnings_of(ds.attrs)["edge"]
+    assert 0.2 < float(re.search(r"step to ([\d.]+) s", warning)[1]) < 0.35
+    assert warning in caplog.text
+    assert "edge" not in warnings_of(ball_pressed(0.2 * depth, edge="accept").attrs)
+    assert "edge" not in warnings_of(ball_pressed(0.05 * depth, edge="accept", boundary="periodic").attrs)
 
 
 def test_section__is_not_cut_along_the_seam():
     part = ROUGH.isel(x=slice(0, 33), y=slice(0, 25))
     part = part.where(part.y > part.y[1], part + 1e-6)  # a ridge along one border
     ds = pressed(part)
-    assert ds.roughvisc.attributes["border_note"]
+    assert "border" in warnings_of(ds.attrs)
     assert int(ds.pressure[-1].sum("x").values.argmax()) < 2
     assert 2 <= cut_position(ds, 0, "y") < 23

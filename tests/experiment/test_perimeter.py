@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.experiment.profile import Profile
@@ -70,7 +69,7 @@ def pillars():
 
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_pillars__have_the_area_of_their_cells(boundary):
-    ds = simulate_whole(
+    ds = rv.simulate(
         pillars(), UNIT, rv.Program().load(1.0, over=0), boundary=boundary, missing="absent", progress=False
     )
     assert ds.contact_area_counted.values == pytest.approx(64.0)
@@ -79,16 +78,16 @@ def test_pillars__have_the_area_of_their_cells(boundary):
 
 def test_scan_pressed_as_a_punch__has_its_whole_area():
     flat = rv.from_array(np.zeros((6, 5)), 1.0)
-    ds = simulate_whole(flat, UNIT, rv.Program().load(1.0, over=0), edge="accept", progress=False)
+    ds = rv.simulate(flat, UNIT, rv.Program().load(1.0, over=0), edge="accept", progress=False)
     assert float(ds.contact_area[0]) == pytest.approx(30.0)
 
 
 def test_ball_on_a_window__is_corrected_as_on_the_whole_grid(monkeypatch):
     ball, program = rv.sphere(1.0, 12.0, (121, 120)), rv.Program().load(1.0, over=0)
     monkeypatch.setattr("roughvisc.experiment.profile._WORTH_FOLLOWING", 10**9)
-    whole = simulate_whole(ball, UNIT, program, progress=False)
+    whole = rv.simulate(ball, UNIT, program, progress=False)
     monkeypatch.undo()
     assert Profile(ball, follow=True).window.shape != (121, 120)
-    followed = simulate_whole(ball, UNIT, program, progress=False)
+    followed = rv.simulate(ball, UNIT, program, progress=False)
     assert float(followed.contact_area[0]) == float(whole.contact_area[0])
     assert float(whole.contact_area[0]) == pytest.approx(np.pi * 0.75 ** (2 / 3), rel=0.03)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import xarray as xr
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.experiment import loading
@@ -34,7 +33,7 @@ PROGRAMS = {
 
 def result(material, program, **settings):
     settings = {"tolerance": 3e-2, "fields": (), "progress": False} | settings
-    return simulate_whole(BALL, MATERIALS[material], PROGRAMS[program], **settings)
+    return rv.simulate(BALL, MATERIALS[material], PROGRAMS[program], **settings)
 
 
 @pytest.mark.parametrize("absent", [False, True])
@@ -49,7 +48,7 @@ def test_rows__of_a_wide_grid_hold_the_same_numbers(monkeypatch, absent):
     monkeypatch.setattr(passes, "_BLOCK", 100)
 
     def pressed():
-        return simulate_whole(height, MATERIALS["zener"], program, progress=False, **settings).drop_vars("wall_time")
+        return rv.simulate(height, MATERIALS["zener"], program, progress=False, **settings).drop_vars("wall_time")
 
     narrow = pressed()
     monkeypatch.setattr(loading, "is_wide", lambda size: True)
@@ -83,10 +82,10 @@ def test_ancillary_variables__exist():
 def test_dent_left_by_a_load__is_as_uncertain_as_the_load_made_it():
     # 1 % off in a compliance is 1 % of what it gave under load, however little of that is left
     program = rv.Program().load(0.02, over=0.3).hold(0.3).load(0.0, over=0.01).hold(30.0)
-    ds = simulate_whole(BALL, MATERIALS["power_law"], program, times=[0.6, 30.6], tolerance=1e-2, progress=False)
+    ds = rv.simulate(BALL, MATERIALS["power_law"], program, times=[0.6, 30.6], tolerance=1e-2, progress=False)
     loaded, left = ds.approach.values
     assert left < 0.1 * loaded
-    assert ds.approach_error[-1] > ds.roughvisc.attributes["series_error"] * loaded > 0
+    assert ds.approach_error[-1] > ds.attrs["series_error"] * loaded > 0
 
 
 @pytest.mark.parametrize("control", ["approach", "load"])

@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -20,7 +19,7 @@ PROGRAM = rv.Program().load(LOAD, over=0.5).hold(4.0)
 
 @pytest.fixture(scope="module")
 def result():
-    return simulate_whole(BALL, RUBBER, PROGRAM, times=[4.5], tolerance=1e-3, progress=False)
+    return rv.simulate(BALL, RUBBER, PROGRAM, times=[4.5], tolerance=1e-3, progress=False)
 
 
 def test_histories__hold_the_steps_between_kept_times(result):
@@ -60,13 +59,13 @@ def test_histories__are_stored_and_read_by_the_same_names(result, tmp_path):
 
 
 def test_histories__where_every_step_is_kept_are_the_result():
-    ds = simulate_whole(BALL, RUBBER, PROGRAM, tolerance=1e-2, progress=False)
+    ds = rv.simulate(BALL, RUBBER, PROGRAM, tolerance=1e-2, progress=False)
     assert "step" not in ds.dims
     xr.testing.assert_identical(rv.observables.history(ds).force, ds.force)
 
 
 def test_histories__of_many_cases_ask_for_one():
-    both = xr.concat([simulate_whole(BALL, RUBBER, PROGRAM, times=1, tolerance=1e-2, progress=False)] * 2, "case")
+    both = xr.concat([rv.simulate(BALL, RUBBER, PROGRAM, times=1, tolerance=1e-2, progress=False)] * 2, "case")
     with pytest.raises(InputError, match="choose one case first"):
         rv.observables.history(both)
     steps = rv.observables.history(both.isel(case=0))
@@ -77,7 +76,7 @@ def test_force_of_a_whole_step__is_no_history():
     # no compliance at once: under given approach the force of an implicit step is not that at its end
     soft = rv.kelvin_voigt(1e6, 1e6)
     program = rv.Program().approach(1e-6, over=0.5).hold(1.0)
-    ds = simulate_whole(BALL, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
+    ds = rv.simulate(BALL, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
     kept = set(ds.time.values)
     assert set(rv.observables.history(ds).time.values) - {0.0} <= kept
 

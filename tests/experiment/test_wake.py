@@ -5,6 +5,7 @@ import math
 import pytest
 
 import roughvisc as rv
+from roughvisc.labels import warnings_of
 
 CELL, TIME = 2.2e-5, 1e-3
 #: Retarded compliance over the whole: a half.
@@ -28,41 +29,38 @@ def test_wake_note__is_of_speeds_at_which_a_longer_period_changes_friction(caplo
     ratio = (short.friction_force / long.friction_force).values
     assert ratio[0] == pytest.approx(1, abs=0.05)
     assert ratio[1] < 0.6
-    note = short.roughvisc.attributes["wake_note"]
+    note = warnings_of(short.attrs)["wake"]
     assert note in caplog.text
     assert f"every {49 * CELL * 1e3:.6g} mm, and at 1 m/s the contact slides into the wake" in note
     assert f"up to {left(49 * CELL, FAST):.2g} % of the creep" in note
-    assert "wake_note" not in rv.friction(ball(49), RUBBER, load=2e-2, speeds=SLOW).attrs
+    assert "wake:" not in rv.friction(ball(49), RUBBER, load=2e-2, speeds=SLOW).attrs.get("warnings", "")
 
 
 def test_wake_note__is_along_the_motion():
-    assert "every 990 µm" in rv.friction(ball(89), RUBBER, **SLIDE, direction="-y").roughvisc.attributes["wake_note"]
+    assert "every 990 µm" in rv.friction(ball(89), RUBBER, **SLIDE, direction="-y").attrs["warnings"]
     # along x a period takes 5.4 retardation times at the higher speed
     far = rv.friction(ball(89), RUBBER, load=2e-2, speeds=89 * CELL / (5.4 * TIME))
-    assert "wake_note" not in far.roughvisc.attributes
+    assert "wake:" not in far.attrs.get("warnings", "")
 
 
 def test_wake_note__of_a_surface_without_a_recipe_goes_by_what_touches():
     shape = ball(45)
     measured = rv.from_array(shape.values, spacing=CELL)
     few, many = (rv.friction(measured, RUBBER, load=load, speeds=FAST) for load in (2e-3, 0.5))
-    assert "wake_note" in few.roughvisc.attributes
-    assert "wake_note" not in many.roughvisc.attributes, "what touches reaches almost from one period to the next"
+    assert "wake:" in few.attrs.get("warnings", "")
+    assert "wake:" not in many.attrs.get("warnings", ""), "what touches reaches almost from one period to the next"
     rough = rv.self_affine(1e-3, (45, 40), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
-    assert "wake_note" not in rv.friction(rough, RUBBER, pressure=2e4, speeds=FAST).attrs
+    assert "wake:" not in rv.friction(rough, RUBBER, pressure=2e4, speeds=FAST).attrs.get("warnings", "")
     wave = rv.wavy(1e-5, 45 * CELL, (45 * CELL, 3 * CELL), (45, 3), waves=1)
     found = rv.friction(wave, RUBBER, pressure=2e3, speeds=FAST, fields=("pressure",))
     assert float((found.pressure > 0).mean()) < 0.5
-    assert "wake_note" not in found.roughvisc.attributes, "it is a row of ridges by its recipe"
+    assert "wake:" not in found.attrs.get("warnings", ""), "it is a row of ridges by its recipe"
 
 
 def test_wake_note__of_creep_without_end_says_that_nothing_recovers():
     strip = rv.wavy(1e-6, 45 * CELL, (45 * CELL, CELL), (45, 1), waves=1)
     ridge = strip.copy(data=ball(45).values[:, 22:23])  # no longer the wave of its recipe
-    assert (
-        "100 % of the creep"
-        in rv.friction(ridge, rv.maxwell(1e6, 1e3), pressure=1e3, speeds=10.0).roughvisc.attributes["wake_note"]
-    )
+    assert "100 % of the creep" in rv.friction(ridge, rv.maxwell(1e6, 1e3), pressure=1e3, speeds=10.0).attrs["warnings"]
 
 
 def test_wake_note__of_a_program_is_of_slides_that_come_as_far_as_the_next_wake(caplog):
@@ -70,7 +68,7 @@ def test_wake_note__of_a_program_is_of_slides_that_come_as_far_as_the_next_wake(
     press = rv.Program().load(2e-2, over=0)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": 1, "progress": False}
     near, far = (rv.simulate(ball(45), RUBBER, press.slide(n * period, speed=FAST), **settings) for n in (0.4, 2.0))
-    assert "wake_note" not in near.roughvisc.attributes
+    assert "wake:" not in near.attrs.get("warnings", "")
     creep = [1 + -math.expm1(-n * period / (FAST * TIME)) for n in (1, 2)]
-    assert f"up to {100 * (1 - creep[0] / creep[1]):.2g} % of the creep" in far.roughvisc.attributes["wake_note"]
-    assert far.roughvisc.attributes["wake_note"] in caplog.text
+    assert f"up to {100 * (1 - creep[0] / creep[1]):.2g} % of the creep" in far.attrs["warnings"]
+    assert warnings_of(far.attrs)["wake"] in caplog.text

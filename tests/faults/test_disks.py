@@ -8,7 +8,6 @@ import xarray as xr
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.groups import whole_of
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 
@@ -23,7 +22,7 @@ def study(tmp_path):
 
 
 def results(folder):
-    return whole_of(rv.open_results(folder)).drop_vars("wall_time").load()
+    return rv.open_results(folder).drop_vars("wall_time").load()
 
 
 @pytest.mark.parametrize("workers", ["0", pytest.param("2", marks=pytest.mark.long)])
@@ -87,7 +86,7 @@ def test_run__serves_what_is_finished_on_a_disk_that_may_only_be_read(study, tmp
     assert (status, err.count("\n")) == (0, 1)
     assert "is not writable: the finished result is shown, and nothing is written" in err
     assert "Figure" not in out
-    xr.testing.assert_equal(whole_of(rv.sweep(study, folder, progress=False)).drop_vars("wall_time").load(), wanted)
+    xr.testing.assert_equal(rv.sweep(study, folder, progress=False).drop_vars("wall_time").load(), wanted)
     assert float(rv.run(one, folder, progress=False).force[-1]) == pytest.approx(5e-3)
 
 

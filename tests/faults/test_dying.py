@@ -14,13 +14,12 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.index import INDEX, LATEST
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -47,7 +46,7 @@ def case(tmp_path):
 
 @pytest.fixture
 def wanted(case, tmp_path):
-    with whole_result(run_case(case, tmp_path / "wanted")) as ds:
+    with open_result(run_case(case, tmp_path / "wanted")) as ds:
         return ds.drop_vars("wall_time").load()
 
 
@@ -61,7 +60,7 @@ def test_at_a_file_operation(case, wanted, tmp_path, most):
     for way, at, end in lines:
         assert end == "killed" if way == "kill" else "TRACEBACK" not in end
         folder = tmp_path / way / at
-        with whole_result(run_case(case, folder)) as found:
+        with open_result(run_case(case, folder)) as found:
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
         clean_folder(folder)
         assert [path.name for path in folder.iterdir()] == [f"{case.key}.nc"], (way, at, end)
@@ -82,10 +81,10 @@ def test_at_an_allocation(tmp_path, count):
     assert not [end for end in ends if "TRACEBACK" in end]
     assert any(end != "finished" for end in ends)
     case = read_study(path)
-    with whole_result(run_case(case, tmp_path / "wanted")) as ds:
+    with open_result(run_case(case, tmp_path / "wanted")) as ds:
         wanted = ds.drop_vars("wall_time").load()
     for number in range(count):
-        with whole_result(run_case(case, tmp_path / str(number))) as found:
+        with open_result(run_case(case, tmp_path / str(number))) as found:
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
 
 
@@ -104,7 +103,7 @@ def test_damaged_checkpoints(case, wanted, tmp_path, count):
         shutil.copytree(unfinished, there)
         for name in rng.choice(names, size=rng.integers(1, 3), replace=False):
             (there / name).write_bytes(damaged_bytes(rng, (unfinished / name).read_bytes()))
-        with within(20), whole_result(run_case(case, there.parent)) as found:
+        with within(20), open_result(run_case(case, there.parent)) as found:
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
         assert [path.name for path in there.parent.iterdir()] == [f"{case.key}.nc"]
 
@@ -116,7 +115,7 @@ def test_damaged_results(tmp_path, count):
     path.write_text(TWO_LOADS)
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(21)
     run_cases(cases, out, watch=Monitor(), workers=0)
-    wanted = whole_of(rv.open_results(out, cases=cases)).drop_vars("wall_time").load()
+    wanted = rv.open_results(out, cases=cases).drop_vars("wall_time").load()
     places = [out / f"{case.key}.nc" for case in cases]
     whole = [place.read_bytes() for place in places]
     refused = 0
@@ -125,14 +124,14 @@ def test_damaged_results(tmp_path, count):
         place.write_bytes(damaged_bytes(rng, content))
         with within(20):
             try:
-                with whole_result(place) as found:
+                with open_result(place) as found:
                     xr.testing.assert_identical(found.load(), wanted_alone(content, tmp_path))
             except InputError:
                 refused += 1
             if number % 10 == 0:
                 outcomes = run_cases(cases, out, watch=Monitor(), workers=0)
                 assert {one.kind for one in outcomes.values()} == {"done"}
-                found = whole_of(rv.open_results(out)).drop_vars("wall_time")
+                found = rv.open_results(out).drop_vars("wall_time")
                 xr.testing.assert_equal(found.load(), wanted)
         place.write_bytes(content)
     assert refused > 0.8 * count
@@ -141,7 +140,7 @@ def test_damaged_results(tmp_path, count):
 def wanted_alone(content, tmp_path):
     path = tmp_path / "whole.nc"
     path.write_bytes(content)
-    with whole_result(path) as ds:
+    with open_result(path) as ds:
         return ds.load()
 
 

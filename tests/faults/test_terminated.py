@@ -13,7 +13,7 @@ from support import BALL
 from roughvisc.cli import interrupts
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 
 MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", 'time_step = "160 us"\n[keep]')
 TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -55,7 +55,7 @@ def test_run__writes_its_checkpoint_and_ends_quietly(tmp_path, text, options, wh
         reached = []
         path = run_case(case, tmp_path / "out", progress=lambda now, end, all=reached: all.append(now))
         assert min(reached) > 0, "it goes on"
-        with whole_result(path) as found, whole_result(run_case(case, tmp_path / "calm")) as wanted:
+        with open_result(path) as found, open_result(run_case(case, tmp_path / "calm")) as wanted:
             xr.testing.assert_equal(found.drop_vars("wall_time"), wanted.drop_vars("wall_time"))
         assert [one.name for one in unfinished.parent.glob(f"*{case.key}*")] == [path.name]
 

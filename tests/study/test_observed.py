@@ -75,9 +75,7 @@ def test_run__ends_with_what_is_observed(invoke, study, tmp_path, counted, coars
         assert ds.leak_rate[0] > 0
         assert ds.leak_status.values.tolist() == [0, 1]
         assert ds.leak_rate.attrs["viscosity"] == 1e-3
-        assert json.loads(ds.roughvisc.attributes["observed"]) == {
-            "leakage": {"viscosity": 1e-3, "pressure_drop": 1e5, "along": "x"}
-        }
+        assert json.loads(ds.attrs["observed"]) == {"leakage": {"viscosity": 1e-3, "pressure_drop": 1e5, "along": "x"}}
         xr.testing.assert_allclose(ds.leak_rate, rv.observables.leakage(ds).leak_rate, rtol=1e-12, atol=0)
     table = rv.to_csv(ds, tmp_path / "history.csv").read_text()
     assert ",closed" in table
@@ -167,7 +165,7 @@ def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pic
         xr.testing.assert_allclose(ds.thermal_conductance, again.thermal_conductance)
         assert list(ds.thermal_conductance.attrs["resistivity"]) == [5.0, 0.0]
         asked = {"conductance": {"resistivity": [5.0, 0.0], "kind": "thermal"}}
-        assert json.loads(ds.roughvisc.attributes["observed"]) == asked
+        assert json.loads(ds.attrs["observed"]) == asked
 
 
 def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):

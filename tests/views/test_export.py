@@ -13,7 +13,6 @@ import pint
 import pytest
 import sample_results as made
 import xarray as xr
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -41,7 +40,7 @@ def computed(tmp_path_factory):
     press = rv.Program().load(0.01, over=0.05).hold(0.2)
     fields = ("pressure", "gap", "displacement")
     options = {"boundary": "periodic", "tolerance": 1e-2, "times": 3, "fields": fields, "progress": False}
-    return simulate_whole(scan, rubber, press, **options)
+    return rv.simulate(scan, rubber, press, **options)
 
 
 def test_units__are_read_by_pint():

@@ -11,7 +11,7 @@ from rich.console import Console
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import CASES
 from roughvisc.topography.grid import nominal_area
 from roughvisc.views.console.result_tables import result_table
@@ -39,7 +39,7 @@ def test_one_row__has_one_area_and_one_share_everywhere(folder):
     table = list(csv.DictReader((folder / CASES).read_text("utf-8-sig").splitlines()))
     swept = rv.open_results(folder)
     for number, told in enumerate(table):
-        ds = whole_result(folder / told["file"]).load()
+        ds = open_result(folder / told["file"]).load()
         # the reference: cells of the kept pressure, less 0.088 of a cell for each face, in free space
         contact = np.pad(ds.pressure.values[-1] > 0, 1)
         faces = sum(np.count_nonzero(contact & ~np.roll(contact, turn, axis)) for axis in (0, 1) for turn in (1, -1))

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 from rich.console import Console
-from support import simulate_whole
 
 import roughvisc as rv
 from roughvisc import observables
@@ -26,7 +25,7 @@ def strip(request):
         height = labelled(height.values.T, (WIDTH, LENGTH / COUNT))
     fields = ("pressure", "gap", "displacement")
     press = rv.Program().load(1e-5, over=0).hold(1.0)
-    return simulate_whole(
+    return rv.simulate(
         height, rv.zener(3e6, 3e6, 3e5), press, boundary="periodic", fields=fields, times=2, tolerance=1e-4
     )
 

@@ -30,8 +30,8 @@ def measure(sizes=((128, 60), (128, 200), (256, 200)), repeats=5):
             return rv.simulate(ball, material, program, tolerance=tolerance, **settings)
 
         name = f"Maxwell step load, {cells}^2, seed with {steps} steps"
-        more = {"peer_convolutions": int(seed.roughvisc.cost.convolutions.sum())}
+        more = {"peer_convolutions": int(seed.convolutions.sum())}
         for how in with_symmetry_and_without():
             ours, fast = seconds(press, repeats)
-            counted = int(fast.roughvisc.cost.convolutions.sum())
+            counted = int(fast.convolutions.sum())
             yield row("seed paper", name + how, theirs, ours, worst(seed), worst(fast), counted, **more)

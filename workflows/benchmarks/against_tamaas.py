@@ -85,6 +85,6 @@ def creep(tamaas, cells, steps, repeats):
             break
     for how in with_symmetry_and_without():
         ours, ds = seconds(lambda: rv.simulate(ball, material, program, tolerance=tolerance, **settings), repeats)
-        reached, counted = error(ds.pressure[0].values, duration), int(ds.roughvisc.cost.convolutions.sum())
+        reached, counted = error(ds.pressure[0].values, duration), int(ds.convolutions.sum())
         name = f"free-space creep, {cells}^2, Tamaas with {steps} steps{how}"
         yield row("Tamaas", name, theirs, ours, their_error, reached, counted)

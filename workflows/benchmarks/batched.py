@@ -74,7 +74,7 @@ def parts(cells, repeats):
             ds = simulate(height, rubber, program, boundary="periodic", tolerance=1e-2, times=2, progress=False)
             found.append([spent[name] for name in ("case", "solver", "transforms")])
     times = dict(zip(("case", "solver", "transforms"), np.median(found[1:], axis=0), strict=True))
-    return times | {"steps": ds.roughvisc.steps.sizes["step"], "iterations": int(ds.roughvisc.cost.iterations.sum())}
+    return times | {"steps": ds.roughvisc.steps.sizes["step"], "iterations": int(ds.iterations.sum())}
 
 
 def passes(gap, displacement):

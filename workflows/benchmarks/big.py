@@ -293,7 +293,7 @@ def creeping(cells, count, fraction=0.08, tolerance=1e-3):
     ds = rv.simulate(surface, material, program, threads=count, **settings)
     wall, spent = time.perf_counter() - wall, time.process_time() - spent
     fields = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / (8 * cells**2)
-    cost, accuracy = ds.roughvisc.cost, ds.roughvisc.accuracy
+    cost, accuracy = ds, ds
     print(
         f"{cells:5d} creep, {count} threads: contact {float(ds.contact_fraction[-1]):.3f}, wall {wall:.1f} s, "
         f"cpu {spent:.1f} s, {ds.roughvisc.steps.sizes['step']} steps, {int(cost.iterations.sum())} iterations, "

@@ -90,7 +90,7 @@ def _against(ds, exact, load, apex, points=8):
 
 def _row(ds, **true):
     """What is stated of each quantity, over the true error; errors below the tolerance of the runs are none."""
-    stated = ds.roughvisc.accuracy
+    stated = ds
     side = float(ds.x[1] - ds.x[0])
     return {"cells": float(ds.contact_area_counted[0]) / side**2} | {
         name: (float(stated[f"grid_error_{name}"][0]), abs(float(error))) for name, error in true.items()

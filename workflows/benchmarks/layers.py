@@ -63,7 +63,7 @@ def measure(kind, cells, tolerance, sender):
             "exponentials": len(memory.material.times),
             "processor": round(took, 2),
             "steps": steps,
-            "convolutions": int(ds.roughvisc.cost.convolutions.sum()),
+            "convolutions": int(ds.convolutions.sum()),
             "stated_error": float(ds.stated_error.max()),
             "memory": used,
             "used over planned": round(used / planned, 2),

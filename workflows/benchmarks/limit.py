@@ -104,7 +104,7 @@ def solved(case, cells):
         began = time.process_time()
         ds = solve()
         whole = time.process_time() - began
-    total = int(ds.roughvisc.cost.convolutions.sum())
+    total = int(ds.convolutions.sum())
 
     contact = sum(seconds for seconds, _ in problems), sum(count for _, count in problems)
     if case == "friction":

@@ -82,7 +82,7 @@ def taken(kind, cells):
         path = run_case(case, folder)
         wall = time.perf_counter() - began
         with open_result(path) as ds:
-            convolutions = float(ds.roughvisc.cost.convolutions.sum())
+            convolutions = float(ds.convolutions.sum())
         size = Path(path).stat().st_size
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     return {"convolutions": convolutions, "wall_time": wall, "memory": memory, "disk": size}

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 
 import roughvisc as rv
-from roughvisc.groups import whole_of
 
 TOLERANCE = 1e-2
 
@@ -132,7 +131,7 @@ def main(count=2000, seed=1):
             with np.errstate(all="raise", under="ignore"):
                 ds = rv.simulate(height, body, chain, fields=("pressure", "gap", "displacement"), progress=False,
                                  **settings)  # fmt: skip
-            problems = violations(whole_of(ds))
+            problems = violations(ds)
         except (rv.RoughviscError, ArithmeticError) as error:
             problems = [f"{type(error).__name__}: {error}"]
         wrong += bool(problems)

@@ -1,9 +1,9 @@
-"""Do two checkouts compute the same? Twenty-one scenes in each, every variable and attribute compared bit by bit.
+"""Do two checkouts compute the same? Scenes in each; variables that both have are compared bit by bit.
 
     python workflows/benchmarks/same_bits.py OTHER_CHECKOUT [SCENE ...]
 
-Run it from the checkout that is to be judged. Wall times and versions are left out. Exit status 1 where anything else
-differs.
+Run it from the checkout that is to be judged. Variables of one checkout alone are listed. Exit status 1 if anything
+that both have differs.
 """
 
 import pickle
@@ -14,16 +14,22 @@ from pathlib import Path
 
 import numpy as np
 
-try:
-    from roughvisc.groups import whole_of as whole
-except ImportError:  # a checkout whose results have no groups
-
-    def whole(dataset):
-        return dataset
-
-
-#: Variables and attributes that differ between runs of one program; and a number of the steps that is no result.
+#: Variables and attributes that differ between runs of one program, and texts.
 LEFT_OUT = ("wall_time", "roughvisc_version", "history", "source", "result_format", "step")
+LEFT_OUT += ("notes", "details", "warnings", "title", "Conventions")
+
+
+def whole(dataset):
+    """All values of a result by name, with those of its steps and of the groups that the first edition has."""
+    values = {name: np.asarray(one.values) for name, one in dataset.variables.items()}
+    for group in ("energy", "accuracy", "cost", "steps"):
+        try:
+            part = getattr(dataset.roughvisc, group)
+        except (AttributeError, ValueError):  # there is none
+            continue
+        prefix = "step_" if group == "steps" else ""
+        values |= {f"{prefix}{name}": np.asarray(one.values) for name, one in part.variables.items()}
+    return values
 
 
 def set_numerics(**settings):
@@ -93,8 +99,8 @@ def computed(names, path):
     for name, scene in scenes().items():
         if names and name not in names:
             continue
-        dataset = whole(scene())
-        values = {key: np.asarray(dataset[key].values) for key in dataset.variables if key not in LEFT_OUT}
+        dataset = scene()
+        values = {key: one for key, one in whole(dataset).items() if key.removeprefix("step_") not in LEFT_OUT}
         told = {f"attribute {key}": value for key, value in dataset.attrs.items() if key not in LEFT_OUT}
         results[name] = values | told
     Path(path).write_bytes(pickle.dumps(results))
@@ -105,8 +111,8 @@ def differing(one, other):
     for key in sorted(one.keys() | other.keys()):
         a, b = one.get(key), other.get(key)
         if a is None or b is None:
-            yield f"{key} is in one of them alone"
-        elif not isinstance(a, np.ndarray):
+            continue
+        if not isinstance(a, np.ndarray):
             if str(a) != str(b):
                 yield f"{key}: {b} -> {a}"
         elif a.shape != b.shape:
@@ -128,11 +134,13 @@ def main(other, *names):
         )
         found.append(pickle.loads(path.read_bytes()))
         path.unlink()
-    any_differs = False
+    any_differs, alone = False, set()
     for name, result in found[0].items():
         lines = list(differing(result, found[1][name]))
         any_differs |= bool(lines)
+        alone.update(result.keys() ^ found[1][name].keys())
         print(f"{name}: {'the same' if not lines else ''}", *lines, sep="\n    " if lines else "", flush=True)
+    print("in one checkout alone:", ", ".join(sorted(alone)))
     return any_differs
 
 

@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.groups import whole_of
 from roughvisc.study.quantities import QUANTITIES
 
 SIDE, PATCHES = 1e-3, 24
@@ -99,7 +98,7 @@ def numbers(text, names, folder):
     path = Path(folder) / "study.toml"
     path.write_text(text)
     case = rv.vary(rv.read_study(path), {"keep.fields": ["pressure", "gap"]})
-    result = whole_of(rv.run(case, out=Path(folder) / "runs", progress=False)).load()
+    result = rv.run(case, out=Path(folder) / "runs", progress=False).load()
     return {name: QUANTITIES[name].of(result, case) for name in names}
 
 

@@ -139,7 +139,7 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     >>> gel = rv.sheet(rv.zener(3e6, 1e6, 1e5), thickness=1e-4)
     >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=45)
     >>> ds = rv.simulate(ball, gel, rv.Program().load(1e-4, over=0), progress=False)
-    >>> ds.roughvisc.attributes["thickness"], ds.roughvisc.attributes["base"]
+    >>> ds.attrs["thickness"], ds.attrs["base"]
     (0.0001, 'bonded')
     """
     amiss = separability_error(material)

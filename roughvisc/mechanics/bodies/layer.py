@@ -7,7 +7,6 @@ together. They do separate where the compliances of the materials are in proport
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -101,34 +100,6 @@ class LayeredBody(Body):
         ]
         found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, shear)
         return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
-
-    def apart(self, waves: tuple[float, float], ages: Sequence[float]) -> tuple[float, float]:
-        """How far half-spaces of the top layer and of what lies lowest are from the response, at most.
-
-        Parameters
-        ----------
-        waves : tuple of float
-            Wave numbers of the longest and of the shortest wave that counts. [1/m]
-        ages : sequence of float
-            At which the materials are compared, as elastic ones. [s]
-
-        Returns
-        -------
-        top, base : float
-            Largest relative difference of the contact compliance over these waves.
-        """
-        q, found = np.geomspace(*waves, 60), [(0.0, 0.0)]
-        for age in ages:
-            contact = [0.0]
-            with suppress(InputError):  # a table ends before
-                contact = [float(one.contact_compliance(age)) for one in self.materials]
-            if all(0 < one < math.inf for one in contact):
-                shear = [2 / (1 - poisson) * one for poisson, one in zip(self.poissons, contact, strict=True)]
-                answer = effective_compliance(q, self.thicknesses, self.poissons, shear)
-                top, base = (float(np.abs(contact[at] / answer - 1).max()) for at in (0, -1))
-                found.append((top, base))
-        top, base = (max(one) for one in zip(*found, strict=True))
-        return top, base
 
     def attributes(self) -> dict[str, Any]:
         """What it is, in words."""

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.bodies.body import BASE, separability_error
 from roughvisc.mechanics.bodies.sheet import Sheet, complement
 from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area, spacing
-from roughvisc.variables import OTHER_DIMS, of_step
+from roughvisc.variables import OTHER_DIMS
 from roughvisc.variables.axes import axis_of
 
 Array = NDArray[np.float64]
@@ -200,7 +200,6 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         If it is no result of one case.
     """
     _check(dataset)
-    dataset = whole_of(dataset)
     case = Case.from_json(dataset.attrs["case"]) if "case" in dataset.attrs else None
     longest = _longest(dataset["height"]) if "height" in dataset else math.inf
     attrs = _with_the_case(dataset.attrs, case, longest)
@@ -310,10 +309,8 @@ def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
         return float(dataset["speed"].max()), float(dataset.get("dissipated_power", xr.DataArray(math.nan)).max())
     if "sliding_distance" not in dataset:
         return 0.0, math.nan
-    names = ["time", "sliding_distance", "friction_force"]
-    if "step_sliding_distance" in dataset:
-        names = [of_step(name) for name in names]
-    time, distance, force = (dataset[name].values for name in names)
+    rows = history(dataset)
+    time, distance, force = (rows[name].values for name in ("time", "sliding_distance", "friction_force"))
     lasts = np.diff(time) > 0
     if not lasts.any():
         return math.nan, math.nan

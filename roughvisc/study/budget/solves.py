@@ -19,7 +19,7 @@ from roughvisc.study.execution.run import unconverged
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.store import result_path, whole_result
+from roughvisc.study.storage.store import open_result, result_path
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -151,7 +151,7 @@ class Bench:
                     raise RoughviscError(f"{self.what}: the solve {name!r} failed: {outcome.message}")
                 if outcome.kind != "done":
                     log.warning("%s: the solve %r: %s: %s", self.what, name, outcome.kind, outcome.message)
-                found[name] = files.enter_context(whole_result(result_path(self.folder, one.key)))
+                found[name] = files.enter_context(open_result(result_path(self.folder, one.key)))
             yield found
 
 
@@ -179,7 +179,7 @@ def stated_by(path: Path, quantities: Sequence[Observable], axis: str, places: A
     if not path.is_file():
         return Stated()
     try:
-        with whole_result(path) as opened:  # without the fields that no quantity is derived from
+        with open_result(path) as opened:  # without the fields that no quantity is derived from
             needed = {one for quantity in quantities for one in quantity.fields}
             whole = opened.drop_vars([name for name in opened if opened[name].ndim > 2 and name not in needed]).load()
     except (InputError, OSError) as error:

@@ -19,11 +19,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.notes import body_note, layer_note, omitted_effects
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.resources import PART, PROCESS, Available, amount, cores, memory_available, too_large
 from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.bodies.kernel import wave_limits
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
@@ -61,7 +59,7 @@ from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.parameters import labels_of, parameters_of
-from roughvisc.topography.grid import nominal_area, spacing
+from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import unit_for
 
@@ -77,7 +75,6 @@ COLUMNS = {
     "grows": ("", "whether the grid may grow"),
     "final_cells_x": ("1", "cells along x in the end, where the grid grows; 0: not known"),
     "final_cells_y": ("1", "cells along y in the end, where the grid grows; 0: not known"),
-    "left_out": ("", "what costs nothing, and why: it is not modelled, computed or kept"),
     "speeds": ("1", "speeds of a curve of friction"),
     "steps": ("1", "accepted time steps expected"),
     "rows": ("1", "kept times expected"),
@@ -98,7 +95,6 @@ COLUMNS = {
     "half_memory": ("byte", "memory of the process at its peak on cells twice as long"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
-    "body_note": ("", "what the base of a sheet or layers do, by the coarse march; empty of a half-space"),
     "program_note": ("", "how a measured history became segments"),
     "audit": (
         "",
@@ -393,7 +389,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
     height, grows = surface.height, surface.grows and uses_window(settings) and body.separates
     whole = next(i for i, stage in enumerate(surface.stages) if stage.outside == math.inf)
     window = whole > 0 and uses_window(settings)
-    mirrored = surface.mirrored and settings.method == "fast" and not program.slides
     row["grows"] = grows
     try:
         Problem(height, body, settings).check_cells()
@@ -405,7 +400,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
     row |= {
         "memory_model": choice.note,
         "exponentials": len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0,
-        "left_out": omitted_effects(choice, settings, window, mirrored),
         "nominal_pressure": largest,
         "full_contact_pressure": full,
         "warning": full_contact_warning(largest, full),
@@ -423,10 +417,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
     timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
     convolution = stopwatch.seconds(timed, settings.boundary, body.kernel) * work(cells) / work(timed.size)
     quarter = work(cells / 4) / work(cells)
-    sides = spacing(height)
-    size = (height.shape[0] * sides[0], height.shape[1] * sides[1])
-    final = float(choice.material.contact_compliance(program.duration))
-    waves = wave_limits(height.shape, sides)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     beside = stopwatch.beside(found.coarse_run, settings.boundary, body.kernel)
     row |= replace(ahead, found=found).expected(shape, needed, there)
@@ -436,8 +426,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
         "border_warning": border_warning(shape) if found.at_border and settings.edge == "error" else "",
         "final_cells_x": shape[0],
         "final_cells_y": shape[1],
-        "body_note": body_note(body.kernel, settings, size, final, found.force, found.level)
-        or layer_note(body, settings.tolerance, waves, (0.0, program.duration)),
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "wall_time": wall_time(settings, solved, found, choice, convolution, beside),

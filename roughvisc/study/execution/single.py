@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import ConvergenceError
-from roughvisc.groups import whole_of
 from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.files import require_writable
@@ -37,7 +36,7 @@ def run_stated(
 
         path = run_on(client, case, folder.absolute(), progress, threads)
     dataset = open_result(path)
-    complaint = unconverged(whole_of(dataset))
+    complaint = unconverged(dataset)
     if complaint:
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
     return dataset

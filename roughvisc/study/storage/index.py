@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of
 from roughvisc.study.storage.files import (
     UNSEALED,
     append_checksum,
@@ -33,16 +32,14 @@ from roughvisc.study.storage.files import (
     verify_checksum,
     warn_once,
 )
-from roughvisc.study.storage.formats import FORMER_NAMES, current_histories
 from roughvisc.study.storage.store import NETCDF, is_json_table, result_files, result_path
-from roughvisc.variables import RESULT_FORMAT, of_step
 from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")
 
 INDEX, LATEST = ".index.npz", ".latest.json"
 #: Raised by whoever changes what an index holds.
-_LAYOUT = 6
+_LAYOUT = 7
 #: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
 _UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
 _UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
@@ -51,12 +48,9 @@ _KEY = re.compile(r"[0-9a-f]{16}")
 
 
 def _names_of_histories() -> tuple[str, ...]:
-    """Histories over the rows, and over the accepted steps, with the coordinate of the rows itself."""
+    """Return the names of histories over the rows, and of the coordinate of the rows."""
     found = (
-        name
-        for axis in AXES.values()
-        for name, variable in axis.variables.items()
-        if variable.dims in ((axis.name,), ("step",)) and name != "step"
+        name for axis in AXES.values() for name, variable in axis.variables.items() if variable.dims == (axis.name,)
     )
     return tuple(dict.fromkeys(found))
 
@@ -76,7 +70,7 @@ class Entry:
     fields : dict
         dtype of each variable over x and y.
     histories : dict
-        Everything over the rows, ``time`` or ``speed`` too, and over the accepted steps.
+        Everything over the rows, ``time`` or ``speed`` too.
     x, y : ndarray
         Positions of the cells. [m]
     sealed : bool
@@ -151,37 +145,21 @@ def read_entry(path: Path) -> Entry:
         sealed = verify_checksum(path)
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_mask(False)
-            attributes = attributes_of(file.__dict__)
-            stored = _histories(file)
+            attributes = dict(file.__dict__)
+            histories = {name: file[name][:] for name in _names_of_histories() if name in file.variables}
             fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
             x, y = file["x"][:], file["y"][:]
     except (OSError, RuntimeError, IndexError, AttributeError) as error:
         raise InputError(
             f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
         ) from error
-    try:
-        current, known = current_histories(stored, attributes), _names_of_histories()
-    except InputError as error:
-        raise error.prefixed(str(path)) from error
-    histories = {name: values for name, values in current.items() if name in known}
     along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]
     if absent or not is_json_table(attributes.get("case")):
         raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
     plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
-    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)} | {"result_format": RESULT_FORMAT}
+    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
     return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float), sealed)
-
-
-def _histories(file: Any) -> dict[str, NDArray[Any]]:
-    """Histories of a result by their names in the package; in files of former versions they are all at the root."""
-    known = _names_of_histories()
-    found = {name: file[name][:] for name in dict.fromkeys((*known, *FORMER_NAMES)) if name in file.variables}
-    for group, members in file.groups.items():
-        prefix = of_step("") if group == "steps" else ""
-        names = {f"{prefix}{name}": variable for name, variable in members.variables.items()}
-        found |= {name: names[name][:] for name in known if name in names and name not in found}
-    return found
 
 
 def _stamp(path: Path) -> tuple[int, int]:

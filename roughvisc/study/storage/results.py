@@ -12,7 +12,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.groups import for_root, root_of
 from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.variation import DRAWN, REALISATION
@@ -167,7 +166,7 @@ def _stacked(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, ND
     dataset = annotate(dataset)
     keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
     labels = labels_of(parameters, first.case, ("case",))
-    return root_of(_by_realisation(dataset.assign_coords(keys | labels), parameters))
+    return _by_realisation(dataset.assign_coords(keys | labels), parameters)
 
 
 def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
@@ -212,7 +211,7 @@ def _spread(variable: xr.Variable, place: NDArray[np.intp]) -> xr.Variable:
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Histories over (case, time or step); NaN where a case took fewer steps than others, -1 for its status."""
+    """Histories over (case, time); NaN where a case has fewer rows than others, -1 for its status."""
     if len({len(one) for one in histories}) == 1:
         return np.stack(histories)
     missing = np.nan if histories[0].dtype.kind == "f" else -1
@@ -269,4 +268,4 @@ def _tree(folder: Path, entries: Sequence[Entry], parameters: Mapping[str, NDArr
     for number, entry in enumerate(entries):
         node = _stacked(folder, [entry], {key: values[number : number + 1] for key, values in parameters.items()})
         nodes[entry.key] = node.isel(case=0)
-    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=for_root(_attributes(entries))), **nodes})
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=_attributes(entries)), **nodes})

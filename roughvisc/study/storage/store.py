@@ -27,11 +27,10 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of, carrying, group_of, groups_of, root_of, split, whole_of
-from roughvisc.labels import annotate, format_of
+from roughvisc.labels import annotate
 from roughvisc.recorder import chunks
+from roughvisc.steps import STEPS, steps_of, with_steps
 from roughvisc.study.storage.files import append_checksum, atomic_write, is_news, verify_checksum
-from roughvisc.study.storage.formats import to_current
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
@@ -74,7 +73,7 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
 
 
 class ResultBackend(BackendEntrypoint):
-    """Fields over x and y are read when they are asked for, all else at once; the root carries the groups."""
+    """Fields over x and y are read when they are needed, all else at once."""
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """As xarray's engine ``netcdf4`` opens it, durations as plain numbers."""
@@ -82,12 +81,13 @@ class ResultBackend(BackendEntrypoint):
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
-            root, groups = _dataset(path, file), {name: _dataset(path, one) for name, one in file.groups.items()}
-        return carrying(root.drop_vars(drop_variables or (), errors="ignore"), groups)
+            result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
+            steps = _dataset(path, file.groups[STEPS]) if STEPS in file.groups else None
+        return result if steps is None else with_steps(result, steps.set_coords("time"))
 
 
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
-    """The variables of a file, or of a group of it."""
+    """Return the variables of a file or of a group."""
     variables = {name: _variable(path, variable) for name, variable in file.variables.items()}
     for axis in [name for name, one in variables.items() if one.attrs.get("bounds") == f"{name}{BOUNDS}"]:
         variables.pop(variables[axis].attrs.pop("bounds"), None)
@@ -215,8 +215,9 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Parameters
     ----------
     dataset : xarray.Dataset
-        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates; of a root, its groups too. Fields
-        that are read from elsewhere when they are asked for are read and written a chunk at a time.
+        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Fields that are read from elsewhere
+        when they are needed are read and written a chunk at a time. The history of accepted steps that the Dataset
+        carries becomes the group ``steps``.
     path : path
         The file to write; one of that name is replaced.
     precision : float, optional
@@ -243,9 +244,9 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
-    whole = annotate(to_current(whole_of(dataset))).assign_attrs(_NEEDED_ATTRIBUTES)
-    parts = split(whole)
-    parts[""] = _with_bounds(parts[""])
+    steps = steps_of(dataset)
+    parts = {"": _with_bounds(annotate(dataset).assign_attrs(_NEEDED_ATTRIBUTES))}
+    parts |= {} if steps is None else {STEPS: steps}
     parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
     with atomic_write(path) as temporary:
         try:
@@ -270,7 +271,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 def _declare_part(
     file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None
 ) -> list[tuple[netCDF4.Variable, xr.Variable]]:
-    """The variables of the root or of a group as they are declared in the file, and what is to be written to them."""
+    """Declare the variables of the root or of a group; return them with the values to write."""
     with NETCDF:
         place = file.createGroup(group) if group else file
         place.setncatts(plain_attributes(part.attrs))
@@ -295,9 +296,9 @@ def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(named)
 
 
-def _with_bounds(root: xr.Dataset) -> xr.Dataset:
-    """Root that states the borders of the cells, as CF has them: without attributes, those of the centres hold."""
-    bounded = root.drop_vars([f"{axis}{BOUNDS}" for axis in ("x", "y")], errors="ignore")
+def _with_bounds(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a result that states the borders of the cells, as CF has them: the attributes of the centres hold."""
+    bounded = dataset.drop_vars([f"{axis}{BOUNDS}" for axis in ("x", "y")], errors="ignore")
     for axis in ("x", "y"):
         if axis in bounded.dims:
             edges = cell_edges(bounded[axis].values)
@@ -384,42 +385,24 @@ def quarantine(path: Path, problem: str) -> None:
         log.info("%s: is renamed to %s and computed again", path, aside.name)
 
 
-def open_result(path: str | Path, *, group: str = "") -> xr.Dataset:
+def open_result(path: str | Path) -> xr.Dataset:
     """Open a result; its fields are read when they are needed, in any thread or process.
-
-    First the checksum of the file is verified, which takes about 0.3 s for 1 GB. A file without a checksum, because
-    another program has changed it, is opened with a warning in the log, once per process.
 
     Parameters
     ----------
     path : path
         A file written by :func:`write_result`.
-    group : {"", "steps", "accuracy", "cost"}
-        Group to open: the root with surface, fields and histories at the kept times; every accepted step, over
-        ``step``; the parts of the stated error and bounds of the area; the computing cost of the rows. The root has the
-        others as ``ds.roughvisc.steps``, ``ds.roughvisc.accuracy`` and ``ds.roughvisc.cost``.
 
     Returns
     -------
     xarray.Dataset
-        Times are plain numbers in seconds. Files of earlier versions get the current names and groups.
+        Times are plain numbers in seconds. The history of all accepted steps is ``ds.roughvisc.steps``.
 
     Raises
     ------
     InputError
-        If the file is absent, not a NetCDF file, damaged, or not a result; or if there is no such group.
+        If the file is absent, not a NetCDF file, damaged, or not a result.
     """
-    root = _stored(path)
-    return group_of(root, group) if group else root
-
-
-def whole_result(path: str | Path) -> xr.Dataset:
-    """The same with all groups in one Dataset, as the package has it inside."""
-    return whole_of(_stored(path))
-
-
-def _stored(path: str | Path) -> xr.Dataset:
-    """Root of a result, which carries its groups."""
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
@@ -432,12 +415,6 @@ def _stored(path: str | Path) -> xr.Dataset:
         raise InputError(
             f"{path}: is not a NetCDF file, or is damaged: expected a result of roughvisc ({error})"
         ) from error
-    try:
-        if format_of(dataset.variables, dataset.attrs) < RESULT_FORMAT:
-            dataset = root_of(to_current(whole_of(dataset)))
-        attributes_of(dataset.attrs)
-    except ValueError as error:
-        raise error.prefixed(str(path)) from error
     found = _foreign(dataset)
     if found:
         dataset.close()
@@ -451,10 +428,9 @@ def _foreign(dataset: xr.Dataset) -> str:
     if absent := [name for name in AXES[rows].needed if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
     known = AXES[rows].variables
-    for part in (dataset, *groups_of(dataset).values()):
-        for name, variable in part.variables.items():
-            if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
-                return f"holds {name} as {variable.dtype}"
+    for name, variable in dataset.variables.items():
+        if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
+            return f"holds {name} as {variable.dtype}"
     if odd := [name for name in AXES[rows].needed if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):

@@ -18,7 +18,7 @@ from roughvisc.study.cost.estimate import ConvolutionTimer, solved_on, stages_of
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.quantities import Observable, observables_of
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.store import result_path, whole_result, write_result
+from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.trade.ladder import Setting, changed, duration_of, has_steps, shape_of
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables.axes import AXES
@@ -182,7 +182,7 @@ class TimedRuns:
             raise NotRun(text) from error
         if complaint := unconverged(dataset):
             raise NotRun(complaint)
-        with whole_result(self._path) as kept:
+        with open_result(self._path) as kept:
             dataset = kept.load()
         found = {one.name: (case.experiment().axis, one.of(dataset, case)) for one in self._derived}
         return Run(dataset.assign(found), took, steps, self._memory(case, dataset, steps), self._path.stat().st_size)

@@ -13,7 +13,6 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.formats import to_current
 from roughvisc.study.trade.recommend import require_same
 from roughvisc.units import quantity
 
@@ -52,7 +51,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
         If the file is absent or is something else.
     """
     try:
-        dataset = to_current(_read(path))
+        dataset = _read(path)
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be opened: {error}: expected a trade of roughvisc (.nc)") from error
     if not _holds_a_trade(dataset):

@@ -15,7 +15,7 @@ from roughvisc.labels import annotate
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import step_text
 from roughvisc.units import quantity as quantity_in
-from roughvisc.variables import VARIABLES, current_name
+from roughvisc.variables import VARIABLES
 
 #: The accuracies that are advised on unasked.
 TARGETS = (1e-2, 1e-3)
@@ -106,7 +106,6 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
 
 def known_quantity(quantity: str, known: Sequence[str], name: str) -> str:
     """The quantity, if it is one of those that are known by that name, or were before."""
-    quantity = current_name(quantity)
     if quantity not in known:
         raise InputError(f"{name}: found {quantity!r}: expected one of {', '.join(known)}")
     return quantity

@@ -9,11 +9,12 @@ from typing import Any
 import xarray as xr
 from rich.console import Group
 
+from roughvisc.labels import warnings_of
 from roughvisc.observables.leakage import closing_times
 from roughvisc.variables.axes import AXES, Axis, axis_of
 from roughvisc.variables.grid_errors import GRID_ERROR
 from roughvisc.variables.spots import CONDUCTANCES
-from roughvisc.views.console.tables import NOTES, accuracy_rows, number, readable, two_columns
+from roughvisc.views.console.tables import accuracy_rows, number, readable, two_columns
 
 #: Part of the friction force from which on a summary shows the force across the motion.
 _ACROSS = 0.05
@@ -55,7 +56,6 @@ def result_table(dataset: xr.Dataset) -> Group:
             if name in dataset and (dataset[name] != 0).any()
         ),
         *([("Shortest octave of waves", _octave(dataset))] if "last_octave_friction" in dataset else []),
-        *((label, dataset.attrs[note]) for note, label in NOTES.items() if note in dataset.attrs),
         # a file that another program has written may not state its cost
         *((f"Cost: {label}", f"{int(dataset[name].sum())}") for name, label in _COSTS.items() if name in dataset),
         *([("Cost: wall time", readable(float(dataset["wall_time"].max()), "s"))] if "wall_time" in dataset else []),
@@ -93,10 +93,6 @@ def _share(dataset: xr.Dataset, row: xr.Dataset) -> str:
     return share + (f"; {readable(float(counted), 'm^2')} counted" if counted is not None else "")
 
 
-def _slide_note(dataset: xr.Dataset, row: xr.Dataset) -> str:
-    return f": {row.attrs['slide_note']}" if row.attrs.get("slide_note") else ""
-
-
 def _force_error(dataset: xr.Dataset, row: xr.Dataset) -> str:
     known = "friction_force_error" in row
     return f", stated error {readable(float(row['friction_force_error']), 'N')}" if known else ""
@@ -122,7 +118,6 @@ def _known_to(name: str) -> Callable[[xr.Dataset, xr.Dataset], str]:
 _MORE: dict[str, Callable[[xr.Dataset, xr.Dataset], str]] = {
     "nominal_pressure": _highest,
     "contact_area": _share,
-    "sliding_distance": _slide_note,
     "friction_force": _force_error,
     "leak_rate": _closing,
     **{name: _known_to(name) for name in CONDUCTANCES},
@@ -143,4 +138,4 @@ def _across(row: xr.Dataset, where: str) -> list[tuple[str, Any]]:
 def _octave(dataset: xr.Dataset) -> str:
     """What the waves that a scan hardly resolves add, and what that means where it is much."""
     most = f"adds up to {100 * float(dataset['last_octave_friction'].max()):.2g} % of the friction"
-    return f"{most}: unresolved wavelengths may add as much again" if "octave_note" in dataset.attrs else most
+    return f"{most}: unresolved wavelengths may add as much again" if "octave" in warnings_of(dataset.attrs) else most

@@ -118,15 +118,12 @@ def plan_tables(costs: xr.Dataset) -> Group:
     return Group(*parts)
 
 
-#: What a result and a plan say in words.
-NOTES = {"body_note": "Body", "program_note": "Program"}
 #: What is modelled, shown once if it is the same in all cases.
 _MODELLED = {
     "boundary": "Boundary",
     "memory_model": "Memory of the material",
     "scheme": "Time",
-    "left_out": "Savings",
-    **NOTES,
+    "program_note": "Program",
     "audit": "Assumptions",
 }
 #: Cells of a grid on which several threads are used.

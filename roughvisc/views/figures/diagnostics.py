@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
 from roughvisc.units import unit_for
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures import style
@@ -28,8 +27,6 @@ _ERRORS = (
     ("grid_error_approach", "grid, approach", style.BLUE, 1.0),
     ("grid_error_gap", "grid, gap", style.VERMILION, 1.0),
 )
-#: Of results of earlier versions, which state one for pressure and approach.
-_FORMER = ("grid_error", "grid", style.SKY, 1.0)
 _COSTS = (("convolutions", "convolutions", style.BLUE), ("iterations", "iterations", style.SKY))
 #: Errors below this part of the largest are not shown.
 _FAINTEST = 1e-5
@@ -59,13 +56,12 @@ def diagnostics(dataset: xr.Dataset) -> Figure:
         If the Dataset is not one case's result, or holds neither cost nor accuracy.
     """
     require(dataset)
-    dataset, over = whole_of(dataset), axis_of(dataset.variables)
-    dataset = dataset.sortby(over)
+    dataset = dataset.sortby(axis_of(dataset.variables))
     steps = rows_of(steps_of(dataset))
     drawn = [
         (_draw_cost, any(name in dataset for name, _, _ in _COSTS)),
-        (_draw_steps, steps.size > 1 and f"step_{over}" in dataset),
-        (_draw_accuracy, any(name in dataset for name, _, _, _ in (*_ERRORS, _FORMER))),
+        (_draw_steps, steps.size > rows_of(dataset).size),
+        (_draw_accuracy, any(name in dataset for name, _, _, _ in _ERRORS)),
     ]
     chosen = [draw for draw, known in drawn if known]
     if not chosen:
@@ -114,7 +110,7 @@ def _draw_steps(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArra
 def _draw_accuracy(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.DataArray) -> None:
     """What the rows state of themselves."""
     floor, ceiling = math.inf, 0.0
-    for name, label, colour, width in (*_ERRORS, *([] if "grid_error_pressure" in dataset else [_FORMER])):
+    for name, label, colour, width in _ERRORS:
         if name not in dataset:
             continue
         rows, values = axis.unit(rows_of(dataset)), dataset[name].values.astype(float)

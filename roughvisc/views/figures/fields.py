@@ -23,7 +23,6 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Unit, in_si, unit_for
@@ -434,7 +433,7 @@ def _frame_texts(dataset: xr.Dataset, frames: list[int]) -> list[str]:
     axis = RowAxis.of(rows)
     texts = [axis.text(rows[frame]) for frame in frames]
     if AXES[str(rows.name)].telling == "friction_coefficient" and "friction_coefficient" in dataset:
-        arrow = _ARROWS[str(attributes_of(dataset.attrs).get("direction", "x"))]
+        arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
         shown = [_power(float(dataset["friction_coefficient"][frame])) for frame in frames]
         return [f"{arrow} {text}\nµ = {friction}" for text, friction in zip(texts, shown, strict=True)]
     if _stands_for_more(dataset) and not _nominal(dataset, frames):

@@ -10,7 +10,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
 from roughvisc.observables import history
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import NOT_CONVERGED, VARIABLES
@@ -133,7 +132,6 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     for name in [one for solved, theory, *_ in _DRAWN for one in (solved, theory)[: 1 + persson]]:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
             raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")
-    dataset = whole_of(dataset)
     ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
     across = unit_for(ordered["speed"].values, "m/s")
     told = {"computed": Line2D([], [], color="0.3")}

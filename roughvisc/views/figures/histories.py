@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of, whole_of
 from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
 from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
@@ -137,7 +136,6 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
         If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
     """
     require(dataset)
-    dataset = whole_of(dataset)
     over = axis_of(dataset.variables)
     dataset = dataset.sortby(over)
     steps = steps_of(dataset)
@@ -233,10 +231,9 @@ def hysteresis(dataset: xr.Dataset) -> Figure:
 
 def _end(dataset: xr.Dataset) -> str:
     """What the last point is, with the work that the result states."""
-    whole = whole_of(dataset)
-    if "work" not in whole:
+    if "work" not in dataset:
         return "end"
-    work = float(whole["work"][-1])
+    work = float(dataset["work"][-1])
     return f"end: {unit_for([work], 'J').text(work)} of work done"
 
 
@@ -362,9 +359,7 @@ def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     first, material = next(iter(cases.values())), stated[0].get("material")
     of_one_material = material is not None and all(one.get("material") == material for one in stated)
     rough = "height" in first and stated[0].get("surface", {}).get("generate") not in _SMOOTH
-    endless = (
-        first.attrs.get("boundary") == "periodic" and not {"thickness", "kernel"} & attributes_of(first.attrs).keys()
-    )
+    endless = first.attrs.get("boundary") == "periodic" and not {"thickness", "kernel"} & first.attrs.keys()
     if not (of_one_material and rough and endless):
         return {}
     known = material_of(first)

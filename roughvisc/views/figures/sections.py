@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
-from roughvisc.groups import attributes_of
+from roughvisc.labels import warnings_of
 from roughvisc.observables import contact
 from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
@@ -44,7 +44,7 @@ def _inner(dataset: xr.Dataset, count: int) -> np.ndarray:
     """Which lines of a direction are not at a seam: all of them, where the surface itself repeats."""
     inner = np.ones(count, dtype=bool)
     mirrored = MIRRORED in str(dataset.attrs.get("history", ""))
-    if ("border_note" in attributes_of(dataset.attrs) or mirrored) and count > 8:
+    if ("border" in warnings_of(dataset.attrs) or mirrored) and count > 8:
         margin = max(2, count // 16)
         inner[:margin] = inner[-margin:] = False
     return inner

@@ -16,7 +16,7 @@ from matplotlib.transforms import Bbox
 from roughvisc.errors import InputError
 from roughvisc.study.trade.ladder import format_tolerance, step_text
 from roughvisc.study.trade.recommend import WORDS, main_quantities, pareto_front, uncertainty
-from roughvisc.variables import VARIABLES, current_name
+from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
 
 #: family of settings -> marker and colour, told apart by either
@@ -77,7 +77,7 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
     known = main_quantities(dataset)
-    quantities = known[:2] if quantities is None else [current_name(name) for name in quantities]
+    quantities = known[:2] if quantities is None else list(quantities)
     for name in quantities:
         if name not in known:
             raise InputError(f"quantities holds {name!r}: expected some of {', '.join(known)}")

@@ -16,14 +16,14 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
+from roughvisc.labels import warnings_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.audit.limits import Finding
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write, verify_checksum
 from roughvisc.study.storage.index import index_of
-from roughvisc.study.storage.store import no_results, result_files, whole_result
+from roughvisc.study.storage.store import no_results, open_result, result_files
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
@@ -63,20 +63,6 @@ _SETTINGS = (
     "case_key",
 )
 _ORIGIN = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
-#: Attributes in which a result speaks of its limits.
-_NOTES = (
-    "model_note",
-    "material_note",
-    "program_note",
-    "slide_note",
-    "accuracy_note",
-    "octave_note",
-    "wake_note",
-    "slope_note",
-    "border_note",
-    "edge_note",
-    "body_note",
-)
 #: Headings, rows and notes of a table.
 Rows = tuple[list[str], list[list[str]], list[str]]
 #: Parameters shown, with the name of each.
@@ -154,9 +140,9 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
     if isinstance(source, xr.Dataset):
         require(source, axis_of(source), "x", "y")
-        yield whole_of(source)
+        yield source
     else:
-        with whole_result(source) as dataset:
+        with open_result(source) as dataset:
             yield dataset
 
 
@@ -181,7 +167,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
                 row["name"] += f" ({row['key'] or number + 1})"
             names.add(row["name"])
             if "time" in dataset.dims:
-                over = [name for name, one in dataset.data_vars.items() if one.dims in (("time",), ("step",))]
+                over = [name for name, one in dataset.data_vars.items() if one.dims == ("time",)]
                 histories[row["name"]] = dataset[over].load()
             if number not in pictured:
                 continue
@@ -223,7 +209,7 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
 
 def _order(source: Path) -> tuple[Any, ...]:
     """Cases by what was varied in them, numbers by size."""
-    with whole_result(source) as dataset:
+    with open_result(source) as dataset:
         case = json.loads(dataset.attrs.get("case", "{}"))
     values = (case.get("varied") or {}).values()
     numbers = ((0, value, "") if isinstance(value, int | float) else (1, 0.0, str(value)) for value in values)
@@ -259,7 +245,7 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
         "others": [[name, case_text.table_words(name, case[name])] for name in others],
         "settings": told(_SETTINGS),
         "origin": told(_ORIGIN),
-        "notes": [note for _, note in told(_NOTES)],
+        "warnings": list(warnings_of(dataset.attrs).values()),
         "audit": _audit(dataset),
         "history": str(dataset.attrs.get("history", "")).splitlines(),
         "toml": case_text.study_text(case) if case else "",

@@ -13,13 +13,11 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.groups import whole_of
-from roughvisc.labels import expect_current_names
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables import VARIABLES, current_name
+from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures import style
@@ -132,8 +130,8 @@ class Cases:
     Parameters
     ----------
     members : list of xarray.Dataset
-        Histories of each case over its own times and over its steps, or over the places on another axis; of
-        realisations of one case their mean.
+        Histories of each case over its own times, or over the places on another axis; of realisations of one case
+        their mean.
     parameters : list of Parameter
         What was varied, but what says the same as one before it.
     bands : list of Band or None
@@ -188,7 +186,7 @@ class Cases:
         InputError
             If a case has none of that name.
         """
-        quantity = self.area if quantity is None else current_name(quantity)
+        quantity = self.area if quantity is None else quantity
         if not self.lies_over_axis(quantity):
             known = [str(name) for name in self.members[0].data_vars if self.lies_over_axis(str(name))]
             raise InputError(f"quantity is {quantity!r}: expected a history of every case: {', '.join(known)}")
@@ -209,13 +207,12 @@ def cases_of(results: Any) -> Cases:
         If they are something else, or one case only.
     """
     if isinstance(results, xr.DataTree):
-        of_rows = [("step",), *((axis,) for axis in AXES)]
-        found = [whole_of(node.to_dataset()) for node in results.children.values()]
+        of_rows = [(axis,) for axis in AXES]
+        found = [node.to_dataset() for node in results.children.values()]
         members = [one[[name for name in one.data_vars if one[name].dims in of_rows]].load() for one in found]
     elif isinstance(results, xr.Dataset) and "case" in results.dims:
-        results = whole_of(results)
         over = [dim for dim in ("case", REALISATION) if dim in results.dims]
-        held = [name for name in results.data_vars if set(results[name].dims) <= {*over, "step", *AXES}]
+        held = [name for name in results.data_vars if set(results[name].dims) <= {*over, *AXES}]
         table = results[held].load()
         keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
         members = [table.isel(dict(zip(over, place, strict=True))) for place in np.argwhere(keys != "")]
@@ -223,8 +220,6 @@ def cases_of(results: Any) -> Cases:
         raise InputError(
             "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
         )
-    for member in members:
-        expect_current_names(member)
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
     scalars = [one for name, one in members[0].coords.items() if not one.dims and name not in _NO_PARAMETERS]

@@ -14,12 +14,9 @@ from matplotlib.patches import Patch
 
 from roughvisc.study.ensembles import statistics
 from roughvisc.study.statement.variation import ITSELF
-from roughvisc.variables import NOT_CONVERGED, STEPPED, of_step
+from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import axis_of
 
-#: Times of a mean over realisations, whose accepted steps all differ.
-_MOST_TIMES = 400
-_STEP_TIME = of_step("time")
 #: How the measured surface itself is drawn.
 ITSELF_STYLE = {"ls": (0, (4, 1.5)), "lw": 1.1}
 
@@ -50,17 +47,14 @@ def pooled(members: Sequence[xr.Dataset], numbers: Sequence[int]) -> tuple[xr.Da
     Parameters
     ----------
     members : sequence of xarray.Dataset
-        Histories of each, over rows of its own and over its steps.
+        Histories of each, over rows of its own.
     numbers : sequence of int
         Number of each realisation.
     """
     itself = next((one for one, number in zip(members, numbers, strict=True) if number == ITSELF), None)
     drawn = [one for one, number in zip(members, numbers, strict=True) if number != ITSELF] or list(members)
     rows = axis_of(drawn[0].variables)
-    parts = [_of_rows(drawn, rows)]
-    if all(_STEP_TIME in one for one in drawn):
-        parts.append(_of_steps(drawn))
-    mean, lower, upper = ({name: one for part in parts for name, one in part[i].items()} for i in range(3))
+    mean, lower, upper = _of_rows(drawn, rows)
     if itself is not None and not np.array_equal(itself[rows], mean[rows]):
         common = np.asarray(mean[rows].values)
         names = [str(name) for name, one in itself.data_vars.items() if one.dims == (rows,)]
@@ -79,40 +73,31 @@ def _of_rows(drawn: Sequence[xr.Dataset], rows: str) -> tuple[dict, dict, dict]:
         common = common[(common >= max(one.min() for one in places)) & (common <= min(one.max() for one in places))]
     held = (str(name) for name, one in drawn[0].data_vars.items() if one.dims == (rows,))
     names = [name for name in held if all(name in one for one in drawn)]
-    return _moments(drawn, names, rows, common, rows)
-
-
-def _of_steps(drawn: Sequence[xr.Dataset]) -> tuple[dict, dict, dict]:
-    """Histories of steps, which each realisation takes in its own way, at times of all of them."""
-    clocks = [one[_STEP_TIME].values for one in drawn]
-    common = np.unique(np.concatenate([clock[np.isfinite(clock)] for clock in clocks]))
-    common = common[np.unique(np.linspace(0, len(common) - 1, _MOST_TIMES).astype(int))] if common.size else common
-    names = [name for name in map(of_step, STEPPED) if all(name in one for one in drawn)]
-    return _moments(drawn, names, _STEP_TIME, common, "step")
+    return _moments(drawn, names, rows, common)
 
 
 def _moments(
-    drawn: Sequence[xr.Dataset], names: Sequence[str], clock: str, common: np.ndarray, dim: str
+    drawn: Sequence[xr.Dataset], names: Sequence[str], rows: str, common: np.ndarray
 ) -> tuple[dict, dict, dict]:
     """Mean and band of some histories at common places, and these."""
-    mean, lower, upper = ({clock: xr.Variable(dim, common, drawn[0][clock].attrs)} for _ in range(3))
+    mean, lower, upper = ({rows: xr.Variable(rows, common, drawn[0][rows].attrs)} for _ in range(3))
     for name in names:
         attrs = drawn[0][name].attrs
         if "flag_values" in attrs:
-            told = np.array([_at(one, name, clock, common, nearest=True) for one in drawn])
+            told = np.array([_at(one, name, rows, common, nearest=True) for one in drawn])
             bad = (told == NOT_CONVERGED).any(axis=0)  # the worst that any of them tells
-            mean[name] = xr.Variable(dim, np.where(bad, NOT_CONVERGED, told[0]), attrs)
+            mean[name] = xr.Variable(rows, np.where(bad, NOT_CONVERGED, told[0]), attrs)
             continue
-        found = statistics(np.array([_at(one, name, clock, common) for one in drawn], dtype=float))
-        mean[name] = xr.Variable(dim, found["mean"], attrs)
-        lower[name] = xr.Variable(dim, found["patch_lower"], attrs)
-        upper[name] = xr.Variable(dim, found["patch_upper"], attrs)
+        found = statistics(np.array([_at(one, name, rows, common) for one in drawn], dtype=float))
+        mean[name] = xr.Variable(rows, found["mean"], attrs)
+        lower[name] = xr.Variable(rows, found["patch_lower"], attrs)
+        upper[name] = xr.Variable(rows, found["patch_upper"], attrs)
     return mean, lower, upper
 
 
-def _at(member: xr.Dataset, name: str, clock: str, common: np.ndarray, nearest: bool = False) -> np.ndarray:
+def _at(member: xr.Dataset, name: str, rows: str, common: np.ndarray, nearest: bool = False) -> np.ndarray:
     """Values of a history at some places."""
-    places, values = member[clock].values, member[name].values
+    places, values = member[rows].values, member[name].values
     known = np.isfinite(places)
     places, values = places[known], values[known]
     order = np.argsort(places, kind="stable")

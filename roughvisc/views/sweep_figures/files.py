@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.variables.axes import AXES
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.files import write_figure
@@ -45,7 +45,7 @@ def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
     """Name for the files and words for the title of each result that states its case; other files are left out."""
     cases = {}
     for path in paths:
-        with suppress(InputError, ValueError), whole_result(path) as dataset:
+        with suppress(InputError, ValueError), open_result(path) as dataset:
             cases[str(path)] = json.loads(dataset.attrs["case"]) if "case" in dataset.attrs else {}
     stems = file_stems({Path(path).stem: case for path, case in cases.items()})
     return {Path(path): (stems[Path(path).stem], case_words(case)) for path, case in cases.items()}

@@ -35,7 +35,7 @@ def test_power_law__jumps_by_what_is_there_at_once(material):
     times = [0.0, 1e-6, 1e-3, 1.0, 10.0]
     found, ds = sunk(material, rv.Program().load(2.0, over=0).hold(10.0), times)
     assert found == pytest.approx(2.0 * material.contact_compliance(times), rel=1e-3, abs=0)
-    assert f"at once and from {1e-4 * 1e-6:.1g} s" in ds.roughvisc.attributes["memory"]
+    assert f"at once and from {1e-4 * 1e-6:.1g} s" in ds.attrs["memory"]
 
 
 @pytest.mark.parametrize("first", [(), (0.0,)])
@@ -44,7 +44,7 @@ def test_table__jumps_by_what_is_there_at_once(first):
     table = rv.Tabulated(t, creep(t))
     times = [0.0, 1e-4, 1.0, 10.0]
     found, ds = sunk(table, rv.Program().load(2.0, over=0).hold(10.0), times, tolerance=1e-2)
-    assert 0 < ds.roughvisc.attributes["series_error"] <= 1e-3
+    assert 0 < ds.attrs["series_error"] <= 1e-3
     assert found == pytest.approx(2.0 * table.contact_compliance(times), rel=2e-3, abs=0)
 
 
@@ -66,7 +66,7 @@ def test_short_ramp_before_a_long_hold__is_resolved(material):
     exact = closed_forms.punch_approach(1.0, material, program, times)
     scale = closed_forms.punch_approach(1.0, rv.elastic(0.25), rv.Program().load(1.0, over=0), [0.0])
     assert found == pytest.approx(exact / scale, rel=1e-3, abs=0)
-    assert ds.roughvisc.attributes["series_error"] <= 1e-4
+    assert ds.attrs["series_error"] <= 1e-4
 
 
 def test_sphere__follows_lee_and_radok_from_the_jump_on():
@@ -90,8 +90,8 @@ def test_wide_table__runs_in_seconds():
     began = time.perf_counter()
     ds = rv.simulate(ball, table, program, times=[0.1, 1.0], tolerance=1e-4, fields=(), progress=False)
     assert time.perf_counter() - began < 20
-    assert "made passive: deviates from the rows by at most 0.0" in ds.roughvisc.attributes["memory"]
-    assert ds.roughvisc.attributes["series_error"] == 0
+    assert "made passive: deviates from the rows by at most 0.0" in ds.attrs["memory"]
+    assert ds.attrs["series_error"] == 0
 
 
 def test_noisy_table__dissipates():
@@ -101,7 +101,7 @@ def test_noisy_table__dissipates():
     times = np.append(0, np.geomspace(1e-4, 10.0, 40))
     _, ds = sunk(table, rv.Program().approach(1.0, over=0).hold(10.0), times)
     assert (np.diff(ds.force.values) < 0).all()
-    assert "made passive" in ds.roughvisc.attributes["memory"]
+    assert "made passive" in ds.attrs["memory"]
 
 
 def test_shortest_age__follows_from_the_shortest_interval():

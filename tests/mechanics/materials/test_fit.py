@@ -137,5 +137,5 @@ def test_moduli_at_odds__are_said_in_the_result(caplog):
     material = from_dynamic(omega, storage, 2 * loss, frequency_unit="rad/s")
     program = rv.Program().load(1e-4, over=0)
     ds = rv.simulate(rv.sphere(1e-3, 2e-4, 15), material, program, progress=False)
-    assert "measurement: storage and loss moduli are at odds" in ds.attrs["notes"]
+    assert "material: storage and loss moduli are at odds" in ds.attrs["warnings"]
     assert "at odds" in caplog.text

@@ -215,7 +215,7 @@ def test_row_right_after_a_corner__is_judged():
     )
     off = np.abs(coarse.force - fine.force).values
     assert off[-1] < 1e-2 * float(fine.force.max())
-    assert np.all(off <= coarse.roughvisc.accuracy.force_error.values / 0.8)
+    assert np.all(off <= coarse.force_error.values / 0.8)
 
 
 @pytest.mark.parametrize("what", ["triangle", "pulled"])

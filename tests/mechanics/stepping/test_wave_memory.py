@@ -39,7 +39,7 @@ def test_equal_materials__are_a_half_space(control):
     found, expected = (
         pressed(body, program=program, boundary="periodic") for body in (rv.layer(RUBBER, 1e-4, on=SAME), RUBBER)
     )
-    assert "that all waves share" in found.roughvisc.attributes["memory"]
+    assert "that all waves share" in found.attrs["memory"]
     assert off(found, expected) < TOLERANCE
     np.testing.assert_allclose(found["approach"][1:], expected["approach"][1:], rtol=TOLERANCE)
     assert float(found["stated_error"].max()) <= TOLERANCE
@@ -55,7 +55,6 @@ def test_mirrored_surface__is_solved_on_a_quarter():
     body = rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7))
     shifted = MIRRORED.roll(x=1, roll_coords=False)
     found, expected = (pressed(body, height=height, boundary="periodic") for height in (MIRRORED, shifted))
-    assert "mirror images" in found.roughvisc.attributes["left_out"]
     np.testing.assert_allclose(found["contact_area_counted"], expected["contact_area_counted"])
     assert off(found, expected.roll(x=-1, roll_coords=False)) < TOLERANCE
 
@@ -158,18 +157,10 @@ def test_slide__dissipates_in_both_bodies_what_friction_does_in_the_steady_state
     np.testing.assert_allclose(lost.sum(), (slid * (friction[1:] + friction[:-1]) / 2).sum(), rtol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("thickness", "expected"),
-    [
-        (1e-12, "half-space of the lowest material alone would be accurate enough"),
-        (1e-4, "The layers matter"),
-        (1e2, "half-space of the top layer alone would be accurate enough: it differs by at most 0 %"),
-    ],
-)
-def test_body_note__says_whether_one_material_would_do(thickness, expected):
+@pytest.mark.parametrize("thickness", [1e-12, 1e2])
+def test_thin_and_thick_layers__are_half_spaces_of_one_material(thickness):
     base = rv.elastic(1e7)
     found = pressed(rv.layer(RUBBER, thickness, on=base), boundary="periodic")
-    assert expected in found.roughvisc.attributes["body_note"]
     assert rv.audit(found)["thickness"].sentence.startswith("Modelled: layer(zener(")
     for alone, at in ((base, 1e-12), (RUBBER, 1e2)):
         if thickness == at:

@@ -432,7 +432,7 @@ def test_border__says_what_the_note_of_the_result_says(rough):
     assert rv.audit(rough)["border"].verdict == "holds"
     heights = rough.height + 2e-5 * rough.x / 1e-3
     ds = rv.simulate(heights, RUBBER, rv.Program().pressure(2e4, over=1.0), boundary="periodic", **QUICK)
-    assert "border_note" in ds.roughvisc.attributes
+    assert "border:" in ds.attrs.get("warnings", "")
     assert rv.audit(ds)["border"].verdict in ("doubtful", "broken")
     mirrored = rv.simulate(
         rv.mirror(heights), RUBBER, rv.Program().pressure(2e4, over=1.0), boundary="periodic", **QUICK
@@ -518,7 +518,7 @@ def test_curve_of_friction__is_judged_by_its_speeds():
     rise = cf.flash_temperature(power / float(row.contact_area), radius, 0.1, 0.2, 2e6)
     assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise)
     passing = float(np.ptp(wave.x.values)) / 1e-3
-    assert slow.roughvisc.attributes["compliance_at_end"] == rubber.contact_compliance(passing)
+    assert slow.attrs["compliance_at_end"] == rubber.contact_compliance(passing)
 
 
 def test_audit__takes_units_and_shows_itself(ball):
@@ -606,7 +606,7 @@ def test_result__of_before_is_audited_by_its_case(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(AUDITED)
     with open_result(run_case(read_study(path), tmp_path)) as ds:
-        known = ds.roughvisc.attributes
+        known = ds.attrs
         old = ds.drop_attrs(deep=False).assign_attrs({name: known[name] for name in ("case", "boundary", "recipe")})
         assert [one.number for one in rv.audit(old)] == pytest.approx([o.number for o in rv.audit(ds)], nan_ok=True)
 

@@ -315,7 +315,7 @@ def test_budget__reads_what_a_result_states_of_its_grid(tmp_path):
     study = case(BALL, tmp_path, **{"solve.grid_error": True, "program.0.over": "1 s", "keep.times": [0.5, 1.0, 2.0]})
     result = rv.run(study, out=tmp_path / "results", progress=False)
     found = budgets(result, ["contact_area", "approach"], at=[0.5, 2.0], workers=0, progress=False)
-    accuracy = result.roughvisc.accuracy
+    accuracy = result
     for name, variable in (("contact_area", "grid_error_area"), ("approach", "grid_error_approach")):
         part = accuracy[variable].values * float(result[name].max()) / result[name].values
         stated_width = found[name]["half_width"].sel(source="grid")
@@ -342,7 +342,7 @@ def test_budget__reads_the_last_octave_that_a_curve_states(tmp_path):
         np.testing.assert_allclose(one["half_width"].sel(octave), solved[name]["half_width"].sel(octave), rtol=0.1)
         assert (one["direction"].sel(octave) == solved[name]["direction"].sel(octave)).all()
         assert "as the result states" in str(one["method"].sel(octave).values)
-    stated_grid = np.log1p(result.roughvisc.accuracy["grid_error_friction"].values)
+    stated_grid = np.log1p(result["grid_error_friction"].values)
     np.testing.assert_allclose(found["friction_coefficient"]["half_width"].sel(source="grid"), stated_grid, rtol=1e-6)
     other = rv.budget(result, "leak_rate", **QUIET)  # which the result states nothing of
     assert float(other["cost"].sel(source="grid")) > 0

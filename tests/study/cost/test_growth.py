@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 from rich.console import Console
-from support import BALL, run_whole
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError
@@ -109,7 +109,7 @@ def test_plan__foresees_the_grid_in_the_end_and_the_work_till_then(study, convol
     assert np.max([step.width for step in found.course], axis=0) == pytest.approx(found.pressed.width)
     foreseen = solved_on(stages_of(profile, grows=True), found)
     convolved.clear()
-    ds = run_whole(case, progress=False)
+    ds = rv.run(case, progress=False)
     final = (ds.sizes["x"], ds.sizes["y"])
     assert (int(planned.final_cells_x), int(planned.final_cells_y)) == final
     assert final[0] > 1.5 * height.sizes["x"]
@@ -185,7 +185,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
         costs
     )
     with pytest.raises(EdgeContactError):
-        run_whole(rough, progress=False)
+        rv.run(rough, progress=False)
 
 
 def test_grid_that_would_grow_too_large__is_foreseen(study, monkeypatch):
@@ -197,4 +197,4 @@ def test_grid_that_would_grow_too_large__is_foreseen(study, monkeypatch):
     assert (int(costs.final_cells_x[0]), int(costs.final_cells_y[0])) == (36, 36)
     assert "Contact is expected to reach the border" in costs.border_warning.item()
     with pytest.raises(EdgeContactError):
-        run_whole(case, progress=False)
+        rv.run(case, progress=False)

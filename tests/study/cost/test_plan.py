@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rich.console import Console
-from support import BALL, run_whole
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.api import simulate
@@ -89,7 +89,7 @@ def study(tmp_path):
 def test_plan__expects_about_the_steps_and_convolutions_that_are_taken(study, changes):
     case = vary(study(ROUGH)[0], changes)
     planned = rv.plan([case])
-    ds = run_whole(case, progress=False)
+    ds = rv.run(case, progress=False)
     if case.settings.keep.times == "all":
         assert float(planned.steps[0]) == pytest.approx(ds.sizes["time"], rel=0.2)
     assert 0.6 < float(planned.convolutions[0]) / int(ds.convolutions.sum()) < 1.8
@@ -118,7 +118,7 @@ def test_plan__foresees_a_long_march_from_a_part_of_it(study, monkeypatch):
     assert 1 / 3 < ratio < 3, "the steps of a hold grow, which its beginning does not tell"
 
 
-def test_plan__names_what_is_modelled_and_what_is_left_out(study):
+def test_plan__names_what_is_modelled(study):
     base = study(ROUGH)[0]
     cases = [
         base,
@@ -135,11 +135,6 @@ def test_plan__names_what_is_modelled_and_what_is_left_out(study):
     assert list(planned.exponentials.values[:2]) == [1, 0]
     assert int(planned.exponentials[2]) > 3
     assert list(planned.cells_x.values) == [90] * 5
-    assert "gap and displacement: not kept" in str(planned.left_out[0].item())
-    assert "padding" in str(planned.left_out[0].item())
-    assert "past pressures: remembered by 1 exponential, at no cost" in str(planned.left_out[0].item())
-    assert "past pressures: not needed, the material is elastic" in str(planned.left_out[1].item())
-    assert "pressure and displacement: not kept" in str(planned.left_out[3].item())
     assert str(planned.scheme[4].item()).startswith("the seed paper's")
     assert (planned.refusal == "").all()
     assert planned.attrs["refusal"] == ""
@@ -266,11 +261,7 @@ def test_plan__counts_the_window_that_follows_a_small_contact(study):
     (case,) = study(text)
     whole = vary(case, {"solve.edge": "accept"})
     planned = rv.plan([case, whole])
-    assert "too deep to be touched" in str(planned.left_out.values[0])
-    assert "too deep" not in str(planned.left_out.values[1])
     assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
-    ds = run_whole(case, progress=False)
-    assert ds.roughvisc.attributes["left_out"] == planned.left_out.values[0]
 
 
 def said_of(planned):
@@ -283,7 +274,7 @@ def test_plan__says_how_much_comes_into_contact(study):
     """On the surface's own cells: what it says is what the run has."""
     cases = [study(ROUGH)[0], vary(study(ROUGH)[0], {"program.0.load": "5 N"})]
     planned = rv.plan(cases)
-    taken = [float(run_whole(case, progress=False).contact_fraction.max()) for case in cases]
+    taken = [float(rv.run(case, progress=False).contact_fraction.max()) for case in cases]
     assert taken[0] < 0.3 < 0.99 < taken[1]
     assert planned.contact_fraction.values == pytest.approx(taken, rel=0.02)
     low, high = (f"{float(f'{100 * one:.2g}'):g}" for one in planned.contact_fraction.values)
@@ -306,7 +297,7 @@ def test_plan__says_how_much_comes_into_contact(study):
 def test_contact__of_a_program_is_that_of_the_run(study, program):
     """The largest contact is not that at the end, nor that of the relaxed material."""
     case = vary(study(ROUGH)[0], {"program": program})
-    planned, taken = rv.plan([case]), run_whole(case, progress=False).contact_fraction
+    planned, taken = rv.plan([case]), rv.run(case, progress=False).contact_fraction
     assert float(planned.contact_fraction[0]) == pytest.approx(float(taken.max()), rel=0.03)
 
 
@@ -345,7 +336,7 @@ def test_contact__of_a_case_that_was_not_marched_is_not_known(study, monkeypatch
 def test_plan__means_by_contact_fraction_what_a_result_means(study):
     """The surface is as coarse as the plan's own grid, so that the plan presses what the run does."""
     case = study(ROUGH.replace("[90, 108]", "[33, 31]").replace("50 um", "100 um"))[0]
-    touching = run_whole(case, progress=False).pressure.values > 0
+    touching = rv.run(case, progress=False).pressure.values > 0
     faces = sum((touching & ~np.roll(touching, turn, axis)).sum((1, 2)) for axis in (1, 2) for turn in (1, -1))
     share = (touching.sum((1, 2)) - 0.088 * faces) / (33 * 31)
     found = float(rv.plan([case]).contact_fraction[0])
@@ -370,7 +361,7 @@ def test_disk__of_a_contact_that_is_small_at_most_kept_times(study, tmp_path):
         assert old in text
         text = text.replace(old, new)
     cases = study(text)
-    path = run_whole(cases[0], tmp_path / "out", progress=False).encoding["source"]
+    path = rv.run(cases[0], tmp_path / "out", progress=False).encoding["source"]
     assert float(rv.plan(cases).disk[0]) == pytest.approx(pathlib.Path(path).stat().st_size, rel=0.3)
 
 

@@ -17,7 +17,6 @@ from support import LOADS, LONG, assert_same, numbers
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError, InputError, InUseError, RoughviscError
-from roughvisc.groups import whole_of
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, has_other_versions
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
@@ -213,7 +212,7 @@ def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
         assert killed.victims
         wanted = sweep(cases[:2], tmp_path / "calm", client, progress=False)
     assert ds.sizes["case"] == 2
-    xr.testing.assert_equal(whole_of(ds).drop_vars("wall_time").load(), whole_of(wanted).drop_vars("wall_time").load())
+    xr.testing.assert_equal(ds.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
 
 
 @pytest.mark.thorough

@@ -6,14 +6,14 @@ import logging
 
 import pytest
 import xarray as xr
-from support import BALL, run_whole, simulate_whole
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 
 
 @pytest.fixture
@@ -24,11 +24,11 @@ def study(tmp_path):
 
 
 def test_run__keeps_a_file_that_is_whole_in_itself(study):
-    ds = run_whole(study, progress=False)
+    ds = rv.run(study, progress=False)
     case = read_study(study)
     path = study.parent / "results" / "ball" / f"{case.key}.nc"
     assert ds.encoding["source"] == str(path)
-    with whole_result(path) as read:
+    with open_result(path) as read:
         xr.testing.assert_identical(read.load().drop_encoding(), ds.drop_encoding())
         assert {name: read.sizes[name] for name in ("time", "x", "y")} == {"time": 3, "x": 24, "y": 21}
         assert read.attrs["title"] == "A ball"
@@ -36,27 +36,27 @@ def test_run__keeps_a_file_that_is_whole_in_itself(study):
         assert "generated: sphere\n" in read.attrs["history"]
         assert read.attrs["history"].endswith("run of ball.toml")
         assert read.attrs["case_key"] == case.key
-        assert read.roughvisc.attributes["surface_sha256"] == case.surface_sha256
+        assert read.attrs["surface_sha256"] == case.surface_sha256
         assert (read.attrs["boundary"], read.attrs["tolerance"]) == ("free", 1e-3)
         again = Case.from_json(read.attrs["case"])
     assert again == case
     xr.testing.assert_equal(
-        run_whole(again, study.parent / "other", progress=False).drop_vars("wall_time"), ds.drop_vars("wall_time")
+        rv.run(again, study.parent / "other", progress=False).drop_vars("wall_time"), ds.drop_vars("wall_time")
     )
 
 
 def test_finished_case__is_reused_by_another_commit(study, monkeypatch, solved_on):
-    run_whole(study, progress=False)
+    rv.run(study, progress=False)
     solved = len(solved_on)
     monkeypatch.setattr(importlib.metadata, "version", lambda name: "0.1.dev999+gabcdef0")
     assert rv.__version__ == "0.1.dev999+gabcdef0"
-    run_whole(study, progress=False)
+    rv.run(study, progress=False)
     assert len(solved_on) == solved > 0
 
 
 def test_run__equals_simulate(study):
-    ds = run_whole(study, progress=False)
-    direct = simulate_whole(
+    ds = rv.run(study, progress=False)
+    direct = rv.simulate(
         rv.level(rv.sphere(10e-3, 1e-3, (24, 21)), 0),
         rv.zener(3e6, 1e6, 1e5),
         rv.Program().load(5e-3, over=0).hold(0.2),
@@ -70,14 +70,14 @@ def test_run__equals_simulate(study):
 
 def test_run__reports_progress(study):
     reached = []
-    run_whole(study, progress=lambda now, end: reached.append((now, end)))
+    rv.run(study, progress=lambda now, end: reached.append((now, end)))
     assert reached == sorted(reached)
     assert reached[-1] == (0.2, 0.2)
 
 
 def test_run__says_what_was_varied(study):
     study.write_text(BALL + '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]')
-    ds = run_whole(read_cases(study)[1], progress=False)
+    ds = rv.run(read_cases(study)[1], progress=False)
     assert ds.attrs["title"] == "A ball, program.0.load = 0.006"
     assert json.loads(ds.attrs["case"])["varied"] == {"program.0.load": 0.006}
     assert float(ds.force[-1]) == pytest.approx(6e-3, rel=1e-8)
@@ -86,25 +86,25 @@ def test_run__says_what_was_varied(study):
 def test_run__writes_nothing_where_the_input_is_wrong(study):
     case = vary(read_study(study), {"program.0.load": 50.0})
     with pytest.raises(EdgeContactError, match=r"ball\.toml: .*periodic"):
-        run_whole(case, progress=False)
+        rv.run(case, progress=False)
     assert [p.name for p in study.parent.iterdir()] == ["ball.toml"]
 
 
 def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):
     with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
-        run_whole(study, progress=False)
+        rv.run(study, progress=False)
     (path,) = (study.parent / "results" / "ball").iterdir()
     assert "1 of 3 kept times did not converge, first at t = 100 ms" in str(caught.value)
     assert str(path) in str(caught.value)
     assert "did not converge" in caplog.text
-    with whole_result(path) as ds:
+    with open_result(path) as ds:
         assert list(ds.status.values) == [0, 1, 0]
 
 
 def test_run__rounds_the_fields_as_the_study_says(study):
-    exact = run_whole(study, progress=False)
+    exact = rv.run(study, progress=False)
     study.write_text(BALL + "precision = 1e-3\n")
-    rounded = run_whole(study, progress=False)
+    rounded = rv.run(study, progress=False)
     assert rounded.attrs["case_key"] != exact.attrs["case_key"]
     assert rounded.pressure.attrs["relative_precision"] == 1e-3
     assert not rounded.pressure.equals(exact.pressure)

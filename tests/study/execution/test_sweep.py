@@ -21,7 +21,6 @@ from support import BALL, LONG, assert_same, numbers
 
 import roughvisc as rv
 from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
-from roughvisc.groups import whole_of
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.cluster import connect
@@ -83,9 +82,7 @@ def test_sweep__same_bits_here_and_on_workers_and_on_a_cluster(study, tmp_path, 
     assert len(wanted) == 4
     for name, ds in (("one", one), ("several", several), ("remote", remote)):
         assert_same(numbers(tmp_path / name), wanted)
-        xr.testing.assert_equal(
-            whole_of(ds).drop_vars("wall_time").load(), whole_of(here).drop_vars("wall_time").load()
-        )
+        xr.testing.assert_equal(ds.drop_vars("wall_time").load(), here.drop_vars("wall_time").load())
         assert leftovers(tmp_path / name) == []
 
 
@@ -120,9 +117,7 @@ def test_sweep__on_a_cluster_takes_the_scan_along(study, tmp_path, by_hand):
     xr.testing.assert_equal(packed.height(), cases[0].height())
     with connect(file=by_hand) as client:
         found = sweep(cases, tmp_path / "there", client, progress=False)
-    xr.testing.assert_equal(
-        whole_of(found).drop_vars("wall_time").load(), whole_of(wanted).drop_vars("wall_time").load()
-    )
+    xr.testing.assert_equal(found.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
     with open_result(tmp_path / "there" / f"{cases[0].key}.nc") as ds:
         assert str(tmp_path / "there" / "inputs") in ds.attrs["case"]
 

@@ -4,7 +4,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, run_whole
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.study.statement.case import read_study, vary
@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
 def test_file__of_a_varied_case_is_labelled(tmp_path):
     (tmp_path / "ball.toml").write_text(SMALL)
     case = vary(read_study(tmp_path / "ball.toml"), {"program.0.load": "2 mN", "program.1": {"hold": "0.3 s"}})
-    path = run_whole(case, tmp_path, progress=False).encoding["source"]
+    path = rv.run(case, tmp_path, progress=False).encoding["source"]
     with xr.open_dataset(path) as ds:  # by xarray as it comes
         scalar = {name: one.item() for name, one in ds.coords.items() if not one.dims}
         assert ds.attrs["case_key"] == case.key
@@ -52,7 +52,7 @@ def test_file__of_a_varied_case_is_labelled(tmp_path):
 
 def test_file__of_a_plain_case_has_no_labels(tmp_path):
     (tmp_path / "ball.toml").write_text(SMALL)
-    with run_whole(tmp_path / "ball.toml", tmp_path, progress=False) as ds:
+    with rv.run(tmp_path / "ball.toml", tmp_path, progress=False) as ds:
         assert [name for name, one in ds.coords.items() if not one.dims] == []
 
 

@@ -18,7 +18,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from support import run_whole
 
 import roughvisc as rv
 from roughvisc.errors import InUseError
@@ -40,7 +39,7 @@ from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage import lock as lock_module
 from roughvisc.study.storage.checkpoint import CheckpointWriter, RowFile, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 
 
 def loaded(path, key):
@@ -146,7 +145,7 @@ def case_of(text, folder):
 
 def values(path):
     """All variables but wall_time, to the last bit."""
-    with whole_result(path) as ds:
+    with open_result(path) as ds:
         loaded = ds.drop_vars("wall_time").load().variables
         return {str(name): (v.dims, v.dtype, v.values.tobytes()) for name, v in loaded.items()}
 
@@ -490,7 +489,7 @@ def test_finished_case__is_not_run_again(whole, tmp_path, monkeypatch):
 
     monkeypatch.setattr(run_module, "solve", computed)
     assert run_case(case, tmp_path) == path
-    xr.testing.assert_identical(run_whole(case, tmp_path).load(), whole_result(path).load())
+    xr.testing.assert_identical(rv.run(case, tmp_path).load(), open_result(path).load())
     # killed after the result was in place, before all else was gone
     for left in (f".{case.key}.unfinished/rows", f".{case.key}.lock", f".{case.key}.0f0f0f0f.part.nc"):
         (tmp_path / left).parent.mkdir(exist_ok=True)
@@ -542,13 +541,13 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     path = run_case(case, tmp_path, stop=stop)
     assert stop.asked == steps - steps // 2
     assert not caplog.records
-    with whole_result(path) as mixed:
-        assert mixed.roughvisc.attributes["transforms"] == f"{here}; then {there}"
+    with open_result(path) as mixed:
+        assert mixed.attrs["transforms"] == f"{here}; then {there}"
         force = mixed.pressure.sum(("x", "y")).values
     assert run_case(case, tmp_path, stop=stop) == path
     assert stop.asked == steps - steps // 2, "it is finished"
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
-    with whole_result(run_case(case, tmp_path / "scipy")) as same:
+    with open_result(run_case(case, tmp_path / "scipy")) as same:
         np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
 
 

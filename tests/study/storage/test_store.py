@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from sample_results import hertz_creep, rough_creep
-from support import simulate_whole
 from xarray.core.indexing import LazilyIndexedArray
 
 import roughvisc as rv
@@ -15,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.storage import checkpoint as records
 from roughvisc.study.storage import store
 from roughvisc.study.storage.files import atomic_write
-from roughvisc.study.storage.store import may_be_missing, whole_result, write_result
+from roughvisc.study.storage.store import may_be_missing, open_result, write_result
 
 #: What the seed paper's algorithm, or the direct history, leaves unsaid.
 MISSING = {
@@ -28,7 +27,6 @@ MISSING = {
         "contact_area_solver_upper",
     ),
 }
-MISSING_AT_STEPS = {"step_stored_energy", "step_dissipated_energy", "step_time_error"}
 
 
 def test_missing__is_declared_where_it_occurs():
@@ -37,11 +35,11 @@ def test_missing__is_declared_where_it_occurs():
     found = set()
     for rare in ({"method": "seed", "time_step": 0.01}, {"memory": "direct"}, {"time_step": 0.02}):
         numerics = rv.Numerics(**rare)
-        ds = simulate_whole(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, numerics=numerics)
+        ds = rv.simulate(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, numerics=numerics)
         missing = {str(name) for name in ds.variables if ds[name].isnull().any()}
         assert all(ds[name].isnull().all() for name in missing), "throughout"
         found |= missing
-    assert found == MISSING | MISSING_AT_STEPS
+    assert found == MISSING
     assert all(map(may_be_missing, found))
 
 
@@ -49,7 +47,7 @@ def test_write_result__gives_the_same_numbers_back(tmp_path):
     written = rough_creep(shape=(21, 34), frames=5)
     path = write_result(written, tmp_path / "new" / "result.nc")
     assert [p.name for p in path.parent.iterdir()] == ["result.nc"]
-    with whole_result(path) as read:
+    with open_result(path) as read:
         assert read["pressure"].encoding["chunksizes"] == (5, 21, 34)
         assert not read["pressure"]._in_memory
         xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
@@ -120,19 +118,19 @@ def test_whole_file__appears_at_the_end_only(tmp_path):
 
 def test_open_result__refuses_what_is_none(tmp_path):
     with pytest.raises(InputError, match="does not exist: expected a result"):
-        whole_result(tmp_path / "none.nc")
+        open_result(tmp_path / "none.nc")
     with pytest.raises(InputError, match="is a folder"):
-        whole_result(tmp_path)
+        open_result(tmp_path)
     (tmp_path / "text.nc").write_text("hello")
     with pytest.raises(InputError, match="is not a NetCDF file, or is damaged"):
-        whole_result(tmp_path / "text.nc")
+        open_result(tmp_path / "text.nc")
     whole = write_result(hertz_creep((30, 40), 4), tmp_path / "whole.nc").read_bytes()
     (tmp_path / "torn.nc").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="is not a NetCDF file, or is damaged"):
-        whole_result(tmp_path / "torn.nc")
+        open_result(tmp_path / "torn.nc")
     xr.Dataset({"rain": ("time", np.arange(3.0))}).to_netcdf(tmp_path / "weather.nc")
     with pytest.raises(InputError, match="holds no time, force, approach: expected a result of roughvisc"):
-        whole_result(tmp_path / "weather.nc")
+        open_result(tmp_path / "weather.nc")
 
 
 @pytest.mark.parametrize("precision", [0.3, 1e-2, 1e-4, 1e-9])
@@ -140,7 +138,7 @@ def test_precision__is_kept_and_said(tmp_path, precision):
     exact = rough_creep(shape=(21, 34), frames=5)
     exact["gap"][2, 3, 4] = np.nan
     path = write_result(exact, tmp_path / "rounded.nc", precision=precision)
-    with whole_result(path) as rounded:
+    with open_result(path) as rounded:
         for name in ("pressure", "gap"):
             found, true = rounded[name].values, exact[name].values
             np.testing.assert_allclose(found, true, rtol=precision, atol=0)
@@ -150,7 +148,7 @@ def test_precision__is_kept_and_said(tmp_path, precision):
             assert "bits of the fraction" in rounded[name].attrs["quantization"]
         xr.testing.assert_identical(rounded["force"].load().drop_attrs(), exact["force"].drop_attrs())
         assert "relative_precision" not in rounded["height"].attrs
-    with whole_result(write_result(exact, tmp_path / "exact.nc")) as kept:
+    with open_result(write_result(exact, tmp_path / "exact.nc")) as kept:
         assert "relative_precision" not in kept["gap"].attrs
         np.testing.assert_array_equal(kept["gap"].values, exact["gap"].values)
 
@@ -163,9 +161,9 @@ def test_precision__is_to_nearest_and_uses_all_it_may(tmp_path, precision):
     for name in ("pressure", "gap"):  # with a fill value, and without
         ds[name].values[:] = values
         ds[name].values[0, 0, : special.size - 1] = special[:-1]
-    for pack in (ds, whole_result(write_result(ds, tmp_path / "exact.nc")).load()):
+    for pack in (ds, open_result(write_result(ds, tmp_path / "exact.nc")).load()):
         path = write_result(pack, tmp_path / "rounded.nc", precision=precision)
-        with whole_result(write_result(whole_result(path).load(), tmp_path / "again.nc", precision=precision)) as found:
+        with open_result(write_result(open_result(path).load(), tmp_path / "again.nc", precision=precision)) as found:
             for name in ("pressure", "gap"):
                 rounded = found[name].values
                 assert rounded[0, 0, : special.size - 1].tobytes() == special[:-1].tobytes()
@@ -197,7 +195,7 @@ def test_field__is_compressed_by_what_that_saves(tmp_path):
         path = write_result(ds, tmp_path / f"{seconds}.nc")
         with netCDF4.Dataset(path) as raw:
             assert [name for name in ("pressure", "gap") if raw[name].filters()["zlib"]] == ["pressure"]
-        xr.testing.assert_equal(whole_result(path).load(), ds)
+        xr.testing.assert_equal(open_result(path).load(), ds)
 
 
 def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, monkeypatch):
@@ -236,5 +234,5 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
     finally:
         tracemalloc.stop()
     assert largest < 1.5 * ds["pressure"].nbytes / 3
-    with whole_result(path) as read:
+    with open_result(path) as read:
         np.testing.assert_array_equal(read["pressure"][:, 3, 5], np.arange(24.0))

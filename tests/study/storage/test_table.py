@@ -5,14 +5,14 @@ import csv
 import numpy as np
 import pandas as pd
 import pytest
-from support import BALL, run_whole
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases
-from roughvisc.study.storage.store import whole_result
+from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import CASES
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
@@ -44,7 +44,7 @@ def test_table__says_what_the_results_say(folder):
     assert table["status"].tolist() == ["converged", "converged", "failed", "failed"]
     assert (table["message"].str.contains("border") == [False, False, True, True]).all()
     for row in range(2):
-        with whole_result(folder / table["file"].iloc[row]) as ds:
+        with open_result(folder / table["file"].iloc[row]) as ds:
             for heading, value in {
                 "time [s]": ds.time[-1],
                 "force [N]": ds.force[-1],
@@ -78,7 +78,7 @@ def test_table__leaves_out_what_is_not_known(folder, tmp_path):
     with pytest.raises(InputError, match="holds no results"):
         rv.to_table(tmp_path)
     (tmp_path / "one.toml").write_text(SMALL)
-    run_whole(rv.read_study(tmp_path / "one.toml"), out=tmp_path / "one", progress=False)
+    rv.run(rv.read_study(tmp_path / "one.toml"), out=tmp_path / "one", progress=False)
     table = rv.to_table(tmp_path / "one")
     assert table["title"].tolist() == ["A ball"]
     assert not [name for name in table if name.startswith(("program", "material"))], "nothing was varied"

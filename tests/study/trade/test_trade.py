@@ -15,7 +15,6 @@ from support import (
     TIMES,
     case_of,
     measured,
-    simulate_whole,
     true_errors,
 )
 
@@ -51,7 +50,7 @@ def test_errors__are_those_against_the_closed_form(tmp_path):
         ((33, 31), {"tolerance": 1e-2, "numerics": rv.Numerics(time_step=0.05, method="seed")}),
     ]
     for i, (shape, solve) in enumerate(given):
-        again = simulate_whole(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, times=TIMES, progress=False, **solve)
+        again = rv.simulate(rv.sphere(RADIUS, SIZE, shape), RUBBER, PRESS, times=TIMES, progress=False, **solve)
         both, _ = true_errors(again)
         found = max(error_of(ds, i, "pressure"), error_of(ds, i, "approach"))
         assert found == pytest.approx(both, rel=1e-7)
@@ -260,7 +259,7 @@ def test_closed_forms__are_found_and_met(tmp_path, surface, material, program, n
     exact = closed_form(case, np.array([0.2, 0.4]))
     assert exact.name == name
     assert set(QUANTITIES) - set(exact.quantities) == unknown
-    press = simulate_whole(
+    press = rv.simulate(
         case.height(), case.material(), case.program(), times=[0.2, 0.4], tolerance=1e-3, progress=False
     )
     errors = exact.errors(press)
@@ -290,7 +289,7 @@ def test_infinite_pressure__at_a_cones_apex_is_averaged(tmp_path):
     case = case_of(tmp_path, surface=cone, keep__times=[0.1])
     exact = closed_form(case, np.array([0.1]))
     assert not np.isfinite(exact.pressure(np.zeros(1), 0.1))
-    press = simulate_whole(case.height(), case.material(), case.program(), times=[0.1], tolerance=1e-3, progress=False)
+    press = rv.simulate(case.height(), case.material(), case.program(), times=[0.1], tolerance=1e-3, progress=False)
     assert 1e-3 < exact.errors(press)["pressure"] < 0.03
     press.pressure[0, 20, 20] = 0.0  # the apex counts: its cell carries a share of the load that is then missing
     lost = float(exact._cell_mean(0.0, 0.0, [2e-3 / 41] * 2, 0.1)) * (2e-3 / 41) ** 2 / LOAD

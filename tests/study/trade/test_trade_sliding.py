@@ -95,7 +95,7 @@ def test_friction__errors_are_those_against_its_finest_run(tmp_path):
         expected = [float(abs(run[name] - fine[name]).max() / fine[name].max()) for run in runs]
         assert errors_of(ds, name) == pytest.approx(expected, rel=1e-9), name
     assert (ds.error.sel(quantity="pressure") > 0).all()
-    assert ds.transforms.values.tolist() == [int(run.roughvisc.cost.convolutions.sum()) for run in runs]
+    assert ds.transforms.values.tolist() == [int(run.convolutions.sum()) for run in runs]
     assert ds.steps.values.tolist() == [2, 2, 2]
     assert float(ds.peak_memory[0]) == PROCESS + curve_bytes(case.solving(), 26 * 21)
     assert ds.attrs["rows"] == "speeds"

@@ -36,7 +36,7 @@ def result(displacement=False):
     return xr.Dataset(
         {"height": (("x", "y"), height), **kept, **histories},
         coords={"time": [0.1, 0.2], "x": x, "y": y},
-        attrs={"boundary": "periodic", "tolerance": 1e-3, "result_format": 2, "title": "made up"},
+        attrs={"boundary": "periodic", "tolerance": 1e-3, "result_format": 1, "title": "made up"},
     )
 
 

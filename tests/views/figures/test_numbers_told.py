@@ -49,7 +49,7 @@ def work_of_the_last_cycle(ds):
 #: figure -> how it is drawn, and the numbers that it may print, each of which it must
 FIGURES = {
     "history": (plot.history, lambda ds: []),
-    "hysteresis": (plot.hysteresis, lambda ds: [float(ds.roughvisc.energy.work[-1]), 2, work_of_the_last_cycle(ds)]),
+    "hysteresis": (plot.hysteresis, lambda ds: [float(ds.work[-1]), 2, work_of_the_last_cycle(ds)]),
     "maps": (
         lambda ds: plot.maps(ds, TIMES),
         lambda ds: [*TIMES, *(float(ds.force.sel(time=t)) / 1e-6 for t in TIMES)],  # 1 mm x 1 mm

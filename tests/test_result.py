@@ -1,0 +1,178 @@
+"""A result as a user has it: one flat Dataset, the history of its steps, and what xarray does to both."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from support import refused
+
+import roughvisc as rv
+
+BALL, RUBBER = rv.sphere(1e-2, 2e-3, (17, 15)), rv.zener(1e6, 1e6, 1e6)
+PROGRAM = rv.Program().load(0.01, over=0.5).hold(2.0)
+STUDY = """
+[surface]
+generate = "sphere"
+radius = "10 mm"
+size = "2 mm"
+shape = [17, 15]
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "1 MPa s"
+[[program]]
+load = "10 mN"
+over = 0.5
+[[program]]
+hold = 2.0
+[keep]
+times = 5
+"""
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return rv.simulate(BALL, RUBBER, PROGRAM, times=5, progress=False)
+
+
+@pytest.fixture(scope="module")
+def heavier(ball):
+    program = rv.Program().load(0.02, over=0.5).hold(2.0)
+    return rv.simulate(BALL, RUBBER, program, times=ball.time.values, progress=False)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stored")
+    (folder / "ball.toml").write_text(STUDY)
+    return rv.run(folder / "ball.toml", progress=False)
+
+
+def concatenated(results, dim, **how):
+    new = "use_new_combine_kwarg_defaults"
+    with xr.set_options(**({new: True} if new in xr.get_options() else {})):
+        return xr.concat(results, dim, **how)
+
+
+def test_attributes__are_plain(stored):
+    assert all(isinstance(value, str | int | float | np.number) for value in stored.attrs.values())
+    assert {"title", "Conventions", "source", "history", "case", "case_key", "boundary", "tolerance"} <= set(
+        stored.attrs
+    )
+
+
+def test_steps__hold_every_accepted_step_and_the_rows_among_them(ball, stored):
+    for ds in (ball, stored):
+        steps = ds.roughvisc.steps
+        assert steps.force.dims == ("step",)
+        assert steps.sizes["step"] > ds.sizes["time"]
+        at = np.searchsorted(steps.time.values, ds.time.values)
+        for name in ("time", "force", "contact_area", "time_error", "work"):
+            np.testing.assert_array_equal(steps[name].values[at], ds[name].values)
+
+
+def test_steps__if_each_is_a_row_are_the_rows():
+    every = rv.simulate(BALL, RUBBER, PROGRAM, progress=False)
+    assert every.roughvisc.steps.sizes["step"] >= every.sizes["time"] > 10
+    assert set(every.time.values) <= set(every.roughvisc.steps.time.values)
+
+
+@pytest.mark.parametrize(
+    "select",
+    [
+        lambda ds: ds.isel(time=-1),
+        lambda ds: ds.isel(time=[3, 1]),
+        lambda ds: ds.sel(time=slice(0.1, 0.6)),
+        lambda ds: ds[["force", "pressure"]],
+        lambda ds: ds.load().copy(deep=True),
+        lambda ds: ds.isel(x=slice(3), y=2),
+    ],
+    ids=["last", "two", "some", "variables", "copy", "corner"],
+)
+def test_steps__belong_to_every_selection_of_rows(ball, select):
+    xr.testing.assert_identical(select(ball).roughvisc.steps, ball.roughvisc.steps)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda one, other: concatenated([one, other], "case", data_vars="all"),
+        lambda one, other: concatenated([one.isel(time=[-1]), other.isel(time=[-1])], "time", data_vars="minimal"),
+        lambda one, other: one.assign_coords(time=one.time * 1e3),
+        lambda one, other: one.interp(time=[0.1, 0.2]),
+        lambda one, other: one.assign(force=other.force),
+    ],
+    ids=["cases", "times", "milliseconds", "interpolated", "changed"],
+)
+def test_steps__of_another_result_are_refused(ball, heavier, change):
+    """xarray keeps the encoding of the first Dataset."""
+    with refused("steps", None):
+        _ = change(ball, heavier).roughvisc.steps
+
+
+def test_concat__keeps_every_variable_of_both(ball, heavier):
+    both = concatenated([ball, heavier], "load", data_vars="all")
+    assert set(both.variables) == set(ball.variables)
+    for number, one in enumerate((ball, heavier)):
+        xr.testing.assert_equal(both.isel(load=number), one)
+
+
+def test_new_times__keep_every_variable(ball):
+    shifted = ball.assign_coords(time=ball.time * 1e3)
+    between = ball.interp(time=[0.1, 0.2])
+    assert set(shifted.variables) == set(between.variables) == set(ball.variables)
+    np.testing.assert_array_equal(shifted.stated_error, ball.stated_error)
+    assert np.isfinite(between.stated_error).all()
+
+
+@pytest.mark.parametrize("experiment", ["history", "friction"])
+def test_netcdf_of_xarray__loses_the_steps_alone(stored, experiment, tmp_path):
+    ds = stored
+    if experiment == "friction":
+        rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+        ds = rv.friction(rough, RUBBER, speeds=[1e-4, 1e-3], load=0.02, grid_error=True, progress=False)
+    ds.to_netcdf(tmp_path / "mine.nc")
+    found = rv.open_result(tmp_path / "mine.nc")
+    xr.testing.assert_identical(found.load(), ds.load())
+    with refused("steps", None):
+        _ = found.roughvisc.steps
+    assert found.roughvisc.plot_history() if experiment == "history" else found.roughvisc.plot_friction()
+
+
+def test_file__has_the_group_of_steps_and_gives_it_back(stored):
+    path = stored.encoding["source"]
+    with netCDF4.Dataset(path) as file:
+        assert list(file.groups) == ["steps"]
+        assert "step" not in file.dimensions
+    with xr.open_dataset(path) as plain:
+        xr.testing.assert_identical(plain.roughvisc.steps, stored.roughvisc.steps)
+        assert set(plain.data_vars) == {*stored.data_vars, "x_bounds", "y_bounds"}
+    with xr.open_datatree(path) as tree:
+        assert set(tree.children) == {"steps"}
+
+
+def test_variables__refer_to_variables_of_their_own_dataset(ball):
+    for part in (ball, ball.roughvisc.steps):
+        named = [one.attrs.get("ancillary_variables", "").split() for one in part.variables.values()]
+        assert {other for others in named for other in others} <= set(part.variables)
+
+
+def test_friction__has_no_steps():
+    rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    curve = rv.friction(rough, RUBBER, speeds=[1e-4, 1e-3], load=0.02, progress=False)
+    assert curve.stated_error.dims == ("speed",)
+    with refused("steps", None):
+        _ = curve.roughvisc.steps
+
+
+def test_warnings__are_one_attribute_of_one_line_each(tmp_path):
+    """A tilted scan: it repeats with a step, its slopes are steep, and its time step is too long."""
+    rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.4, rolloff=5e-4, seed=1)
+    tilted = rough.copy(data=rough.values + 3e-4 * np.arange(24)[:, None] / 24)
+    numerics = rv.Numerics(time_step=0.05)
+    program = rv.Program().pressure(1e4, over=0.1)
+    ds = rv.simulate(tilted, RUBBER, program, boundary="periodic", numerics=numerics, progress=False)
+    assert {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()} == {"accuracy", "border", "slope"}
+    ds.to_netcdf(tmp_path / "tilted.nc")
+    assert rv.open_result(tmp_path / "tilted.nc").attrs["warnings"] == ds.attrs["warnings"]
