@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from roughvisc.cli.group import PATH, Failure, say
-from roughvisc.errors import printable
+from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,76 +45,49 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.command()
 @click.argument("study", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the measurements. [default: results/STUDY-trade]")
-@click.option("--apply", "target", metavar="PART", help="Write the cheapest setting with this accuracy into STUDY: 1%.")
-@click.option("--quantity", default="contact_area", help="Quantity that --apply refers to.", show_default=True)
+@click.option("--accuracy", metavar="PART", default="1%", help="Wanted relative error.", show_default=True)
+@click.option("--quantity", default=None, help="Quantity of this error. [default: contact_area, or friction]")
 @click.option("--budget", metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True)
-@click.option(
-    "--floor", is_flag=True, help="Compute the error that no setting lessens, as `budget` does without options."
-)
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-def trade(
-    study: Path, out: Path | None, target: str | None, quantity: str, budget: str, floor: bool, quiet: bool
-) -> None:
-    """Measure what accuracy costs, and recommend a setting.
+def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, budget: str, quiet: bool) -> None:
+    """Measure the cost and the error of several tolerances and grids.
 
-    Computes the case with several tolerances and grids; with a loading program also with fixed time steps, other
-    memory models and the seed paper's algorithm. Each run is timed and compared with a closed-form solution if there
-    is one, else with the finest run. Writes a NetCDF file and a figure. --apply changes the keys in STUDY and keeps its
-    comments and layout. A budget that `roughvisc budget` has left in the results shows the error that no setting
-    lessens.
+    Each run is timed and compared with the finest run. Marks the cheapest setting with the error --accuracy. Writes a
+    NetCDF file and a figure.
 
     \b
     Example:
       roughvisc trade focus_variation-study.toml
-      roughvisc trade focus_variation-study.toml --apply 1%
+      roughvisc trade focus_variation-study.toml --accuracy 0.1% --quantity mean_gap
     """
     from dask.system import CPU_COUNT
     from rich.console import Console
     from scipy import fft
 
     from roughvisc.progress import reporting
-    from roughvisc.study.budget.budget import budgets, case_of
-    from roughvisc.study.quantities import QUANTITIES
     from roughvisc.study.statement.case import read_study
     from roughvisc.study.storage.store import write_dataset
     from roughvisc.study.trade import files as trade_file
-    from roughvisc.study.trade import recommend
-    from roughvisc.study.trade.apply import apply
     from roughvisc.study.trade.bench import further_quantities_of, quantities_of
+    from roughvisc.study.trade.recommend import main_quantities
     from roughvisc.study.trade.trade import trade as measured
     from roughvisc.views.console.accuracy_tables import trade_table
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import trade as figure
 
     case, console, time = read_study(study), Console(quiet=quiet), trade_file.seconds(budget, "--budget")
-    folder, part = trade_file.trade_folder(case, out), None
-    usual = quantities_of(case)
-    quantity = recommend.known_quantity(quantity, (*usual, *further_quantities_of(case)), "--quantity")
-    if target is not None:
-        part = trade_file.part_of_one(target, "--apply")
-        trade_file.check_writable(study)
+    folder, part = trade_file.trade_folder(case, out), trade_file.part_of_one(accuracy, "--accuracy")
+    known = (*quantities_of(case), *further_quantities_of(case))
+    if quantity is not None and quantity not in known:
+        raise InputError(key="--quantity", found=quantity, expected=f"one of {', '.join(known)}")
     with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, quantities=[quantity], budget=time, progress=report)
-    beside = case_of(case, None)[1]
-    names = [name for name in dict.fromkeys([quantity, *usual]) if name in QUANTITIES]
-    if floor:
-        for name, one in budgets(case, names, out=beside, progress=not quiet).items():
-            write_dataset(one, beside / f"budget-{name}.nc")
-    dataset = recommend.with_floors(dataset, trade_file.budgets_in(beside, names, case))
-    console.print(trade_table(dataset))
+        dataset = measured(case, quantities=[quantity] if quantity else [], budget=time, progress=report)
+    main = main_quantities(dataset)
+    quantity = quantity or main[0]
+    console.print(trade_table(dataset, quantity, part))
     say(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
-    first = list(
-        dict.fromkeys([*([] if quantity == "contact_area" else [quantity]), *recommend.main_quantities(dataset)])
-    )
-    say(console, "Figure", write_figure(figure(dataset, first[:2]), folder / "trade.png"))
-    if part is not None:
-        index = recommend.cheapest(dataset, quantity, part)
-        if index is None:
-            shortfall = recommend.shortfall(dataset, quantity, part)
-            raise Failure(f"{study}: --apply {target}: {shortfall}; the study is unchanged", 1)
-        changes = apply(study, recommend.keys_of(dataset, index))
-        said = printable(f"{study}: {changes or 'already has this setting'}")
-        console.print(said, soft_wrap=True, highlight=False, markup=False)
+    shown = list(dict.fromkeys([quantity, *main]))[:2]
+    say(console, "Figure", write_figure(figure(dataset, shown), folder / "trade.png"))
 
 
 _OPTIONS = {

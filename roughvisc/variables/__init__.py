@@ -384,20 +384,13 @@ VARIABLES: dict[str, Variable] = {
     # a trade of accuracy against speed: what was set, what it cost, how wrong it was
     "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
     "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
-    "family": Variable(_RUNS, "", "what the setting varies", dtype="str"),
-    "method": Variable(_RUNS, "", "method of solution", dtype="str"),
-    "memory": Variable(_RUNS, "", "memory asked for", dtype="str"),
     "tolerance": Variable(_RUNS, "1", "tolerance asked for"),
-    "time_step": Variable(_RUNS, "s", "fixed time step", "missing where steps were chosen by the tolerance"),
     "coarsening": Variable(_RUNS, "1", "length of a cell over that of the study's"),
-    "precision": Variable(_RUNS, "1", "relative precision of the fields in the file", "missing where exact"),
     "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
     "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
-    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result and writing its file"),
+    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result"),
     "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
     "steps": Variable(_RUNS, "1", "accepted time steps"),
-    "peak_memory": Variable(_RUNS, "byte", "memory of the process at its peak", "counted from the arrays it needs"),
-    "disk_size": Variable(_RUNS, "byte", "size of the result's file"),
     "note": Variable(_RUNS, "", "why the setting was not measured; empty if it was", dtype="str"),
     "error": Variable(
         ("setting", "quantity"),
@@ -412,28 +405,18 @@ VARIABLES: dict[str, Variable] = {
         "part of the error that the coarser grid alone makes",
         "of a run as sharp in time as the reference; on a scan it holds what the surface has lost",
     ),
-    "reference": Variable(("quantity",), "", "what the errors are measured against", dtype="str"),
     "reference_time_uncertainty": Variable(
         ("quantity",),
         "1",
         "uncertainty of the reference due to time steps",
-        "how far it may be off: by Richardson extrapolation; zero if exact",
+        "how far it may be off: by Richardson extrapolation",
     ),
     "reference_grid_uncertainty": Variable(
         ("quantity",),
         "1",
         "uncertainty of the reference due to the grid",
-        "how far it may be off: by Richardson extrapolation; zero if exact; of a scan: what its spacing leaves unknown",
+        "how far it may be off: by Richardson extrapolation; of a scan: what its spacing leaves unknown",
     ),
-    "floor": Variable(
-        ("quantity",),
-        "1",
-        "error that no setting lessens",
-        "half of the interval at 95 % by all sources of a budget but those that settings change, over the largest "
-        "value; missing without a budget",
-    ),
-    "floor_source": Variable(("quantity",), "", "source of most of the floor", dtype="str"),
-    "floor_open": Variable(("quantity",), "", "sources that are open, and not in the floor", dtype="str"),
 }
 
 #: Fields that the user may ask for in ``fields``: those that the solver finds.

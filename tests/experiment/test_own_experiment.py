@@ -165,14 +165,12 @@ def test_observables__are_derived_of_every_row(study, tmp_path):
 
 @pytest.mark.thorough
 def test_trade__measures_tolerances_and_grids(study):
-    settings = [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=2.0), Setting(0.1, memory="direct")]
+    settings = [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=2.0)]
     ds = rv.trade(read_study(study), settings, progress=False)
-    assert ds.note[:3].values.tolist() == [""] * 3
-    assert "a stack of loads has none" in ds.note[3].item()
+    assert ds.note.values.tolist() == [""] * 3
     wrong = ds.error.sel(quantity="approach").values
     assert wrong[1] < min(wrong[0], wrong[2])
     assert ds.attrs["rows"] == "loads"
-    assert "for 1 % on contact area" in ds.attrs["recommendation"]
 
 
 def test_study__refuses_what_has_no_meaning(study):

@@ -17,7 +17,6 @@ from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case, read_cases, vary
-from roughvisc.study.trade.reference import closed_form
 
 RADIUS, THICKNESS = 1e-3, 1e-4
 WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
@@ -239,11 +238,6 @@ def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
     assert len(set(approach)) == 3
     again = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
     assert again.approach.identical(results.approach)
-
-
-def test_trade__offers_no_closed_form_of_a_half_space(case):
-    assert closed_form(case, np.array([0.5])) is None
-    assert closed_form(vary(case, {"material.thickness": math.inf}), np.array([0.5])) is not None
 
 
 @pytest.mark.parametrize(

@@ -1,1 +1,1 @@
-"""Trade of speed against accuracy: one case under many settings, each timed and its error measured."""
+"""Cost and error of one case under several tolerances and grids."""

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import math
-import os
-from collections.abc import Iterable
 from pathlib import Path
 
 import xarray as xr
@@ -13,10 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
-from roughvisc.study.trade.recommend import require_same
 from roughvisc.units import quantity
-
-log = logging.getLogger("roughvisc")
 
 
 def trade_folder(case: Case, out: str | Path | None) -> Path:
@@ -59,22 +53,6 @@ def open_trade(path: str | Path) -> xr.Dataset:
     return dataset
 
 
-def budgets_in(folder: Path, names: Iterable[str], case: Case) -> list[xr.Dataset]:
-    """Budgets of a case that ``roughvisc budget`` has left in a folder; one of another scene is left out, and told."""
-    found = []
-    for path in (folder / f"budget-{name}.nc" for name in names):
-        if not path.is_file():
-            continue
-        try:
-            one = _read(path)
-            require_same(one, case)
-        except (OSError, ValueError, RuntimeError) as error:  # an InputError is a ValueError
-            log.warning("%s: does not count: %s", path, error)
-        else:
-            found.append(one)
-    return found
-
-
 def is_trade(path: str | Path) -> bool:
     """Whether a file is one that ``roughvisc trade`` wrote, as far as its variables tell."""
     try:
@@ -89,7 +67,7 @@ def part_of_one(text: str, name: str) -> float:
 
     Examples
     --------
-    >>> part_of_one("1%", "--apply"), part_of_one("0.02", "--apply")
+    >>> part_of_one("1%", "--accuracy"), part_of_one("0.02", "--accuracy")
     (0.01, 0.02)
     """
     try:
@@ -97,7 +75,7 @@ def part_of_one(text: str, name: str) -> float:
     except InputError:
         part = math.nan
     if not 0 < part < 1:
-        raise InputError(f"{name}: found {text!r}: expected a part such as 1% or 0.01, above 0 and below 1")
+        raise InputError(key=name, found=text, expected="a part such as 1% or 0.01, above 0 and below 1")
     return part
 
 
@@ -114,11 +92,5 @@ def seconds(text: str, name: str) -> float:
     except InputError:
         time = math.nan
     if not 0 < time < math.inf:
-        raise InputError(f"{name}: found {text!r}: expected a time such as '5 min' or 90 (seconds), above 0")
+        raise InputError(key=name, found=text, expected="a time such as '5 min' or 90 (seconds), above 0")
     return time
-
-
-def check_writable(path: Path) -> None:
-    """Refuse, before anything is measured, a study that could not be written back."""
-    if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
-        raise InputError(f"{path}: is not writable: --apply needs write permission for it and its folder")

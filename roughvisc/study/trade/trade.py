@@ -1,13 +1,12 @@
-"""``trade``: one case under a ladder of settings, each timed and compared with the reference."""
+"""``trade``: one case under several tolerances and grids, each timed and compared with the finest run."""
 
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -20,8 +19,7 @@ from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns, further_quantities_of, quantities_of
 from roughvisc.study.trade.ladder import Setting, changed_keys, is_data, ladder, shape_of
-from roughvisc.study.trade.recommend import known_quantity, require_same, with_floors
-from roughvisc.study.trade.reference import ClosedForm, ReferenceRun, all_grids, closed_form
+from roughvisc.study.trade.reference import ReferenceRun, all_grids
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import RESULT_FORMAT
@@ -34,9 +32,7 @@ def trade(
     settings: Sequence[Setting] | None = None,
     *,
     quantities: Sequence[str] = (),
-    floor: xr.Dataset | Sequence[xr.Dataset] = (),
     budget: Quantity = 300.0,
-    reference: Literal["auto", "run"] = "auto",
     progress: bool | Report = True,
 ) -> xr.Dataset:
     """Compute one case with a series of settings, and measure cost and error of each.
@@ -46,19 +42,14 @@ def trade(
     case : Case or path
         A case, or its study file.
     settings : sequence of Setting, optional
-        Settings to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances, other grids, fields
-        rounded to float32 precision; for a program also the direct history, fixed time steps, and the algorithm of the
-        seed paper.
+        Tolerances and grids to measure; see :class:`roughvisc.study.trade.ladder.Setting`. Default: tolerances from
+        1e-1 to 1e-3, and coarser grids; also finer grids if the surface is a recipe without conditioning.
     quantities : sequence of str
         Further numbers whose error is measured: ``force``, ``leak_rate``, ``thermal_conductance`` or
         ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or what is conducted.
-    floor : xarray.Dataset, or a sequence of them
-        Of :func:`roughvisc.budget` of the same study: errors that no setting lessens are then in the result.
     budget : float or str
         Total wall time of all runs. A setting that would exceed the remaining time is not run, which the result states.
         [s]
-    reference : {"auto", "run"}
-        "auto": compare with a closed form if there is one. "run": always compare with the finest run.
     progress : bool or callable
         A progress bar, or a function called with the name of a setting, the current time and the length of the program
         [s], or the number of finished speeds and the total number.
@@ -66,57 +57,51 @@ def trade(
     Returns
     -------
     xarray.Dataset
-        Along ``setting``: ``run_time``, ``transforms``, ``steps``, ``peak_memory``, ``disk_size``, and ``error`` and
-        ``coarsening_error`` of each ``quantity``. Along ``quantity``: the ``reference`` and its own uncertainty,
-        ``reference_time_uncertainty`` and ``reference_grid_uncertainty``; of budgets the ``floor``, with
-        ``floor_source`` and ``floor_open``. The attribute ``recommendation`` says which setting to use for which
-        accuracy. ``rv.plot.trade`` draws the result.
+        Along ``setting``: ``run_time``, ``transforms``, ``steps``, and ``error`` and ``coarsening_error`` of each
+        ``quantity``. Along ``quantity``: the uncertainty of the reference, ``reference_time_uncertainty`` and
+        ``reference_grid_uncertainty``. The attribute ``reference`` names the reference. ``rv.plot.trade`` draws the
+        result.
 
     Raises
     ------
     InputError
-        If the study is invalid or contains a sweep, has no such quantity, a budget is of another study, or the
-        reference would take longer than half the budget.
+        If the study is invalid or contains a sweep, has no such quantity, or the reference would take longer than
+        half the budget.
 
     Notes
     -----
-    The finest run uses the finest grid of the settings, and a fifth of their smallest tolerance. Its own uncertainty
-    follows from runs with that tolerance, on grids two and four times coarser, by Richardson extrapolation with
-    Roache's safety factors. Pressures of two grids are compared as means over the coarser cells. In a slide the profile
-    moves by whole cells. Kept times within it are those at which it has moved by whole cells of every grid, at least
-    the beginning and the end.
+    The reference is the finest run: it uses the finest grid of the settings, and a fifth of their smallest tolerance.
+    Its own uncertainty follows from runs with that tolerance, on grids two and four times coarser, by Richardson
+    extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells. In
+    a slide the profile moves by whole cells. Kept times within it are those at which it has moved by whole cells of
+    every grid, at least the beginning and the end.
     """
     if not isinstance(case, Case):
         case = read_study(case)
     if not budget > 0:
-        raise InputError(f"budget is {budget!r}: expected a positive number of seconds")
-    if reference not in ("auto", "run"):
-        raise InputError(f"reference is {reference!r}: expected 'auto' or 'run'")
+        raise InputError(key="budget", found=budget, expected="a positive number of seconds")
     height = case.height()
     shape = (height.sizes["x"], height.sizes["y"])
     rungs = list(ladder(case, shape) if settings is None else settings)
     if not rungs:
-        raise InputError("settings is empty: expected at least one Setting")
+        raise InputError(key="settings", found=rungs, expected="at least one Setting")
     usual, further = quantities_of(case), further_quantities_of(case)
-    names = [known_quantity(name, (*usual, *further), "quantities") for name in quantities]
-    derived = [QUANTITIES[name] for name in names if name in further]
-    budgets = [floor] if isinstance(floor, xr.Dataset) else list(floor)
-    for one in budgets:
-        require_same(one, case)
+    for name in quantities:
+        if name not in (*usual, *further):
+            raise InputError(key="quantities", found=name, expected=f"one of {', '.join((*usual, *further))}")
+    derived = [QUANTITIES[name] for name in quantities if name in further]
     case = _comparable(case, height, rungs, derived)
-    exact = closed_form(case) if reference == "auto" else None
-    with tempfile.TemporaryDirectory() as folder, reporting(progress, at=case.at) as report:
-        bench = TimedRuns(case, height, Path(folder), budget, report, derived)
-        known = exact.quantities if exact else ()
-        finest = None if set(bench.quantities) <= set(known) else ReferenceRun(bench, rungs, is_data(case))
-        order = np.argsort([bench.expected(setting) for setting in rungs], kind="stable")  # the cheapest run first
-        found = {number: _row(bench, rungs[number], exact, finest) for number in order}
-    rows = [found[number] for number in range(len(rungs))]
-    return with_floors(_labelled(bench, rows, exact, finest), budgets)
+    with reporting(progress, at=case.at) as report:
+        bench = TimedRuns(case, height, budget, report, derived)
+        order = sorted(range(len(rungs)), key=lambda number: bench.work(rungs[number]))
+        bench.calibrate(rungs)
+        finest = ReferenceRun(bench, rungs, is_data(case))
+        found = {number: _row(bench, rungs[number], finest) for number in order}
+    return _labelled(bench, [found[number] for number in range(len(rungs))], finest)
 
 
 def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], derived: Sequence[Observable]) -> Case:
-    """The case with rows that all settings have in common, and with the pressures that are compared."""
+    """Return the case with rows that all settings have in common, and with the pressures that are compared."""
     keep, settings, experiment = case.settings.keep, case.solving(), case.experiment()
     changes: dict[str, Any] = {"solve.grid_error": False}
     fields = [*keep.fields, *(field for one in derived for field in one.fields)]
@@ -129,50 +114,42 @@ def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], deri
     return vary(case, changes | changed_keys(settings, experiment.with_common_rows(settings, cells)))
 
 
-def _row(bench: TimedRuns, setting: Setting, exact: ClosedForm | None, finest: ReferenceRun | None) -> dict[str, Any]:
-    """What a setting cost and how wrong it was, or why that is not known."""
+def _row(bench: TimedRuns, setting: Setting, finest: ReferenceRun) -> dict[str, Any]:
+    """Return cost and errors of a setting, or why they are not known."""
     shape = shape_of(bench.case, bench.shape, setting.coarsening)
     missing = dict.fromkeys(bench.quantities, math.nan)
     row: dict[str, Any] = {
         "setting": bench.label(setting),
-        "family": setting.family,
-        **{name: math.nan if value is None else value for name, value in vars(setting).items()},
+        "tolerance": setting.tolerance,
+        "coarsening": setting.coarsening,
         "cells_x": shape[0],
         "cells_y": shape[1],
         "error": missing,
         "coarsening_error": missing,
         "note": "",
-        **dict.fromkeys(("run_time", "transforms", "steps", "peak_memory", "disk_size"), math.nan),
+        **dict.fromkeys(("run_time", "transforms", "steps"), math.nan),
     }
     try:
-        if finest and not is_data(bench.case):
+        if not is_data(bench.case):
             finest.check(setting)
         run = bench.run(setting)
-        against_finest = finest.errors(run.dataset) if finest else {}
+        errors = finest.errors(run.dataset)
     except NotRun as error:
         return row | {"note": str(error)}
-    if finest:
-        alone = finest.of_coarsening(setting.coarsening)
-        row["coarsening_error"] = missing | {
-            name: alone[name] for name in bench.quantities if not (exact and name in exact.quantities)
-        }
     return row | {
-        "error": missing | against_finest | (exact.errors(run.dataset) if exact else {}),
+        "error": errors,
+        "coarsening_error": finest.of_coarsening(setting.coarsening),
         "run_time": run.seconds,
         "transforms": float(run.dataset["convolutions"].sum()),
         "steps": float(run.steps),
-        "peak_memory": run.peak_memory,
-        "disk_size": run.disk_size,
     }
 
 
-_TEXTS = ("setting", "family", "method", "memory", "note")
-_COORDS = ("setting", "family", "method", "memory", "tolerance", "time_step", "coarsening", "precision")
+_TEXTS = ("setting", "note")
+_COORDS = ("setting", "tolerance", "coarsening", "cells_x", "cells_y")
 
 
-def _labelled(
-    bench: TimedRuns, rows: Sequence[dict[str, Any]], exact: ClosedForm | None, finest: ReferenceRun | None
-) -> xr.Dataset:
+def _labelled(bench: TimedRuns, rows: Sequence[dict[str, Any]], finest: ReferenceRun) -> xr.Dataset:
     case, quantities = bench.case, bench.quantities
     columns: dict[str, Any] = {}
     for name in rows[0]:
@@ -181,13 +158,10 @@ def _labelled(
             columns[name] = (("setting", "quantity"), np.array([[v[q] for q in quantities] for v in values], float))
         else:
             columns[name] = ("setting", np.array(values, dtype=str if name in _TEXTS else float))
-    closed = dict.fromkeys(exact.quantities, exact.name) if exact else {}
-    run = finest.name if finest else ""
-    columns["reference"] = ("quantity", np.array([closed.get(name, run) for name in quantities], dtype=str))
     for part in ("time", "grid"):
-        unsure = [0.0 if name in closed or not finest else getattr(finest, part)[name] for name in quantities]
+        unsure = [getattr(finest, part)[name] for name in quantities]
         columns[f"reference_{part}_uncertainty"] = ("quantity", np.array(unsure))
-    coords = {name: columns.pop(name) for name in (*_COORDS, "cells_x", "cells_y")}
+    coords = {name: columns.pop(name) for name in _COORDS}
     dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(quantities)}))
     dataset.attrs = {
         "Conventions": "CF-1.11",
@@ -197,6 +171,7 @@ def _labelled(
         "comment": "One case computed under many settings, each timed and compared with 'reference'; attribute 'case' "
         "states it (JSON, SI units).",
         "case": case.to_json(),
+        "reference": finest.name,
         "grid_is_data": int(is_data(case)),
         "rows": AXES[case.experiment().axis].rows,
         "transforms": transform_library(),

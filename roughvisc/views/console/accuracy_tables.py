@@ -10,10 +10,10 @@ from rich.text import Text
 
 from roughvisc.study.audit.audit import Audit
 from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, NOT_KNOWN
-from roughvisc.study.trade.recommend import WORDS, duration, main_quantities, pareto_front
+from roughvisc.study.trade.recommend import WORDS, cheapest, choice, duration, pareto_front, percent
 from roughvisc.units import unit_for
 from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.views.console.tables import size, titled
+from roughvisc.views.console.tables import titled
 
 #: The words tell the verdicts apart; weight and colour help to find them.
 _STYLES = {BROKEN: "bold red", DOUBTFUL: "bold", NOT_KNOWN: "dim"}
@@ -121,22 +121,25 @@ _ERRORS = {
 _COLUMNS = 4
 
 
-def trade_table(dataset: xr.Dataset) -> Group:
-    """Cost and errors of every setting; what was not run, and why; the advice.
+def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
+    """Return cost and errors of every setting, the cheapest setting that is accurate enough, and what was not run.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of :func:`roughvisc.trade`.
+    quantity : str
+        Quantity whose error is to be small.
+    target : float
+        Wanted relative error. [-]
     """
     shown = dict([one for one in _ERRORS.items() if one[0] in dataset["quantity"]][:_COLUMNS])
-    counts = main_quantities(dataset)[0]
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column()
     table.add_column("setting", min_width=18)
-    for heading in ("time", "transf.", "memory", *shown.values()):
+    for heading in ("time", "transf.", *shown.values()):
         table.add_column(heading, justify="right", no_wrap=True)
-    best = pareto_front(dataset, counts)
+    best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
     for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
         if not np.isfinite(row["run_time"]):
@@ -144,22 +147,20 @@ def trade_table(dataset: xr.Dataset) -> Group:
         errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
         spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
-        table.add_row("*" if best[i] else "", name, spent, transforms, size(float(row["peak_memory"])), *errors)
-    if "floor" in dataset:
-        floors = [_percent(float(dataset["floor"].sel(quantity=name))) for name in shown]
-        table.add_row("", Text("no setting better than", style="italic"), "", "", "", *floors)
+        mark = (">" if i == chosen else "") + ("*" if best[i] else "")
+        table.add_row(mark, name, spent, transforms, *errors, style="bold" if i == chosen else "")
     rows = dataset.attrs.get("rows", "kept times")
-    text = (
-        f"Errors in %, worst of all {rows}. * Pareto-optimal for {WORDS[counts]}: no setting is both faster and better."
-    )
-    parts = [table, Text(text, style="italic"), Text()]
+    marks = f"* Pareto-optimal for {WORDS[quantity]}. > Cheapest for {percent(target)}."
+    parts = [table, Text(f"Errors in %, worst of all {rows}. {marks}", style="italic"), Text()]
     parts += [
         Text(f"Not run: {name}: {why}")
         for name, why in zip(dataset["setting"].values, dataset["note"].values, strict=True)
         if why
     ]
-    parts += [Text(f"Reference: {text}.") for text in _references(dataset)]
-    parts += [Text(), *(Text(line[:1].upper() + line[1:]) for line in dataset.attrs["recommendation"].splitlines())]
+    parts += [Text(f"Reference: {dataset.attrs['reference']}."), Text(choice(dataset, quantity, target))]
+    unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=quantity))
+    if dataset.attrs["grid_is_data"] and np.isfinite(unsure):
+        parts.append(Text(f"Error by the spacing of the points of the scan: about {percent(unsure)}"))
     return titled(dataset.attrs.get("title"), *parts)
 
 
@@ -168,13 +169,3 @@ def _percent(part: float) -> str:
         return "-"
     shown = 100 * part
     return f"{shown:.2g}" if shown >= 1e-3 or shown == 0 else "<0.001"
-
-
-def _references(dataset: xr.Dataset) -> list[str]:
-    """What errors are measured against, each once, with the quantities that it holds for."""
-    found: dict[str, list[str]] = {}
-    for quantity, name in zip(dataset["quantity"].values, dataset["reference"].values, strict=True):
-        if quantity in _ERRORS:
-            found.setdefault(str(name), []).append(_ERRORS[str(quantity)])
-    one = len(found) == 1
-    return [name if one else f"{name}: {', '.join(quantities)}" for name, quantities in found.items()]
