@@ -123,7 +123,7 @@ class MemoryRecorder:
 _CHUNK = (8, 64, 64)
 #: The same of a grid of more cells than this: a frame is read without its neighbours in time, which no memory has room
 #: for. At 4096 x 4096 x 20, in ms, compressed: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51; (1, 256, 256) 331
-#: and 41; (1, 1024, 1024) 309 and 302. ``workflows/benchmarks/big_results.py`` measures it.
+#: and 41; (1, 1024, 1024) 309 and 302.
 _MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
 #: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
 _LONGEST_CHUNK = 1024

@@ -83,7 +83,7 @@ class SteadySliding(Experiment):
     doing: ClassVar[str] = "sliding"
     boundary: ClassVar[Boundary] = "periodic"
     states_grid_error: ClassVar[bool] = True
-    #: Measured by workflows/benchmarks/plans.py at 256 and 1024 squared.
+    #: Measured at 256 and 1024 squared.
     convolution_cost: ClassVar[float] = 2.1
 
     def __post_init__(self) -> None:

@@ -1,29 +1,24 @@
 """Does every row keep its word? Random cases, each against a run of the same case at a thirtieth of its tolerance.
 
     python workflows/benchmarks/accuracy.py [COUNT] [SEED] [--first N] [--out OUT.nc] [--processes N] [--kept 1 10 50]
-    python workflows/benchmarks/accuracy.py --against OTHER_CHECKOUT [COUNT] [SEED] [--first N]
 
-The cases are those of ``accuracy_cases.py``; COUNT is 1000 (12 with ``--against``) and SEED 1 unless given, and
-``1 1 --first N`` reruns case N alone. Each case is printed when done and appended to ``OUT.jsonl``, with the errors of
-all its rows; cases that are found there are not run again, so delete it after a change of the package. At the end
-OUT.nc holds a table of the cases, and a summary is printed. Errors of a row are relative: of the pressure its absolute
-difference summed, over the largest force so far; of approach, force and work over their largest absolute values so far,
-all of the reference and up to that row. Approach and force are judged where the program does not give them.
+The cases are those of ``accuracy_cases.py``; COUNT is 1000 and SEED 1 unless given, and ``1 1 --first N`` reruns case N
+alone. Each case is printed when done. At the end OUT.nc holds a table of the cases, and a summary is printed. Errors of
+a row are relative: of the pressure its absolute difference summed, over the largest force so far; of approach, force
+and work over their largest absolute values so far, all of the reference and up to that row. Approach and force are
+judged where the program does not give them.
 ``--kept`` runs each case once more for each number of kept times, evenly spaced up to the end of the program; all runs
 of a case share a reference, which keeps the times of all of them. ``--check N`` holds the references of the first N
 cases against runs ten times finer.
-With ``--against`` the cost is compared with that of another checkout: see ``accuracy_cost.py``.
 """
 
 import argparse
 import contextlib
-import json
 import logging
 import signal
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -51,20 +46,11 @@ DRAWN = "drawn"
 
 
 def main(count=1000, seed=1, first=0, out="accuracy.nc", processes=2, time_limit=TIME_LIMIT, kept=(DRAWN,), check=0):
-    """Run the cases that are not in the record yet; the table and the records."""
-    record = Path(out).with_suffix(".jsonl")
-    lines = record.read_text().splitlines() if record.exists() else ()
-    wanted = range(first, first + count)
-    found = [line for line in map(json.loads, lines) if line["seed"] == seed and line["number"] in wanted]
-    if found:
-        print(f"{len({line['number'] for line in found})} cases taken from {record}", flush=True)
-    left = sorted(set(wanted) - {line["number"] for line in found})
-    with record.open("a") as file:
-        for results in _judged(left, seed, processes, time_limit, tuple(kept), check):
-            file.write("".join(json.dumps(result) + "\n" for result in results))
-            file.flush()
-            print(*map(described, results), sep="\n", flush=True)
-            found += results
+    """Run the cases; the table and the records."""
+    found = []
+    for results in _judged(range(first, first + count), seed, processes, time_limit, tuple(kept), check):
+        print(*map(described, results), sep="\n", flush=True)
+        found += results
     found.sort(key=lambda result: (result["number"], str(result["kept_times"])))
     ds = table(found)
     ds.to_netcdf(out, engine="netcdf4")
@@ -383,20 +369,14 @@ def _line(label, names, part):
 
 if __name__ == "__main__":
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    asked.add_argument("count", nargs="?", type=int)
+    asked.add_argument("count", nargs="?", type=int, default=1000)
     asked.add_argument("seed", nargs="?", type=int, default=1)
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--out", default="accuracy.nc")
     asked.add_argument("--processes", type=int, default=2)
     asked.add_argument("--limit", type=float, default=TIME_LIMIT, help="processor time of a case [s]")
-    asked.add_argument("--against", metavar="OTHER_CHECKOUT")
     asked.add_argument("--kept", nargs="*", type=int, default=[], help="numbers of kept times beside the drawn ones")
     asked.add_argument("--check", type=int, default=0, help="cases whose reference is checked")
     given = asked.parse_args()
-    if given.against:
-        from accuracy_cost import against
-
-        against(given.against, given.count or 12, given.seed, given.first)
-    else:
-        kept = (DRAWN, *given.kept)
-        main(given.count or 1000, given.seed, given.first, given.out, given.processes, given.limit, kept, given.check)
+    kept = (DRAWN, *given.kept)
+    main(given.count, given.seed, given.first, given.out, given.processes, given.limit, kept, given.check)

@@ -2,9 +2,11 @@
 
     python workflows/benchmarks/public_names.py OTHER_CHECKOUT
 
-Prints what is new here, what is gone, and what has changed. Each checkout is asked in a process of its own.
+Prints how many there are, what is new here, what is gone, and what has changed. Each checkout runs in a process of its
+own. A kind that one of them lacks counts as empty.
 """
 
+import importlib
 import inspect
 import json
 import os
@@ -14,48 +16,95 @@ import warnings
 from pathlib import Path
 
 
-def seen():
-    """Kind -> name -> what is said of it."""
-    warnings.simplefilter("ignore")
+def public_names():
     import roughvisc as rv
-    from roughvisc import errors
-    from roughvisc.cli.group import main
-    from roughvisc.study.cost.plan import COLUMNS
-    from roughvisc.variables import VARIABLES
-    from roughvisc.variables.sliding import SLIDING
-    from roughvisc.views.plot import FIGURES
 
-    def said(one):
-        plain = callable(one) and not inspect.isclass(one)
-        return str(inspect.signature(one)) if plain else type(one).__name__
+    found = {}
+    for prefix, module in (
+        ("rv", rv),
+        *((f"rv.{one}", getattr(rv, one)) for one in ("plot", "observables", "closed_forms")),
+    ):
+        for name in set(module.__all__) - {"__version__"}:
+            one = getattr(module, name)
+            plain = callable(one) and not inspect.isclass(one)
+            found[f"{prefix}.{name}"] = str(inspect.signature(one)) if plain else type(one).__name__
+    return found
 
-    public = {name: said(getattr(rv, name)) for name in rv.__all__ if name != "__version__"}
-    for room in (rv.plot, rv.observables, rv.closed_forms):
-        public |= {f"{room.__name__}.{name}": said(getattr(room, name)) for name in room.__all__}
+
+def study_keys():
+    import roughvisc as rv
+
     schema = rv.study_schema()
     tables = {"study": schema, **schema["$defs"]}
-    keys = {
-        f"{table}.{key}": str(one.get("default")) for table, t in tables.items() for key, one in t["properties"].items()
+    return {
+        f"{name}.{key}": str(one.get("default"))
+        for name, table in tables.items()
+        for key, one in table["properties"].items()
     }
-    commands = {
+
+
+def variables():
+    tables = (declared("roughvisc.variables", "VARIABLES"), declared("roughvisc.variables.sliding", "SLIDING"))
+    return {
+        name: f"{one.dims} {one.units} {getattr(one, 'group', '')}".strip()
+        for table in tables
+        for name, one in table.items()
+    }
+
+
+def commands():
+    from roughvisc.cli.group import main
+
+    return {
         f"{name} {option}": "" for name, one in main.commands.items() for part in one.params for option in part.opts
     }
-    return {
-        "public names": public,
-        "study keys": keys,
-        "variables": {name: f"{one.dims} {one.units} {one.group}" for name, one in VARIABLES.items()},
-        "variables over speed": {name: f"{one.dims} {one.units} {one.group}" for name, one in SLIDING.items()},
-        "figures of a result": dict.fromkeys(FIGURES, ""),
-        "commands and options": commands,
-        "errors": {name: "" for name in dir(errors) if name.endswith("Error")},
-        "columns of a plan": {name: str(said) for name, said in COLUMNS.items()},
-    }
+
+
+def errors():
+    from roughvisc import errors
+
+    return {name: "" for name in dir(errors) if name.endswith("Error")}
+
+
+def declared(module, table):
+    """A table of a module; empty if this checkout lacks one of them."""
+    try:
+        return getattr(importlib.import_module(module), table)
+    except (ImportError, AttributeError):
+        return {}
+
+
+KINDS = {
+    "public names": public_names,
+    "study keys": study_keys,
+    "variables": variables,
+    "commands and options": commands,
+    "commands": lambda: {name.split()[0]: "" for name in commands()},
+    "figures of a result": lambda: dict.fromkeys(declared("roughvisc.views.plot", "FIGURES"), ""),
+    "errors": errors,
+    "columns of a plan": lambda: {
+        name: str(one) for name, one in declared("roughvisc.study.cost.plan", "COLUMNS").items()
+    },
+}
+
+
+def seen():
+    """Kind -> name -> signature, default or unit."""
+    warnings.simplefilter("ignore")
+    found = {}
+    for kind, collect in KINDS.items():
+        try:
+            found[kind] = collect()
+        except (ImportError, AttributeError) as error:
+            print(f"{kind}: {error}", file=sys.stderr)
+            found[kind] = {}
+    return found
 
 
 def asked(checkout):
     command = [sys.executable, __file__, "--of-this"]
     environment = os.environ | {"PYTHONPATH": str(checkout)}
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout)
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=environment).stdout)
 
 
 if __name__ == "__main__":

@@ -72,7 +72,7 @@ from roughvisc.mechanics.contact.influence import Array, Cells
 from roughvisc.mechanics.contact.problem import ContactProblem, FreeSet
 
 # Iterations in which the duality gap must halve; otherwise a projected-gradient step is taken. Measured, like the
-# factors below, by the iterations of 400 solutions of workflows/benchmarks/solver_error.py's problems at 64 squared:
+# factors below, by the iterations of 400 solutions on rough and round surfaces at 64 squared:
 # 7 % less with 10, 1 % more with 60 or without end.
 _PATIENCE = 30
 # From one step to the next the step length may shrink and grow by these factors, and by the last where the border of
@@ -122,8 +122,8 @@ class ContactState:
         Cost; a convolution is a displacement or an application of the preconditioner.
     error : float
         Estimated relative error of the pressure, ``sum |p - p*| / sum p*`` with the exact ``p*`` on this grid; NaN
-        unless asked for, infinite where the approach does not determine the load. Measured on 4,173 solutions
-        (``workflows/benchmarks/solver_error.py``): at least 0.8 times the true error in 98 % of them, 2.4 times in
+        unless asked for, infinite where the approach does not determine the load. Measured on 4,173 solutions:
+        at least 0.8 times the true error in 98 % of them, 2.4 times in
         the median, 8.3 times at the 98th percentile; `bound` is 160 times it in the median.
     """
 

@@ -124,8 +124,7 @@ def shortened(program: Program, height: xr.DataArray) -> Program:
 
 
 #: Least and largest side of the finer of two coarse grids, in cells, from which the growth with the grid is known. In
-#: between it is a third of the case's, and the other one is half of it. `python workflows/benchmarks/plans.py`
-#: measures what is so found.
+#: between it is a third of the case's, and the other one is half of it.
 _COARSE = (33, 129)
 #: Cost may grow from a grid to one twice as fine by factors within these.
 _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
