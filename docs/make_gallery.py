@@ -46,7 +46,10 @@ FIGURES = {
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}
         ),
     },
-    "creeping_seal": {"leakage": rv.plot.leakage},
+    "creeping_seal": {
+        "history": rv.plot.history,
+        "leakage": lambda ds: rv.plot.maps(ds, fields="flux"),
+    },
     "friction": {
         "curve": lambda ds: rv.plot.friction(ds, persson=True),
         "maps": rv.plot.maps,

@@ -1,8 +1,8 @@
-"""A rough seal that creeps until it closes: leak rate over five decades of time, as a figure and as a film.
+"""A rough seal that creeps until it closes: leak rate over five decades of time, and maps of the flow.
 
-Runs ``creeping_seal.toml``, derives what it asks to be observed, and draws where the water flows.
+Runs ``creeping_seal.toml``, computes the leak rate that it requests, and draws the flow of the water.
 
-    python workflows/creeping_seal.py [FIGURE] [FILM]
+    python workflows/creeping_seal.py [FIGURE]
 """
 
 import sys
@@ -16,7 +16,7 @@ import roughvisc as rv
 STUDY = Path(__file__).with_suffix(".toml")
 
 
-def main(figure="creeping_seal.png", film=None):
+def main(figure="creeping_seal.png"):
     with tempfile.TemporaryDirectory() as folder:
         rv.run(STUDY, folder, progress=False)
         (path,) = rv.observe(STUDY, folder)
@@ -27,9 +27,7 @@ def main(figure="creeping_seal.png", film=None):
         print(f"{float(time):8.3g} s   {1e9 * float(rate):9.3g} mm3/s   {100 * float(area):5.1f} % in contact")
     first = ds.isel(time=int(np.flatnonzero(~flowing)[0]))
     print(f"closed from {float(first.time):g} s on, {100 * float(first.contact_fraction):.1f} % in contact")
-    rv.plot.leakage(ds).savefig(figure, dpi=200)
-    if film is not None:
-        rv.plot.animate(ds, film, field="flux", rate=4)
+    rv.plot.maps(ds, fields="flux").savefig(figure, dpi=200)
     return ds
 
 

@@ -18,9 +18,9 @@ from roughvisc.errors import printable
 def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw figures of a result, a folder of results, or a trade.
 
-    Draws two figures of each result: history and maps, or curve and maps of friction. --all draws the rest. For a
-    folder with several cases, also draws figures of the sweep: quantities against the varied settings, and histories
-    of all cases. File names and titles state the varied settings.
+    Draws two figures of each result: history and maps, or friction curve and maps. --all also draws section and
+    surface. For a folder with several cases, also draws figures of the sweep: quantities against the varied settings,
+    and histories of all cases. File names and titles state the varied settings.
 
     \b
     Example:
@@ -57,9 +57,8 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 def report(results: Path, output: Path | None) -> None:
     """Write an HTML report of a result or a folder of results.
 
-    The report shows the contact at any case and time, the accuracy and cost of each case, the surface and its
-    conditioning, figures, assumptions, and how to repeat the study. It is one self-contained file that loads nothing
-    from the network.
+    The report shows the accuracy and cost of each case, figures, the surface and its conditioning, assumptions, and
+    how to repeat the study. It is one self-contained file that loads nothing from the network.
 
     \b
     Example:

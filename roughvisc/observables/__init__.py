@@ -17,32 +17,25 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.observables.area_theories import area_by_theory
 from roughvisc.observables.conductance import conductance
-from roughvisc.observables.cycles import cycle_energy
-from roughvisc.observables.densities import gap_distribution, gap_statistics, pressure_distribution
+from roughvisc.observables.cycles import cycle_work
+from roughvisc.observables.densities import gap_distribution, pressure_distribution
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
-from roughvisc.observables.response import area_growth, history, secant_stiffness, work
-from roughvisc.observables.spots import cluster_areas, clusters, contact, percolation
+from roughvisc.observables.response import history
+from roughvisc.observables.spots import cluster_areas, clusters, contact
 
 __all__ = [
     "area_by_theory",
-    "area_growth",
-    "asked",
     "cluster_areas",
     "clusters",
     "conductance",
     "contact",
-    "cycle_energy",
+    "cycle_work",
     "gap_distribution",
-    "gap_statistics",
     "history",
     "incremental_stiffness",
     "leakage",
-    "observe",
-    "percolation",
     "pressure_distribution",
-    "secant_stiffness",
-    "work",
 ]
 
 
@@ -52,37 +45,6 @@ def __dir__() -> list[str]:
 
 #: Table of ``[observe]`` -> what derives it from a result; the keys of the table are its keyword arguments.
 OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conductance": conductance}
-
-
-def observe(dataset: xr.Dataset) -> xr.Dataset:
-    """Compute all observables that the variables of a result allow.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result.
-
-    Returns
-    -------
-    xarray.Dataset
-        Clusters, percolation, gap statistics, growth exponent, secant stiffness and work over time, each with its unit;
-        ``xarray.merge([dataset, observe(dataset)])`` adds them to the result.
-
-    Raises
-    ------
-    InputError
-        If the cells of the grid are not equal.
-    """
-    found: list[xr.Dataset] = []
-    if "pressure" in dataset or "gap" in dataset:
-        found += [clusters(dataset), percolation(dataset)]
-    if "gap" in dataset:
-        found.append(gap_statistics(dataset))
-    if "contact_area" in dataset:
-        found.append(area_growth(dataset))
-    if "force" in dataset and "approach" in dataset:
-        found += [secant_stiffness(dataset), work(dataset)]
-    return xr.merge(found, compat="equals", join="exact")
 
 
 def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None = None) -> xr.Dataset:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +10,6 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
-from roughvisc.observables.connectivity import label_clusters
 from roughvisc.observables.frozen import over_frames
 from roughvisc.observables.resistivity import Kind, resistivities
 
@@ -32,9 +30,8 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     Returns
     -------
     xarray.Dataset
-        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], its error, and the estimates ending
-        in ``_holm`` and ``_greenwood``. Zero without contact; infinite in full contact with periodic boundaries. The
-        attribute ``resistivity`` states those of the two bodies.
+        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], and its error. Zero without contact;
+        infinite in full contact with periodic boundaries. The attribute ``resistivity`` states those of the two bodies.
 
     Raises
     ------
@@ -50,46 +47,28 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     boundaries the conductance is that of the constriction alone, for one period; the resistance of the bulk is not
     included. Nothing flows through the gap, and films on the spots have no resistance.
 
-    Of resistance over half the sum of the resistivities, with the spots' radii :math:`a_i` from their areas and
-    distances :math:`s_{ij}`, Greenwood [2]_ has
-    :math:`1/(2 \sum a_i) + \sum_{i \ne j} a_i a_j / s_{ij} / \pi (\sum a_i)^2`, and Holm
-    :math:`1/(2 \sum a_i) + 1/(2 \alpha)` with the radius :math:`\alpha` of the disc that the spots lie in.
-
     References
     ----------
     .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
-    .. [2] J. A. Greenwood, *Br. J. Appl. Phys.* 17 (1966) 1621-1632.
     """
     try:
         flows, both = resistivities(resistivity, kind)
     except InputError as error:
         raise InputError(f"resistivity: {error}") from None
-    stiffness, error, holm, greenwood = over_frames(dataset, _punch_and_estimates, outputs=4)
+    stiffness, error = over_frames(dataset, _punch, outputs=2)
     name, factor = f"{flows}_conductance", 2 / sum(both)
-    found = {
-        name: factor * stiffness,
-        f"{name}_error": factor * error,
-        f"{name}_holm": factor * holm,
-        f"{name}_greenwood": factor * greenwood,
-    }
+    found = {name: factor * stiffness, f"{name}_error": factor * error}
     described = describe(xr.Dataset(found))
     for variable in described.data_vars.values():
         variable.attrs["resistivity"] = list(both)
     return described
 
 
-def _punch_and_estimates(
+def _punch(
     touching: np.ndarray, present: np.ndarray, *, spacing: tuple[float, float], boundary: Any
-) -> tuple[float, float, float, float]:
-    """Stiffness of the spots over the contact modulus, its error, and Holm's and Greenwood's estimates of it. [m]"""
-    from roughvisc.mechanics.transport import spot_estimates, spots  # slow to import
+) -> tuple[float, float]:
+    """Stiffness of the spots over the contact modulus, and its error. [m]"""
+    from roughvisc.mechanics.transport.spots import frozen_contact  # slow to import
 
-    found = spots.frozen_contact(touching, spacing, boundary, present=present)
-    if math.isinf(found.stiffness):
-        return found.stiffness, found.error, math.inf, math.inf
-    periodic = boundary == "periodic"
-    labels, _ = label_clusters(touching, periodic)
-    radii, places = spot_estimates.round_spots(labels, present & ~touching, spacing, periodic)
-    period = (spacing[0] * touching.shape[0], spacing[1] * touching.shape[1]) if periodic else None
-    estimates = (one(radii, places, period) for one in (spot_estimates.holm, spot_estimates.greenwood))
-    return found.stiffness, found.error, *estimates  # type: ignore[return-value]
+    found = frozen_contact(touching, spacing, boundary, present=present)
+    return found.stiffness, found.error

@@ -1,4 +1,4 @@
-"""Distributions of pressure and gap over the cells, and statistics of the gap."""
+"""Distributions of pressure and gap over the cells."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.observables.derived import frame_by_frame, need
-from roughvisc.topography.blocks import count_of, mean_of, median_of, row_blocks
+from roughvisc.topography.blocks import row_blocks
 from roughvisc.units import quantities
 
 
@@ -90,30 +90,3 @@ def gap_distribution(dataset: xr.Dataset, bins=60) -> xr.Dataset:
     """
     need(dataset, "gap")
     return _density(dataset["gap"], bins, "gap")
-
-
-def gap_statistics(dataset: xr.Dataset) -> xr.Dataset:
-    """Mean and median gap over the present cells, including those in contact.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result with ``gap``.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``gap_mean`` and ``gap_median`` over time. [m]
-
-    Raises
-    ------
-    InputError
-        If the result holds no ``gap``.
-    """
-    need(dataset, "gap")
-
-    def measure(gap):
-        return (mean_of(gap), median_of(gap)) if count_of(gap) else (np.nan, np.nan)
-
-    mean, median = frame_by_frame(measure, dataset["gap"], outputs=2)
-    return describe(xr.Dataset({"gap_mean": mean, "gap_median": median}))

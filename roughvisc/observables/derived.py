@@ -1,4 +1,4 @@
-"""Application of a function of frames or of histories to a result."""
+"""Application of a function of one frame to every frame of a result."""
 
 from __future__ import annotations
 
@@ -90,16 +90,3 @@ def _one_after_the_other(function: Callable, fields, outputs: int, dtype: type, 
     dims = (*sizes, *(() if over is None else over[:1]))
     arrays = tuple(xr.DataArray(one, coords, dims) for one in found)
     return arrays[0] if outputs == 1 else arrays
-
-
-def along_time(function: Callable, *histories: xr.DataArray) -> xr.DataArray:
-    histories = tuple(one.chunk({"time": -1}) if one.chunks else one for one in histories)
-    return xr.apply_ufunc(
-        function,
-        *histories,
-        input_core_dims=[["time"]] * len(histories),
-        output_core_dims=[["time"]],
-        vectorize=True,
-        dask="parallelized",
-        output_dtypes=[float],
-    )

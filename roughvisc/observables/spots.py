@@ -1,4 +1,4 @@
-"""Contact clusters: position, number, size, percolation."""
+"""Contact clusters: position, number, size."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
-from roughvisc.observables.connectivity import cluster_sizes, percolates
+from roughvisc.observables.connectivity import cluster_sizes
 from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.variables.axes import axis_of
@@ -53,16 +53,14 @@ def _telling(dataset: xr.Dataset) -> tuple[xr.DataArray, Callable]:
     return dataset["gap"], lambda gap: gap <= 0
 
 
-def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
-    """Number and size of the contact clusters.
+def clusters(dataset: xr.Dataset) -> xr.Dataset:
+    """Number and size of the contact clusters. Cells that share only a corner are not connected.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``pressure`` or ``gap``. If its attribute ``boundary`` is ``"periodic"``, clusters continue across
         opposite borders.
-    connectivity : {4, 8}
-        Whether cells that share only a corner are apart or together.
 
     Returns
     -------
@@ -79,7 +77,7 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     field, touches = _telling(dataset)
 
     def measure(frame):
-        sizes = cluster_sizes(touches(frame), _is_periodic(dataset), connectivity)
+        sizes = cluster_sizes(touches(frame), _is_periodic(dataset))
         return (len(sizes), sizes.mean(), sizes[0]) if len(sizes) else (0.0, np.nan, np.nan)
 
     cell = math.prod(spacing(dataset, "clusters"))
@@ -95,15 +93,13 @@ def clusters(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     )
 
 
-def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
+def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
     """Area of every contact cluster; computed immediately, with one frame in memory at a time.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result with ``pressure`` or ``gap``.
-    connectivity : {4, 8}
-        Whether cells that share only a corner are apart or together.
 
     Returns
     -------
@@ -120,39 +116,8 @@ def cluster_areas(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
     rows = axis_of(field.dims)
     if field.dims != (rows, "x", "y"):
         raise InputError(f"the result has dimensions {field.dims}: choose one case first")
-    sizes = [cluster_sizes(touches(frame.values), _is_periodic(dataset), connectivity) for frame in field]
+    sizes = [cluster_sizes(touches(frame.values), _is_periodic(dataset)) for frame in field]
     areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
     for row, found in zip(areas, sizes, strict=True):
         row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
     return describe(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))
-
-
-def percolation(dataset: xr.Dataset, *, connectivity: int = 4) -> xr.Dataset:
-    """Whether the region out of contact connects opposite sides, so that the contact leaks.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A result with ``pressure`` or ``gap``; its attribute ``boundary`` states whether the map is periodic. Absent
-        cells are out of contact.
-    connectivity : {4, 8}
-        4: cells out of contact that share only a corner are not connected. 8: they are connected.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``percolates_x`` and ``percolates_y`` over time, 1 or 0. [1]
-
-    Raises
-    ------
-    InputError
-        If the result holds neither ``pressure`` nor ``gap``.
-    """
-    field, touches = _telling(dataset)
-    along_x, along_y = frame_by_frame(
-        lambda frame: percolates(~touches(frame), _is_periodic(dataset), connectivity),
-        field,
-        outputs=2,
-        dtype=bool,
-    )
-    return describe(xr.Dataset({"percolates_x": along_x.astype("int8"), "percolates_y": along_y.astype("int8")}))

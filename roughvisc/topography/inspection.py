@@ -171,7 +171,7 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
         tilt=tilt,
         borders=borders,
         noise=noise,
-        rms_slope=float(measures["rms_slope"]),
+        rms_slope=float(measures["Sdq"]),
         kurtosis=float(measures["Sku"]),
         area=float(np.prod([images * n * d for n, d in zip(treated.shape, spacing(treated), strict=True)])),
         shape=(images * treated.shape[0], images * treated.shape[1]),

@@ -20,9 +20,8 @@ PARAMETERS = {
     "Ssk": ("1", "skewness"),
     "Sku": ("1", "kurtosis"),
     "Sz": ("m", "maximum height, highest peak to lowest valley"),
-    "Sdq": ("1", "root mean square gradient"),
+    "Sdq": ("1", "root mean square gradient, the rms slope"),
     "Sdr": ("1", "developed interfacial area ratio, excess of the surface over its projection"),
-    "rms_slope": ("1", "root mean square slope, both directions together: the same as Sdq"),
     "rms_slope_x": ("1", "root mean square slope along x"),
     "rms_slope_y": ("1", "root mean square slope along y"),
     "rms_curvature": ("1/m", "root mean square of the mean curvature, half the Laplacian"),
@@ -43,7 +42,7 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr, rms_slope, rms_slope_x, rms_slope_y [-], rms_curvature [1/m] and
+        Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr, rms_slope_x, rms_slope_y [-], rms_curvature [1/m] and
         missing_fraction [-], each with units and a name. Missing points and differences with them are ignored; a
         parameter without any valid point is NaN. On a strip one cell wide, heights do not vary across it.
 
@@ -78,7 +77,6 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
             "Sz": (high - mean) - (low - mean),
             "Sdq": np.sqrt(gradient),
             "Sdr": excess,
-            "rms_slope": np.sqrt(gradient),
             "rms_slope_x": np.sqrt(along_x),
             "rms_slope_y": np.sqrt(along_y),
             "rms_curvature": np.sqrt(curvature),
@@ -94,7 +92,7 @@ def levelled_parameters(h: xr.DataArray) -> xr.Dataset:
 
 
 def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:
-    """Root mean square slope, that of :func:`parameters`, where the surface lies within a depth of its highest point.
+    """Root mean square slope, Sdq of :func:`parameters`, where the surface lies within a depth of its highest point.
 
     Parameters
     ----------

@@ -341,44 +341,9 @@ VARIABLES: dict[str, Variable] = {
         "probability density of the gap",
         "over the present cells out of contact: its integral is 1",
     ),
-    "gap_mean": Variable(_SERIES, "m", "mean gap over the present cells", "cells in contact included"),
-    "gap_median": Variable(_SERIES, "m", "median gap over the present cells", "cells in contact included"),
-    "area_growth_exponent": Variable(
-        _SERIES, "1", "growth exponent of the contact area", "d ln(area) / d ln(time), local"
-    ),
-    "secant_stiffness": Variable(
-        _SERIES,
-        "N/m",
-        "secant stiffness",
-        "slope of force over approach along the history; "
-        "includes the creep between kept times; missing while the approach stands still",
-    ),
-    "trapezoidal_work": Variable(
-        _SERIES,
-        "J",
-        "work by the trapezoidal rule",
-        "work done by the force since the first kept time: "
-        "trapezoidal integral of force over approach; over a closed loop it is the energy dissipated",
-    ),
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
     "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
     "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
-    "cycle_closure": Variable(
-        ("cycle",),
-        "1",
-        "closure of the loop",
-        "how far force and approach at the ends of the cycle are apart, "
-        "over their ranges in the cycle; 0: the loop is closed",
-    ),
-    "cycle_dissipated_energy": Variable(
-        ("cycle",), "J", "energy dissipated in the cycle", "missing where the loop does not close"
-    ),
-    "percolates_x": Variable(
-        _SERIES, "1", "percolation along x", "whether the region out of contact connects opposite sides", dtype="int8"
-    ),
-    "percolates_y": Variable(
-        _SERIES, "1", "percolation along y", "whether the region out of contact connects opposite sides", dtype="int8"
-    ),
     **TRANSPORT,
     **SPOTS,
     # a trade of accuracy against speed: what was set, what it cost, how wrong it was
@@ -437,8 +402,6 @@ _SURFACE = ("x", "y", "x_bounds", "y_bounds", "height", "filled")
 #: What is derived of a row alone, whatever the rows lie over.
 OF_A_ROW = (
     *(name for name in VARIABLES if name.startswith(("cluster_", "pressure_", "gap_")) and "error" not in name),
-    "percolates_x",
-    "percolates_y",
     *TRANSPORT,
     *(name for name in SPOTS if not name.endswith("contact_area")),
 )

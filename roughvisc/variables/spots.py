@@ -31,19 +31,6 @@ def _of(kind: str, units: str) -> dict[str, Variable]:
             f"stated error of the {kind} conductance",
             "of the grid and of the solver",
         ),
-        f"{name}_holm": Variable(
-            _SERIES,
-            units,
-            f"{kind} conductance, Holm",
-            "Holm's estimate: "
-            "many round spots side by side, in series with the disc that they lie in; the latter in free space only",
-        ),
-        f"{name}_greenwood": Variable(
-            _SERIES,
-            units,
-            f"{kind} conductance, Greenwood",
-            "Greenwood's estimate: round spots that interact as points, currents in proportion to the radii",
-        ),
     }
 
 

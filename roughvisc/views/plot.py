@@ -15,91 +15,48 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.variables.axes import axis_of
-from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures.files import write_figure
 from roughvisc.views.figures.rows import fullest_frame, require, rows_of
 
 if TYPE_CHECKING:  # for editors; at run time each is imported when it is first used
     from matplotlib.figure import Figure
 
-    from roughvisc.views.figures.animate import animate, animation
-    from roughvisc.views.figures.budget import budget
-    from roughvisc.views.figures.diagnostics import diagnostics
-    from roughvisc.views.figures.distributions import contact_clusters, distributions
-    from roughvisc.views.figures.fields import maps
-    from roughvisc.views.figures.friction import friction, friction_against_distance
-    from roughvisc.views.figures.histories import area_against_load, history, hysteresis
-    from roughvisc.views.figures.sections import section
-    from roughvisc.views.figures.stability import stability_map
-    from roughvisc.views.figures.surfaces import surface
-    from roughvisc.views.figures.trade import trade
-    from roughvisc.views.figures.transport import conductance, leakage
-    from roughvisc.views.sweep_figures.curves import friction_of_cases, histories_of_cases
-    from roughvisc.views.sweep_figures.files import save_sweep_figures
-    from roughvisc.views.sweep_figures.sweeps import sweep
 
-__all__ = [
-    "animate",
-    "animation",
-    "area_against_load",
-    "budget",
-    "conductance",
-    "contact_clusters",
-    "diagnostics",
-    "distributions",
-    "friction",
-    "friction_against_distance",
-    "friction_of_cases",
-    "histories_of_cases",
-    "history",
-    "hysteresis",
-    "leakage",
-    "maps",
-    "save_figures",
-    "save_sweep_figures",
-    "section",
-    "stability_map",
-    "surface",
-    "sweep",
-    "trade",
-]
-
-#: Modules that the figures are imported from when one is first used -> their figures.
-_MODULES = {
-    "figures.animate": ("animate", "animation"),
-    "figures.budget": ("budget",),
-    "figures.diagnostics": ("diagnostics",),
-    "figures.distributions": ("contact_clusters", "distributions"),
-    "figures.fields": ("maps",),
-    "figures.friction": ("friction", "friction_against_distance"),
-    "figures.histories": ("area_against_load", "history", "hysteresis"),
-    "figures.sections": ("section",),
-    "figures.stability": ("stability_map",),
-    "figures.surfaces": ("surface",),
-    "figures.trade": ("trade",),
-    "figures.transport": ("conductance", "leakage"),
-    "sweep_figures.curves": ("friction_of_cases", "histories_of_cases"),
-    "sweep_figures.files": ("save_sweep_figures",),
-    "sweep_figures.sweeps": ("sweep",),
+#: Public function -> module that it is imported from when it is first used.
+_HOMES = {
+    "animate": "figures.animate",
+    "animation": "figures.animate",
+    "area_against_load": "figures.histories",
+    "budget": "figures.budget",
+    "friction": "figures.friction",
+    "friction_against_distance": "figures.friction",
+    "friction_of_cases": "sweep_figures.curves",
+    "histories_of_cases": "sweep_figures.curves",
+    "history": "figures.histories",
+    "maps": "figures.fields",
+    "save_sweep_figures": "sweep_figures.files",
+    "section": "figures.sections",
+    "surface": "figures.surfaces",
+    "sweep": "sweep_figures.sweeps",
+    "trade": "figures.trade",
 }
-_HOMES = {name: module for module, names in _MODULES.items() for name in names}
+__all__ = sorted([*_HOMES, "save_figures"])
 
 
 def __getattr__(name: str) -> Any:
-    if name == "friction_maps":
-        raise AttributeError("rv.plot.friction_maps is no more: write rv.plot.maps(ds), where times= takes speeds too")
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = _imported(_HOMES[name], name)
+    globals()[name] = getattr(import_module(f"roughvisc.views.{_HOMES[name]}"), name)
     return globals()[name]
-
-
-def _imported(module: str, name: str) -> Any:
-    return getattr(import_module(f"roughvisc.views.{module}"), name)
 
 
 def __dir__() -> list[str]:
     return __all__
+
+
+def _leak_flow(dataset: xr.Dataset) -> Figure:
+    """Maps of the flux of the fluid that leaks."""
+    return __getattr__("maps")(dataset, fields="flux")
 
 
 #: What :func:`save_figures` draws: name -> (function, or the name of one of this module, variables of which all,
@@ -108,41 +65,32 @@ FIGURES: dict[str, tuple[Any, tuple[str, ...], tuple[str, ...]]] = {
     "friction": ("friction", ("speed", "friction_coefficient", "contact_fraction"), ()),
     "history": ("history", (), ("force", "approach", "contact_area")),
     "maps": ("maps", ("x", "y"), ("pressure", "gap")),
+    "leakage": (_leak_flow, ("leak_rate", "gap", "x", "y"), ()),
     "section": ("section", ("height",), ("gap", "displacement")),
-    "distributions": ("distributions", (), ("pressure", "gap")),
-    "clusters": ("contact_clusters", ("x", "y"), ("pressure", "gap")),
-    "hysteresis": ("hysteresis", ("time", "force", "approach"), ()),
-    "leakage": ("leakage", ("leak_rate", "gap"), ()),
-    "conductance": ("conductance", (), CONDUCTANCES),
     "slide": ("friction_against_distance", ("time", "sliding_distance", "friction_coefficient"), ()),
     "surface": ("surface", ("height",), ()),
-    "diagnostics": ("diagnostics", (), ("iterations", "convolutions", "stated_error")),
 }
-
-#: Those of them that are drawn only where they say something, and what tells that: module and function.
-TELLING = {"clusters": ("figures.distributions", "has_clusters"), "hysteresis": ("figures.histories", "has_loop")}
-
-#: What is drawn unless more is asked for, of each line the first that a result allows.
-DEFAULT = (("friction", "history"), ("maps",), ("leakage",), ("conductance",))
+#: Figures that are drawn unless all are requested.
+DEFAULT = ("friction", "history", "maps", "leakage")
 
 
 def allowed_figures(dataset: xr.Dataset) -> list[str]:
-    """Names of the figures that the variables of a result allow."""
-    return [
+    """Names of the figures that the variables of a result allow; a friction curve needs no history besides."""
+    names = [
         name
         for name, (_, needed, wanted) in FIGURES.items()
         if all(one in dataset for one in needed) and (not wanted or any(one in dataset for one in wanted))
     ]
+    return [name for name in names if name != "history" or "friction" not in names]
 
 
 def default_figures(dataset: xr.Dataset) -> list[str]:
-    """Names of the few figures that are drawn unless more is asked for: histories, or a curve of friction, and maps."""
-    allowed = allowed_figures(dataset)
-    return [next(name for name in line if name in allowed) for line in DEFAULT if {*line} & {*allowed}]
+    """Names of the figures that are drawn unless all are requested: history or friction curve, maps, leakage."""
+    return [name for name in allowed_figures(dataset) if name in DEFAULT]
 
 
 def figures_of(dataset: xr.Dataset, leave: str = "", *, every: bool = True) -> Iterator[tuple[str, Figure]]:
-    """Name and figure of all that the variables of a result allow and that says something of it.
+    """Name and figure of all that the variables of a result allow.
 
     The section is drawn in the last row of the largest contact area.
 
@@ -153,10 +101,10 @@ def figures_of(dataset: xr.Dataset, leave: str = "", *, every: bool = True) -> I
     leave : str
         Name of one to leave out.
     every : bool
-        False: only the few of :func:`default_figures`; others are not imported.
+        False: only those of :func:`default_figures`; others are not imported.
     """
     for name in allowed_figures(dataset) if every else default_figures(dataset):
-        if name == leave or (name in TELLING and not _imported(*TELLING[name])(dataset)):
+        if name == leave:
             continue
         draw = FIGURES[name][0]
         draw = draw if callable(draw) else __getattr__(draw)
@@ -176,8 +124,7 @@ def save_figures(
 ) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
-    Of a curve of friction these are the curve and maps of the pressure. Clusters are drawn where the contact has three
-    or more, hysteresis where the approach comes back.
+    Of a friction curve these are the curve and maps of the pressure.
 
     Parameters
     ----------
@@ -194,7 +141,7 @@ def save_figures(
     title : str
         What stands above each figure, such as the case that it shows.
     every : bool
-        False: only the first two, history and maps, or curve and maps of friction, and those of observables.
+        False: only history or friction curve, maps, and the leak flow.
 
     Returns
     -------

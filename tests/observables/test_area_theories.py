@@ -14,7 +14,7 @@ from roughvisc.views import plot
 
 SIDE = 1e-3
 SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE / 3, seed=3)
-SLOPE = float(rv.parameters(SURFACE, periodic=True)["rms_slope"])
+SLOPE = float(rv.parameters(SURFACE, periodic=True)["Sdq"])
 RUBBER = rv.zener(3e6, 1e6, 1e5)
 
 

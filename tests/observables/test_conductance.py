@@ -12,8 +12,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
-from roughvisc.observables import conductance, incremental_stiffness, secant_stiffness
-from roughvisc.variables import VARIABLES
+from roughvisc.observables import conductance, incremental_stiffness
 
 RADIUS = 1e-2
 RUBBER = rv.zener(3e6, 1e6, 1e5)
@@ -44,8 +43,6 @@ def test_ball__conducts_as_a_disc_of_its_radius(ball):
     off = found["thermal_conductance"] / (4 * radius / 5.02) - 1
     assert np.abs(off).max() < 1.5e-2
     assert (np.abs(off) < found["thermal_conductance_error"] / found["thermal_conductance"]).all()
-    for estimate in ("holm", "greenwood"):  # one spot: nothing interacts
-        np.testing.assert_allclose(found[f"thermal_conductance_{estimate}"] / (4 * radius / 5.02), 1, atol=1.5e-2)
     assert found["thermal_conductance"].attrs["units"] == "W/K"
     assert conductance(ball, ("2 ohm m", 0))["electrical_conductance"].attrs["units"] == "S"
 
@@ -85,7 +82,7 @@ def test_results__on_dask_are_alike_and_lazy(ball):
 
 
 def test_stiffness__is_what_a_small_increment_of_load_meets():
-    """Of an elastic ball: ``dF/d(approach)`` between two loads, from two runs; the secant of creep is another one."""
+    """Of an elastic ball: ``dF/d(approach)`` between two loads, from two runs."""
     ball = rv.elastic(3e6)
     loads = 0.02 * np.array([0.999, 1.001])
     below, above = (pressed(ball, load, tolerance=1e-6, cells=31).isel(time=0) for load in loads)
@@ -116,7 +113,6 @@ def test_stiffness__of_a_rubber_is_that_at_once(ball):
     np.testing.assert_allclose(found["incremental_stiffness_error"], 12e6 * found["frozen_stiffness_error"])
     slow = incremental_stiffness(ball, contact_modulus="3 MPa")["incremental_stiffness"]
     np.testing.assert_allclose(slow, found["incremental_stiffness"] / 4)
-    assert not np.allclose(secant_stiffness(ball)["secant_stiffness"], found["incremental_stiffness"], rtol=0.5)
     with pytest.raises(InputError, match="expected a positive number"):
         incremental_stiffness(ball, contact_modulus=0)
 
@@ -161,7 +157,6 @@ def test_no_contact_and_full_contact(boundary):
     assert (found.isel(time=0).to_array() == 0).all()
     square = math.pi * 0.36678742 * 8e-6 if boundary == "free" else math.inf
     assert float(found["thermal_conductance"][1]) == pytest.approx(square, rel=2e-3)
-    assert np.isinf(found["thermal_conductance_greenwood"][1]) == (boundary == "periodic")
 
 
 def test_punch__is_corrected_and_no_worse_for_its_staircase():
@@ -171,9 +166,3 @@ def test_punch__is_corrected_and_no_worse_for_its_staircase():
     found = float(conductance(ds, (1, 1))["thermal_conductance"][0])
     area = float(contact.sum()) * (1.2e-3 / 48) * (1.2e-3 / 47)
     assert found == pytest.approx(2 * math.sqrt(area / math.pi), rel=1e-3)
-
-
-def test_variables__state_their_errors():
-    for name in ("thermal_conductance", "electrical_conductance", "incremental_stiffness", "frozen_stiffness"):
-        assert VARIABLES[name].ancillary == (f"{name}_error",)
-        assert VARIABLES[f"{name}_error"].units == VARIABLES[name].units

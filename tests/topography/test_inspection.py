@@ -86,9 +86,7 @@ def test_noise__of_known_strength_is_found(shape):
     assert found.noise.rms == pytest.approx(2e-9, rel=0.1)
     assert found.noise.wavelength == pytest.approx(1.2e-5, rel=0.25)  # the surface has no shorter waves
     assert found.steps["filter"] == pytest.approx(found.noise.wavelength, rel=0.05)
-    assert found.rms_slope == pytest.approx(
-        float(rv.parameters(smooth).rms_slope), rel=0.2
-    )  # and a little of the surface
+    assert found.rms_slope == pytest.approx(float(rv.parameters(smooth).Sdq), rel=0.2)  # and a little of the surface
 
 
 def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():

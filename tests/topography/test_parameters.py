@@ -42,7 +42,7 @@ def test_parameters__of_waves_are_the_closed_forms(waves):
     assert abs(float(found["Ssk"])) < 1e-10
     assert float(found["Sz"]) == pytest.approx(2 * amplitude, rel=1e-3)
     slope = amplitude * q / np.sqrt(2)
-    assert float(found["rms_slope"]) == pytest.approx(slope, rel=1e-3)
+    assert float(found["Sdq"]) == pytest.approx(slope, rel=1e-3)
     assert float(found["rms_slope_y"]) == pytest.approx(0 if waves == 1 else slope / np.sqrt(2), rel=1e-3, abs=1e-12)
     assert float(found["rms_curvature"]) == pytest.approx(
         amplitude * q**2 / 2 * (0.5**0.5 if waves == 1 else 1), rel=1e-3
@@ -50,12 +50,12 @@ def test_parameters__of_waves_are_the_closed_forms(waves):
     assert float(found["Sdr"]) == pytest.approx(slope**2 / 2, rel=0.01)  # small slopes
 
 
-@pytest.mark.parametrize("order", ["slope", "curvature"])
-def test_parameters__differences_converge_at_second_order(order):
+@pytest.mark.parametrize("name", ["Sdq", "rms_curvature"])
+def test_parameters__differences_converge_at_second_order(name):
     q = 2 * np.pi / 1e-4
-    exact = {"rms_slope": 1e-6 * q / np.sqrt(2), "rms_curvature": 1e-6 * q**2 / 2}[f"rms_{order}"]
+    exact = {"Sdq": 1e-6 * q / np.sqrt(2), "rms_curvature": 1e-6 * q**2 / 2}[name]
     errors = [
-        abs(float(parameters(wavy(1e-6, 1e-4, SIZE, (3 * n, 2 * n + 2)), periodic=True)[f"rms_{order}"]) / exact - 1)
+        abs(float(parameters(wavy(1e-6, 1e-4, SIZE, (3 * n, 2 * n + 2)), periodic=True)[name]) / exact - 1)
         for n in (25, 51)
     ]
     assert np.log(errors[0] / errors[1]) / np.log(51 / 25) == pytest.approx(2, abs=0.1)
@@ -63,7 +63,7 @@ def test_parameters__differences_converge_at_second_order(order):
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_rms_slope__is_that_of_the_parameters(periodic):
-    assert rms_slope(ROUGH, periodic) == float(parameters(ROUGH, periodic)["rms_slope"])
+    assert rms_slope(ROUGH, periodic) == float(parameters(ROUGH, periodic)["Sdq"])
 
 
 def test_rms_slope__of_what_is_near_the_highest_point():
@@ -79,7 +79,7 @@ def test_rms_slope__of_what_is_near_the_highest_point():
 def test_parameters__agree_with_surface_topography(periodic):
     found, their = parameters(ROUGH, periodic=periodic), theirs(ROUGH, periodic)
     assert float(found["Sq"]) == pytest.approx(their.Sq(), rel=1e-12)
-    assert float(found["rms_slope"]) == pytest.approx(their.rms_gradient(), rel=1e-12)
+    assert float(found["Sdq"]) == pytest.approx(their.rms_gradient(), rel=1e-12)
     assert float(found["rms_curvature"]) == pytest.approx(their.rms_laplacian() / 2, rel=1e-12)
     if periodic:
         assert float(found["rms_slope_x"]) == pytest.approx(their.Rdq(), rel=1e-12)

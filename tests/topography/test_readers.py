@@ -487,7 +487,7 @@ def test_ground_steel__presses_nicely_after_conditioning():
     assert "ynthetic" in h.attrs["title"] + h.attrs["description"]
     found = parameters(h, periodic=True)
     assert float(found["Sq"]) == pytest.approx(0.5e-6, rel=0.1)
-    assert float(found["rms_slope"]) == pytest.approx(0.1, rel=0.1)
+    assert float(found["Sdq"]) == pytest.approx(0.1, rel=0.1)
     assert float(found["rms_slope_y"] / found["rms_slope_x"]) > 3  # ground along x
     assert float(h.max()) < 5 * float(found["Sq"])  # no spike is left
     # across the border it is as smooth as within

@@ -103,7 +103,7 @@ def texture_of(height: xr.DataArray, boundary: str, recipe: str = "") -> Texture
         size=size,
         analytic=analytic,
         stated=_stated_waves(recipe, height, cells, analytic),
-        slope=float(measures["rms_slope"]),
+        slope=float(measures["Sdq"]),
         laplacian=2 * float(measures["rms_curvature"]),
         mismatch=max(border_mismatch(height).of_neighbours),
         **whole,

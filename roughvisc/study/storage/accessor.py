@@ -1,7 +1,6 @@
 """The accessor ``ds.roughvisc``: steps of a result, observables, and figures.
 
-``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``,
-and ``ds.roughvisc.plot()`` draws maps without a choice of the figure.
+``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
 Whatever opens or makes a result registers it. Each function is imported when it is asked for.
 """
 
@@ -23,8 +22,6 @@ _PLOT = "plot_"
 _STORE = "roughvisc.study.storage.store"
 #: beginning of a method's name -> module whose public names follow
 _ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.views.plot"}
-#: Module of the figure that needs no choice.
-_QUICK = "roughvisc.views.figures.quick_plot"
 
 
 @xr.register_dataset_accessor("roughvisc")
@@ -50,8 +47,6 @@ class ResultAccessor:
         return require_steps(dataset)
 
     def __getattr__(self, name: str) -> Any:
-        if name == "plot":
-            return _method(import_module(_QUICK).quick_plot, self._dataset)
         if name.startswith("_"):  # what notebooks and copies ask every object for
             raise AttributeError(name)
         start = _PLOT if name.startswith(_PLOT) else ""
@@ -71,4 +66,4 @@ def _method(function: Callable[..., Any], dataset: xr.Dataset) -> partial[Any]:
 
 
 def _methods() -> list[str]:
-    return ["plot"] + [f"{start}{name}" for start, module in _ROOMS.items() for name in import_module(module).__all__]
+    return [f"{start}{name}" for start, module in _ROOMS.items() for name in import_module(module).__all__]

@@ -20,7 +20,7 @@ from roughvisc.variables.axes import axis_of
 #: Cells along the longer side up to which a map is drawn as it is.
 MOST_DRAWN = 1024
 #: What stands for a block of cells; what is not here, by its mean.
-_KEPT = {"pressure": "largest", "gap": "smallest", "contact": "any"}
+_KEPT = {"pressure": "largest", "gap": "smallest", "contact": "any", "flux": "largest"}
 
 
 def stride(dataset: xr.Dataset | xr.DataArray) -> int:

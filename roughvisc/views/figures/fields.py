@@ -14,7 +14,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colorbar import Colorbar, make_axes
-from matplotlib.colors import Colormap, Normalize
+from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
+from roughvisc.observables import asked, leakage
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Unit, in_si, unit_for
@@ -36,6 +37,8 @@ from roughvisc.views.figures.rows import RowAxis, frames_at, require, rows_of, t
 COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}
 COLOUR_MAPS["flux"] = "cividis_r"
 _MOST_MAPS = 24
+#: Decades of the flux below its largest that a map shows.
+_DECADES = 3
 #: Values from which some may lie beyond a scale.
 _MANY = 1_000
 #: Width of the outline of the contact, and part of a map that it may cover: beyond it there is none. [point], [-]
@@ -55,12 +58,14 @@ _LABELLED = 1.1
 
 
 def colour_map(name: str) -> Colormap:
-    """Colour map of a field: absent cells grey, contact on a map of the gap or flux, and no contact on one of pressure.
+    """Colour map of a field, with colours for missing values and for values below the scale.
 
-    The last two lie below the scale.
+    Missing cells are grey; a flux is missing in contact. Contact lies below the scale of the gap, no contact below that
+    of the pressure, fluid at rest below that of the flux.
     """
-    under = {"pressure": style.NO_CONTACT, "gap": style.CONTACT}.get(name)
-    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=style.ABSENT, under=under)
+    under = {"pressure": style.NO_CONTACT, "gap": style.CONTACT, "flux": style.NO_CONTACT}.get(name)
+    bad = style.CONTACT if name == "flux" else style.ABSENT
+    return matplotlib.colormaps[COLOUR_MAPS[name]].with_extremes(bad=bad, under=under)
 
 
 def plane_unit(dataset: xr.Dataset | xr.DataArray) -> Unit:
@@ -79,15 +84,16 @@ def bar_side(dataset: xr.Dataset | xr.DataArray) -> str:
     return "top" if plane_ratio(dataset) < 0.4 else "right"
 
 
-def measured_part(dataset: xr.Dataset) -> xr.Dataset:
-    """The part of a result that was measured, where the surface was made to repeat by its mirror images.
+def measured_part(surface: Any) -> Any:
+    """Return the measured part of a result, or of heights, of a surface that was given its mirror images.
 
-    The history stays where a surface is cropped afterwards, so that the heights must still be their own mirror images.
+    The history stays if a surface is cropped afterwards, so the heights must still be their own mirror images.
     """
-    mirrored = MIRRORED in str(dataset.attrs.get("history", "")).split("\n")
-    if not (mirrored and "height" in dataset and is_mirrored(dataset["height"].values)):
-        return dataset
-    return dataset.isel({axis: slice(0, dataset.sizes[axis] // 2) for axis in ("x", "y")})
+    mirrored = MIRRORED in str(surface.attrs.get("history", "")).split("\n")
+    height = surface if isinstance(surface, xr.DataArray) else surface.get("height")
+    if not mirrored or height is None or not is_mirrored(height.transpose("x", "y").values):
+        return surface
+    return surface.isel({axis: slice(0, surface.sizes[axis] // 2) for axis in ("x", "y")})
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, plane: Unit, **limits) -> AxesImage:
@@ -178,7 +184,12 @@ def map_legend(images: Sequence[AxesImage]) -> dict[str, Artist]:
         named["contact"] = Patch(color=style.CONTACT, lw=0)
     if "pressure" in below:
         named["no contact"] = Patch(facecolor=style.NO_CONTACT, edgecolor="0.5", lw=0.4)
-    if any(np.ma.getmaskarray(values).any() for _, values, _ in shown):
+    masked = {name for name, values, _ in shown if np.ma.getmaskarray(values).any()}
+    if "flux" in masked:
+        named["contact"] = Patch(color=style.CONTACT, lw=0)
+    if "flux" in below:
+        named["no flow"] = Patch(facecolor=style.NO_CONTACT, edgecolor="0.5", lw=0.4)
+    if masked - {"flux"}:
         named["missing"] = Patch(color=style.ABSENT, lw=0)
     return named
 
@@ -199,12 +210,13 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
 def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
     """Maps of fields at chosen times, or speeds, with the contact; one colour scale a field for all of them.
 
-    Contact is orange: an outline on maps of what is known everywhere, or the colour of its cells on maps of the gap. An
-    outline that would bury the map is left out. Of more than 1024 cells a side a cell drawn stands for a block of them:
-    for their largest pressure, their smallest gap, and contact if any of them touches; the figure says so. One frame is
-    read at a time, some rows at a time. The scale leaves out spikes, two of a thousand values at most: an arrow and the
-    largest value tell of them. Of a surface that repeats by its mirror images the part that was measured is drawn. Of a
-    curve of friction an arrow shows where the profile moves, in whose frame the maps are.
+    Contact is orange: an outline, or the colour of its cells on maps of the gap and the flux. The outline is omitted if
+    it would cover more than 10 % of the map. Of more than 1024 cells a side one cell is drawn for a block of them, with
+    their largest pressure and their smallest gap, and in contact if any of them is; the figure says so. One frame is
+    read at a time, some rows at a time. The colour scale may leave out two of a thousand values: an arrow and the
+    maximum at the colour bar indicate them. The flux is drawn on a logarithmic scale of three decades. Of a mirrored
+    surface only the measured part is drawn. Of a friction curve an arrow shows the direction in which the profile
+    moves; the maps are in its frame.
 
     Parameters
     ----------
@@ -215,7 +227,9 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressu
         last. By default up to four over the time in contact, that of the largest contact area among them; of a curve of
         friction the lowest speed, that of the largest friction, and the highest. [s]
     fields : sequence of str
-        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out.
+        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out. Or
+        ``"flux"`` of the fluid that leaks, which is computed from the gap with the arguments of the ``leak_rate`` in
+        the result or of ``[observe]``, else with the defaults of :func:`roughvisc.observables.leakage`.
 
     Returns
     -------
@@ -229,8 +243,11 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressu
     require(dataset, "x", "y")
     fields = [fields] if isinstance(fields, str) else list(fields)
     for name in fields:
-        if name not in FIELDS:
-            raise InputError(f"field {name!r} is unknown: expected some of {', '.join(FIELDS)}")
+        if name not in (*FIELDS, "flux"):
+            raise InputError(key="fields", found=name, expected=f"some of {', '.join(FIELDS)}, flux")
+    if "flux" in fields:
+        require(dataset, "gap")
+        dataset = dataset.assign(flux=_flux_of(dataset))
     stored = [name for name in fields if name in dataset]
     if not stored:
         require(dataset, *fields)
@@ -240,9 +257,23 @@ def maps(dataset: xr.Dataset, times=None, fields: Sequence[str] | str = ("pressu
     images = [_draw_field(figure, p, dataset, name, frames) for name, p in zip(stored, axes, strict=True)]
     _label_maps(axes, dataset, _frame_texts(dataset, frames))
     style.legend_above(figure, map_legend(list(chain.from_iterable(images))))
-    mirrored = "" if dataset is whole else "The part that was measured; its mirror images are not drawn."
+    mirrored = "" if dataset is whole else "Measured area only; mirror images are not shown."
     style.note_below(figure, mirrored, _nominal(dataset, frames), note(dataset, *stored))
     return figure
+
+
+def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
+    """Magnitude of the flux over (time, x, y), missing in contact, lazily."""
+    stated = dataset if "leak_rate" in dataset else asked(dataset)
+    options = {}
+    if "leak_rate" in stated:
+        attributes = stated["leak_rate"].attrs
+        options = {name: attributes[name] for name in ("along", "sides", "viscosity", "pressure_drop")}
+    lazily = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1})
+    lazily.attrs = dataset.attrs
+    found = leakage(lazily, flow=True, **options)
+    size = np.hypot(found["flux_x"], found["flux_y"]).where(lazily["gap"] > 0)
+    return size.rename("flux").assign_attrs(VARIABLES["flux"].attributes())
 
 
 def _map_panels(dataset: xr.Dataset, frames: int, fields: int) -> tuple[Figure, np.ndarray]:
@@ -264,10 +295,13 @@ def _draw_field(figure: Figure, axes: np.ndarray, dataset: xr.Dataset, name: str
     shown = [as_shown(dataset, name, frame) for frame in frames]
     scale = value_scale(name, np.concatenate([one.values.ravel() for one in shown]))
     unit, plane = unit_for([scale.high], VARIABLES[name].units), plane_unit(dataset)
-    limits = scale.limits(unit)
+    limits: dict[str, Any] = scale.limits(unit)
+    if name == "flux":
+        limits = {"norm": LogNorm(**limits)}
+        shown = [one.clip(min=0.1 * scale.low) for one in shown]  # a logarithm of zero is missing, not low
     images = [draw_map(ax, one, unit, plane, **limits) for ax, one in zip(axes.ravel(), shown, strict=False)]
     spots = [touching(dataset, frame) for frame in frames] if {"pressure", "gap"} & set(dataset) else []
-    if name != "gap" and all(can_be_outlined(one.values) for one in spots):
+    if name not in ("gap", "flux") and all(can_be_outlined(one.values) for one in spots):
         for image, one in zip(images, spots, strict=False):
             draw_outline(image.axes, one, plane)
     colour_bar(figure, images, scale, unit)
@@ -319,11 +353,15 @@ class Scale:
 def value_scale(name: str, values: np.ndarray) -> Scale:
     """Colour scale of the known values of a field: by quantiles, where a few values lie far beyond all others. [SI]
 
-    Those of pressure and gap begin at zero, but that of pressure in contact everywhere may begin higher.
+    Those of pressure and gap begin at zero, but that of pressure in contact everywhere may begin higher. That of the
+    flux has three decades.
     """
     values = values[np.isfinite(values)]
-    if not values.size:
+    if not values.size and name != "flux":
         return Scale(name, 0.0, 0.0, 0.0, 0.0, False)
+    if name == "flux":
+        highest = float(values.max(initial=0.0)) or 1.0
+        return Scale(name, highest * 10.0**-_DECADES, highest, 0.0, highest, True)
     lowest, highest = float(values.min()), float(values.max())
     positive = name not in ("displacement", "height")
     marked = positive and lowest <= 0

@@ -90,28 +90,24 @@ def _draw_against_distance(ax: Axes, distance: np.ndarray, values: np.ndarray, c
     ax.plot(distance[first:], values[first:], color=colour)
 
 
-#: What is drawn on the left and on the right: of the solution, by Persson's theory, the grid's error of it, and what
-#: the last octave of waves adds to it.
+#: What is drawn on the left and on the right: of the solution, by Persson's theory, and the error of the grid.
 _DRAWN = (
-    ("friction_coefficient", "persson_friction_coefficient", "grid_error_friction", "last_octave_friction"),
-    ("contact_fraction", "persson_contact_fraction", "grid_error_area", "last_octave_area"),
+    ("friction_coefficient", "persson_friction_coefficient", "grid_error_friction"),
+    ("contact_fraction", "persson_contact_fraction", "grid_error_area"),
 )
 _TOLD = {
     "computed": "computed",
     "theory": "Persson (2001): waves stressed as in full contact",
     "grid": "error of the grid",
-    "octave": "without the shortest octave of waves",
 }
-#: Part that the shortest octave may add, of friction or of area, before it is drawn.
-_MUCH = 0.05
 
 
 @style.apply
 def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
-    Speeds whose iteration did not converge are drawn as open circles. Bands show the error of the grid, where the
-    result states it; dashed lines what is left without the shortest octave of waves, where that is 5 % less or more.
+    Speeds whose iteration did not converge are drawn as open circles. Bands show the error of the grid, if the
+    result states it.
 
     Parameters
     ----------
@@ -150,10 +146,10 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
 
 
 def _draw(
-    axes: Axes, ordered: xr.Dataset, names: tuple[str, str, str, str], across: Unit, colour: str, persson: bool
+    axes: Axes, ordered: xr.Dataset, names: tuple[str, str, str], across: Unit, colour: str, persson: bool
 ) -> dict[str, Line2D | Patch]:
     """One quantity on its axis; entries of a legend for what is drawn beside the solution."""
-    solved, theory, grid, octave = names
+    solved, theory, grid = names
     speed, settled = across(ordered["speed"].values), ordered["status"].values != NOT_CONVERGED
     values = ordered[solved].values
     told: dict[str, Line2D | Patch] = {}
@@ -166,11 +162,6 @@ def _draw(
         axes.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
         told["grid"] = Patch(color="0.3", alpha=0.25, lw=0)
         most.append((values + error)[np.isfinite(error)])
-    if octave in ordered and float(np.nanmax(np.abs(ordered[octave].values), initial=0.0)) > _MUCH:
-        left = values * (1 - ordered[octave].values)
-        axes.plot(speed, left, "--", color=colour, lw=0.9, label=f"{SLIDING[solved].label}, {_TOLD['octave']}")
-        told["octave"] = Line2D([], [], color="0.3", ls="--", lw=0.9)
-        most.append(left[np.isfinite(left)])
     if persson:
         axes.plot(speed, ordered[theory].values, ":", color=colour, label=SLIDING[theory].label)
         told["theory"] = Line2D([], [], color="0.3", ls=":")

@@ -1,4 +1,4 @@
-"""Figures of histories: force, approach and area over the axis of a result, hysteresis loops, area against load."""
+"""Figures of histories: quantities over the axis of a result, and area against load."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from roughvisc.errors import InputError
 from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
 from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
-from roughvisc.observables.cycles import cycle_energy, has_cycles
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities, unit_for
@@ -31,6 +30,10 @@ _PANELS = (
     ("contact_area", style.CONTACT),
     ("mean_gap", style.PURPLE),
     ("work", style.ORANGE),
+    ("friction_coefficient", style.BLUE),
+    ("leak_rate", style.SKY),
+    ("thermal_conductance", style.VERMILION),
+    ("electrical_conductance", style.VERMILION),
 )
 #: What else belongs in a panel, with its label, colour and dashes.
 _BESIDE = {
@@ -38,13 +41,9 @@ _BESIDE = {
         ("contact_area_counted", "counted", "k", (0, (4, 2))),
         ("persson_contact_area", "Persson", "0.5", (0, (1, 1.5))),
     ),
-    "work": (
-        ("stored_energy", "stored", "k", (0, (4, 2))),
-        ("dissipated_energy", "dissipated", "0.5", (0, (1, 1.5))),
-    ),
 }
-#: The line that they stand beside.
-_ITSELF = {"contact_area": "corrected", "work": "in all"}
+#: Largest over smallest leak rate from which its axis is logarithmic.
+_SPANS = 30.0
 #: Panels up to which they stand in one column.
 _ONE_COLUMN = 3
 
@@ -57,36 +56,45 @@ def failed_frames(dataset: xr.Dataset) -> np.ndarray:
 
 
 def steps_of(dataset: xr.Dataset) -> xr.Dataset:
-    """Histories of every accepted step over the axis of a result; of one that has no steps, its rows."""
+    """Histories of every time step over the axis of a result; its rows if it holds no steps."""
     return over_steps(dataset) if axis_of(dataset.variables) == "time" else dataset
 
 
 def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Dataset, name: str, colour: str) -> None:
-    """A line through every accepted step, and a dot at each kept time."""
-    times, values = axis.unit(rows_of(steps)), steps[name].values
+    """Draw a line through every time step, if the result holds them all, and a dot at each kept time."""
+    on = steps if name in steps else dataset
+    times, values = axis.unit(rows_of(on)), on[name].where(np.isfinite(on[name])).values
+    spans = name == "leak_rate" and np.nanmax(values, initial=0.0) > _SPANS * values[values > 0].min(initial=np.inf)
+    values = np.where(values > 0, values, np.nan) if spans else values
     unit = unit_for(values, VARIABLES[name].units)
-    beside = [one for one in _BESIDE.get(name, ()) if one[0] in steps and steps[one[0]].notnull().any()]
-    ax.plot(times, unit(values), color=colour, label=_ITSELF[name] if beside else "_")
+    beside = [one for one in _BESIDE.get(name, ()) if one[0] in on and on[one[0]].notnull().any()]
+    ax.plot(times, unit(values), color=colour, label="corrected" if beside else "_")
     kept = axis.unit(rows_of(dataset))
     if marker := style.marker_of(len(kept)):
-        ax.plot(kept, unit(dataset[name]), ls="", marker=marker, color=colour)
+        shown = dataset[name].where(dataset[name] > 0) if spans else dataset[name].where(np.isfinite(dataset[name]))
+        ax.plot(kept, unit(shown), ls="", marker=marker, color=colour)
     else:
         ax.plot(kept, np.zeros(len(kept)), "|", color="0.4", ms=5, mew=0.4, transform=ax.get_xaxis_transform())
-    failed = failed_frames(steps)
+    failed = failed_frames(on)
     ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5)
     for other, said, shade, dashes in beside:
-        ax.plot(times, unit(steps[other]), color=shade, ls=dashes, lw=0.9, label=said)
-    style.leave_room(ax, *(unit(steps[one]) for one in (name, *(one[0] for one in beside))))
-    ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+        ax.plot(times, unit(on[other]), color=shade, ls=dashes, lw=0.9, label=said)
+    if spans:
+        style.spread_axis(ax.yaxis, unit(values))
+    else:
+        style.leave_room(
+            ax, *(unit(on[one].where(np.isfinite(on[one]))) for one in (name, *(one[0] for one in beside)))
+        )
+        ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
     ax.set_ylabel(style.broken(unit.label(VARIABLES[name].label), 1.0))
 
 
 def marks_of_rows(dataset: xr.Dataset, steps: xr.Dataset) -> dict[str, Line2D]:
-    """What lines and marks of histories mean: accepted steps, kept times or speeds, and what did not converge."""
+    """Legend of lines and marks of histories: time steps, kept times or speeds, and steps that did not converge."""
     rows, named = AXES[axis_of(dataset.variables)].rows, {}
     count = rows_of(dataset).size
     if rows_of(steps).size > count:
-        named["accepted steps"] = Line2D([], [], color="0.3")
+        named["time steps"] = Line2D([], [], color="0.3")
     look = {"marker": style.marker_of(count)} if style.marker_of(count) else {"marker": "|", "mew": 0.4, "ms": 5}
     named[rows] = Line2D([], [], color="0.3", ls="", **look)
     if failed_frames(steps).any():
@@ -106,17 +114,16 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
     ratio = float(np.nanmean(ratios))
     if ratio > 0 and float(np.nanmax(np.abs(ratios - ratio))) < 1e-6 * ratio:
         right = ax.secondary_yaxis("right", functions=(lambda shown: shown * ratio, lambda shown: shown / ratio))
-        right.set_ylabel("of nominal\n[%]")
+        right.set_ylabel("Contact\nfraction [%]")
 
 
 @style.apply
 def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
-    """Force, approach, contact area, mean gap and work over the axis of a result.
+    """Draw force, approach, contact area, mean gap, work and rates over the axis of a result.
 
-    Lines are of every accepted step, dots of the kept times: of so many that they would touch, a stroke at the axis
-    each. What the result does not hold is left out. The axis is linear or logarithmic as the steps suit. Steps that did
-    not converge are crossed out. Work is that of the force so far, in all and by where it went: stored in the springs
-    of the material, or dissipated. Cost and accuracy are in :func:`roughvisc.plot.diagnostics`.
+    Lines are drawn through every time step, dots at the kept times; if the dots would touch, strokes at the axis mark
+    the kept times. Friction is drawn for a program that slides; leak rate and conductance are drawn if the result holds
+    them, a leak rate over decades on a logarithmic axis. Steps that did not converge are crossed out.
 
     Parameters
     ----------
@@ -142,7 +149,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     if persson:
         theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
         steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
-    panels = [panel for panel in _PANELS if panel[0] in steps]
+    panels = [panel for panel in _PANELS if panel[0] in steps or panel[0] in dataset]
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)
         raise InputError(f"the result holds none of {names}: nothing to draw over {over}")
@@ -167,87 +174,6 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     style.legend_above(figure, marks_of_rows(dataset, steps))
     figure.align_ylabels(axes)
     return figure
-
-
-#: Part of its range by which the approach must have come back for a loop.
-_BACK = 0.01
-
-
-def has_loop(dataset: xr.Dataset) -> bool:
-    """Whether the approach comes back at all: force against approach encloses nothing otherwise."""
-    steps = over_steps(dataset)
-    if not (steps["force"] > 0).any():
-        return False
-    approach = steps["approach"].values
-    fallen = np.max(np.maximum.accumulate(approach) - approach, initial=0.0)
-    return bool(fallen > _BACK * np.ptp(approach))
-
-
-@style.apply
-def hysteresis(dataset: xr.Dataset) -> Figure:
-    """Force against approach at every accepted step, the direction of time marked, and the work done in all.
-
-    Where the program has cycles, what is dissipated in the last one that closes is stated too; where the approach never
-    comes back, that there is no loop.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        One case's result.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    require(dataset, "time", "force", "approach")
-    steps = over_steps(dataset)
-    force, approach = steps["force"].values, steps["approach"].values
-    across, up = unit_for(approach, "m"), unit_for(force, "N")
-    x, y = across(approach), up(force)
-    figure = style.new_figure(3.6, 3.1)
-    ax = figure.add_subplot()
-    ax.plot(x, y, color=style.BLUE, marker=style.marker_of(len(x)), ms=2)
-    _draw_arrows(ax, x, y)
-    ax.plot(x[:1], y[:1], "o", color="k", ms=4, label="start")
-    if len(x) > 1:
-        ax.plot(x[-1:], y[-1:], "s", color="k", mfc="w", ms=4.5, label=_end(dataset))
-    lost = cycle_energy(dataset)["cycle_dissipated_energy"].dropna("cycle") if has_cycles(dataset) else np.zeros(0)
-    if len(lost):
-        energy = unit_for([float(lost[-1])], "J")
-        label = f"cycle {int(lost['cycle'][-1])}: {energy.text(float(lost[-1]))} dissipated"
-        ax.plot([], [], ls="", label=label)
-    failed = failed_frames(steps)
-    if failed.any():
-        ax.plot(x[failed], y[failed], "x", color="k", ms=6, mew=1.2, label="not converged")
-    if not has_loop(dataset):
-        ax.set_title("The approach does not come back: no loop", color="0.4")
-    ax.set_xlabel(across.label(VARIABLES["approach"].label))
-    ax.set_ylabel(up.label(VARIABLES["force"].label))
-    style.leave_room(ax, y)
-    ax.grid(color="0.9", lw=0.5)
-    style.legend_above(figure, style.named_in(ax))
-    return figure
-
-
-def _end(dataset: xr.Dataset) -> str:
-    """What the last point is, with the work that the result states."""
-    if "work" not in dataset:
-        return "end"
-    work = float(dataset["work"][-1])
-    return f"end: {unit_for([work], 'J').text(work)} of work done"
-
-
-def _draw_arrows(ax: Axes, x: np.ndarray, y: np.ndarray) -> None:
-    """Five arrows in the direction of time, at even distances along a path."""
-    width, height = (np.ptp(x) or 1.0), (np.ptp(y) or 1.0)
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x) / width, np.diff(y) / height))])
-    if length[-1] == 0:
-        return
-    look = {"arrowstyle": "-|>", "color": style.BLUE, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0}
-    for place in (np.arange(5) + 0.5) / 5 * length[-1]:
-        before = int(np.searchsorted(length, place)) - 1
-        tip = (np.interp(place, length, x), np.interp(place, length, y))
-        ax.annotate("", tip, (x[before], y[before]), arrowprops=look)
 
 
 _AREA = "contact_area"
@@ -294,7 +220,7 @@ def _case_name(results: xr.Dataset, number: int) -> str:
 @style.apply
 @quantities(contact_modulus="Pa")
 def area_against_load(results, *, contact_modulus=None) -> Figure:
-    r"""Contact area, corrected for the grid, against force at every accepted step, one line a case.
+    r"""Contact area, corrected for the grid, against force at every time step, one line per case.
 
     Parameters
     ----------

@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
 from roughvisc.observables import contact
 from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
-from roughvisc.units import Quantity, Unit, quantities, unit_for
+from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
@@ -111,7 +110,7 @@ def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quant
     stated = dataset["height"].attrs.get("highest")
     highest = float(largest(dataset["height"]) if stated is None else stated)
     surface = deformed_surface(dataset, frame, **{across: index}).values
-    unit = _draw_surfaces(bottom, cut, surface, highest, limits)
+    _draw_surfaces(bottom, cut, surface, highest, limits)
     bottom.set_xlabel(plane.label(axis))
     bottom.set_xlim(limits[0], limits[-1])
     where = f"{across} = {plane.text(float(dataset[across][index]))}"
@@ -119,7 +118,6 @@ def section(dataset: xr.Dataset, time: Quantity = -1, axis: str = "x", at: Quant
     style.letter_panels((top, bottom))
     figure.align_ylabels((top, bottom))
     style.legend_above(figure, style.named_in(bottom))
-    _note_exaggeration(figure, bottom, unit.factor / plane.factor)
     return figure
 
 
@@ -137,8 +135,8 @@ def _draw_pressure(ax: Axes, cut: xr.Dataset, limits: np.ndarray) -> None:
     ax.set_ylabel(unit.label(VARIABLES["pressure"].label))
 
 
-def _draw_surfaces(ax: Axes, cut: xr.Dataset, surface: np.ndarray, highest: float, limits: np.ndarray) -> Unit:
-    """Profile, deformed surface and contact on a line of cells; the unit of heights."""
+def _draw_surfaces(ax: Axes, cut: xr.Dataset, surface: np.ndarray, highest: float, limits: np.ndarray) -> None:
+    """Draw profile, deformed surface and contact on a line of cells."""
     height, x = cut["height"].values, (limits[1:] + limits[:-1]) / 2
     level = highest - float(cut["approach"]) if "approach" in cut else np.nan
     known = np.concatenate([height, surface])
@@ -156,24 +154,8 @@ def _draw_surfaces(ax: Axes, cut: xr.Dataset, surface: np.ndarray, highest: floa
     ax.fill_between(wide, np.pad(s, 1, "edge"), top, color=style.BLUE, alpha=0.16, lw=0, label="half-space")
     ax.plot(x, h, color="0.25", lw=1)
     ax.plot(x, s, color=style.BLUE, lw=1)
-    draw_contact(ax, x, np.where(contact(cut), h, np.nan))
+    look = {"lw": 2.4, "marker": "o", "ms": 2.4, "mew": 0}  # a single cell is seen too
+    ax.plot(x, np.where(contact(cut), h, np.nan), color=style.CONTACT, label="contact", **look)
     if bottom < unit(level) < top:
         ax.axhline(unit(level), color=style.BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
     ax.set_ylabel(unit.label(VARIABLES["height"].label))
-    return unit
-
-
-def draw_contact(ax: Axes, x: np.ndarray, height: np.ndarray) -> Line2D:
-    """Line of the contact on a section, which shows a single cell too."""
-    (line,) = ax.plot(x, height, color=style.CONTACT, lw=2.4, marker="o", ms=2.4, mew=0, label="contact")
-    return line
-
-
-def _note_exaggeration(figure: Figure, ax: Axes, units: float) -> None:
-    """How much larger the vertical scale is than the horizontal one, which a reader cannot guess."""
-    figure.draw_without_rendering()
-    box, limits = ax.get_window_extent(), ax.viewLim
-    ratio = (box.height / (limits.height * units)) / (box.width / limits.width)
-    text = f"vertical scale × {float(f'{ratio:.2g}'):g}"
-    note = ax.text(0.985, 0.04, text, transform=ax.transAxes, ha="right", fontsize=style.SMALL, gid="exaggeration")
-    note.set_bbox({"facecolor": "w", "edgecolor": "none", "alpha": 0.7, "pad": 1.0})

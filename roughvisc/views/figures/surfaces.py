@@ -18,7 +18,16 @@ from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn, stride
-from roughvisc.views.figures.fields import Scale, bar_side, colour_bar, draw_map, label_plane, plane_ratio, plane_unit
+from roughvisc.views.figures.fields import (
+    Scale,
+    bar_side,
+    colour_bar,
+    draw_map,
+    label_plane,
+    measured_part,
+    plane_ratio,
+    plane_unit,
+)
 
 #: Robust standard deviations from the median to which the scale of heights reaches.
 _REACH = 5.0
@@ -27,7 +36,9 @@ _NOTHING = 1e-14
 
 
 def _checked(height: xr.DataArray | xr.Dataset) -> xr.DataArray:
+    history = getattr(height, "attrs", {}).get("history")
     height = checked(height, "surface", least=1).rename("height")
+    height = height.assign_attrs({"history": history} if history else {})  # of a result, whose heights may state none
     if not np.isfinite(height).any():
         raise InputError("the surface is all missing: nothing to draw")
     return height
@@ -64,10 +75,12 @@ def _beyond(values: np.ndarray, low: float, high: float) -> float:
 def surface(height: xr.DataArray) -> Figure:
     """Quick look at a surface: map, profile through its middle, distribution of heights, power spectrum.
 
+    Of a surface that was given its mirror images only the measured part is drawn.
+
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset that holds one as ``height``
-        Heights, peaks up; missing points are drawn in grey, and counted. The colours reach over five robust deviations
+        Heights, peaks up; missing points are drawn in grey and counted. The colours reach over five robust deviations
         at most: a spike does not flatten the rest. [m]
 
     Returns
@@ -80,7 +93,8 @@ def surface(height: xr.DataArray) -> Figure:
     distribution is shown with the normal one of the same Sq. The spectrum is that of :func:`roughvisc.psd` under a
     Hann window, by measured points alone: those that are missing or were filled in are bridged.
     """
-    height = _checked(height)
+    whole = _checked(height)
+    height = measured_part(whole)
     low, high = robust_limits(height.values)
     mean = blocks.mean_of(height.values)
     unit, plane = unit_for([high - mean, low - mean], "m"), plane_unit(height)
@@ -93,7 +107,8 @@ def surface(height: xr.DataArray) -> Figure:
     colour_bar(figure, [image], scale, unit, VARIABLES["height"].label + levelled, bar_side(height))
     label_plane(on_map, height, plane)
     missing = (height.size - blocks.count_of(height.values)) / height.size
-    notes = [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
+    notes = ["measured area only; mirror images are not shown"] if height.size < whole.size else []
+    notes += [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
     notes += [f"{100 * beyond:.2g} % lie beyond the scale of heights"] if beyond else []
     if (every := stride(height)) > 1:
         ends = " to ".join(unit.text(one) for one in blocks.extremes_of(height.values))

@@ -1,7 +1,9 @@
-"""Self-contained HTML report of one or many results."""
+"""Self-contained HTML report of one or many results, without scripts."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -36,18 +38,17 @@ from roughvisc.views.figures.rows import require
 from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
-from roughvisc.views.report.frames import colour_bar, figure_uri, frames_of
 from roughvisc.views.sweep_figures import case_text
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
-#: Size that all maps may have together. [bytes]
-_MAPS = 5_000_000
-#: The most that the maps of one case may have. [bytes]
-_MAPS_OF_ONE = 1_500_000
-#: Cases that can be picked; of more, evenly spread ones.
-_PICTURED = 60
+#: Cases of which figures and the audit are shown; of more, evenly spread ones.
+_PICTURED = 6
 #: Cases up to which every figure is drawn.
 _DRAWN = 3
+#: Cases whose studies are shown; of more, evenly spread ones.
+_STATED = 60
+#: Resolution of pictures, which a screen shows at half this size. [1/inch]
+_DPI = 110
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes that state how a result was computed, and whence its surface came.
@@ -70,7 +71,7 @@ _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
 
 def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | Path | None = None) -> Path:
-    """Write a page that shows results: what was run, surface, figures, accuracy, cost, and how to have it again.
+    """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
     Parameters
     ----------
@@ -82,8 +83,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     Returns
     -------
     pathlib.Path
-        The file, below 10 MB: the more cases, the fewer frames of each and the coarser. Of more than 60 cases evenly
-        spread ones can be looked at; the table has them all.
+        The file, which needs no other file. Its table has all cases. Figures are shown of up to 6 cases, evenly spread.
 
     Raises
     ------
@@ -150,40 +150,37 @@ def _swept(folder: Path) -> list[dict[str, str]]:
     """Figures of all cases together."""
     results = results_of(folder)
     found = sweep_figures(results) if results is not None else ()
-    return [{"title": title, "src": figure_uri(figure)} for _, title, figure in found]
+    return [{"title": title, "src": _uri(figure)} for _, title, figure in found]
 
 
 def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]], drawn: Rows) -> str:
     sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
-    pictured = set(np.unique(np.linspace(0, len(sources) - 1, min(len(sources), _PICTURED)).astype(int)))
-    budget = min(_MAPS_OF_ONE, _MAPS // max(1, len(pictured)))
-    rows, views, figures, surfaces, studies, histories = [], [], [], {}, [], {}
-    names: set[str] = set()
+    pictured, stated = (_evenly(len(sources), most) for most in (_PICTURED, _STATED))
+    rows: list[dict[str, Any]] = []
+    cases: list[dict[str, Any]] = []
+    studies: list[dict[str, Any]] = []
+    surfaces: dict[str, dict[str, Any]] = {}
+    histories: dict[str, xr.Dataset] = {}
     for number, source in enumerate(sources):
         with _opened(source) as dataset:
             row = table_row(dataset, source, number)
             rows.append(row)
-            if row["name"] in names:
+            if row["name"] in histories:
                 row["name"] += f" ({row['key'] or number + 1})"
-            names.add(row["name"])
             if "time" in dataset.dims:
                 over = [name for name, one in dataset.data_vars.items() if one.dims == ("time",)]
                 histories[row["name"]] = dataset[over].load()
-            if number not in pictured:
-                continue
-            row["view"] = len(views)
-            told = {"number": number + 1, "title": row["name"], "key": row["key"]}
-            views.append({**told, **frames_of(dataset, budget)})
-            studies.append(_study(dataset))
-            if len(sources) <= _DRAWN:
-                figures += _figures(dataset, row["name"] if len(sources) > 1 else "")
+            if number in stated:
+                studies.append({"number": number + 1, "name": row["name"], **_study(dataset)})
+            if number in pictured:
+                figures = _figures(dataset, every=len(sources) <= _DRAWN)
+                cases.append({"number": number + 1, "name": row["name"], "figures": figures, "audit": _audit(dataset)})
             what = row["surface"]
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
     if len(histories) > 1 and not drawn[1]:  # realisations of one case are drawn as one
-        overview = figure_uri(area_against_load(histories))
-        figures = [{"title": "Contact area against force, one line per case", "src": overview}, *figures]
-    figures = [*swept, *figures] if len(rows) > 1 else figures
+        overview = _uri(area_against_load(histories))
+        swept = [*swept, {"title": "Contact area against force, one line per case", "src": overview}]
     environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
     environment.lstrip_blocks = True
     return environment.get_template("report.html.jinja").render(
@@ -194,17 +191,27 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
         varied=case_text.names_of(list(dict.fromkeys(key for row in rows for key in row["varied"]))),
         failures=failures,
         realisations=dict(zip(("headings", "rows", "notes"), drawn, strict=True)),
-        views=views,
+        cases=cases,
         studies=studies,
         headings=list(dict.fromkeys(row["rows"] for row in rows)) or ["Kept times"],
         telling=list(dict.fromkeys(row["telling_label"] for row in rows if row["telling"])),
         timed=any(row["time_error"] != "not known" for row in rows),
-        audited=any(study["audit"] for study in studies),
-        bars={name: colour_bar(name) for view in views for name in (one["name"] for one in view["fields"])},
-        figures=figures,
+        figures=swept,
         surfaces=list(surfaces.values()),
         more_surfaces=len({row["surface"] for row in rows if row["surface"]}) - len(surfaces),
     )
+
+
+def _evenly(count: int, most: int) -> set[int]:
+    """Numbers of at most so many cases, evenly spread."""
+    return set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist())
+
+
+def _uri(figure: Figure) -> str:
+    """A figure as the address of a PNG."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI)
+    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
 def _order(source: Path) -> tuple[Any, ...]:
@@ -221,12 +228,11 @@ def _common_title(rows: list[dict[str, Any]]) -> str:
     return titles.pop() if len(titles) == 1 else f"{len(rows)} results" if rows else "No result"
 
 
-def _figures(dataset: xr.Dataset, name: str) -> list[dict[str, str]]:
-    """Every figure that the variables allow, but the one of the surface, which has a place of its own."""
-    of = f": {name}" if name else ""
+def _figures(dataset: xr.Dataset, every: bool) -> list[dict[str, str]]:
+    """Figures of one case, without that of the surface."""
     return [
-        {"title": kind.capitalize().replace("_", " ") + of, "src": figure_uri(figure)}
-        for kind, figure in figures_of(dataset, leave="surface")
+        {"title": kind.capitalize().replace("_", " "), "src": _uri(figure)}
+        for kind, figure in figures_of(dataset, leave="surface", every=every)
     ]
 
 
@@ -246,7 +252,6 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
         "settings": told(_SETTINGS),
         "origin": told(_ORIGIN),
         "warnings": list(warnings_of(dataset.attrs).values()),
-        "audit": _audit(dataset),
         "history": str(dataset.attrs.get("history", "")).splitlines(),
         "toml": case_text.study_text(case) if case else "",
     }
@@ -275,7 +280,7 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
         text = [_parameter(one[name]) if one is not None else "" for one in (before, after)]
         rows.append([name.replace("_", " "), attrs["long_name"], *text])
     filled = int(dataset["filled"].sum()) if "filled" in dataset else 0
-    pictures = [figure_uri(_before_and_after(found, dataset, filled))] if before is not None else []
+    pictures = [_uri(_before_and_after(found, dataset, filled))] if before is not None else []
     steps = found.steps
     del found  # of a big surface no more is held than the next figure needs
     return {
@@ -286,7 +291,7 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
         "measured": before is not None,
         "unchanged": unchanged,
         "parameters": rows,
-        "pictures": [*pictures, figure_uri(surface(dataset))],
+        "pictures": [*pictures, _uri(surface(dataset))],
     }
 
 
@@ -305,14 +310,14 @@ def _parameter(value: xr.DataArray) -> str:
 
 @style.apply
 def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Figure:
-    """Maps of the heights before conditioning and as pressed, filled points marked.
+    """Draw maps of the heights before and after conditioning, filled points marked.
 
     Colours end at the quantiles of 0.5 and 99.5 %, so that spikes do not hide the rest.
     """
     figure = style.new_figure(7.0, 3.0)
     axes = figure.subplots(1, 2)
     heights = (found.before, found.after)
-    for ax, height, title in zip(axes, heights, ("before", "as pressed"), strict=True):
+    for ax, height, title in zip(axes, heights, ("before", "after conditioning"), strict=True):
         missing = height.size - count_of(height.values)
         ends = np.array(percentiles_of(height.values, (0.5, 99.5))) - (mean := mean_of(height.values))
         height = (drawn(height.rename("height")) - mean).rename("height")
@@ -328,6 +333,6 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
         places = np.argwhere(marks.values)
         plane = plane_unit(dataset)
         x, y = plane(marks["x"].values[places[:, 0]]), plane(marks["y"].values[places[:, 1]])
-        axes[1].plot(x, y, ".", color="#d55e00", ms=1.5, mew=0)
-        axes[1].set_title(f"as pressed: {filled} points filled in (orange)")
+        axes[1].plot(x, y, ".", color=style.CONTACT, ms=1.5, mew=0)
+        axes[1].set_title(f"after conditioning: {filled} points filled (orange)")
     return figure

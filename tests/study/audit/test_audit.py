@@ -117,7 +117,7 @@ def test_stickiness__of_stiff_roughness_is_that_of_pastewka_and_robbins():
     stiff = rv.simulate(heights, rv.elastic(4e10), rv.Program().pressure(1e8, over=1.0), boundary="periodic", **QUICK)
     measures = rv.parameters(heights, periodic=True)
     found = rv.audit(stiff, work_of_adhesion=0.01)["stickiness"]
-    expected = cf.rough_attraction(float(measures.rms_slope), 2 * float(measures.rms_curvature), 1.6e11, 0.01, 3e-10)
+    expected = cf.rough_attraction(float(measures.Sdq), 2 * float(measures.rms_curvature), 1.6e11, 0.01, 3e-10)
     assert found.number == pytest.approx(expected, rel=1e-3)
     assert "Pastewka" in found.sentence
 

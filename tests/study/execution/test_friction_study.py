@@ -151,7 +151,7 @@ def test_results__over_time_and_over_speed_are_not_put_into_one(case, tmp_path):
     table = rv.to_table(tmp_path / "out")
     assert table["friction_coefficient"].notna().sum() == table["time [s]"].notna().sum() == 1
     curve = open_result(tmp_path / "out" / f"{cases[0].key}.nc")
-    for derive in (rv.observables.history, rv.observables.area_growth, rv.observables.cycle_energy):
+    for derive in (rv.observables.history, rv.observables.cycle_work):
         with pytest.raises(rv.InputError, match="lies over speed: expected a history over time"):
             derive(curve)
 

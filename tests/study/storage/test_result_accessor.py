@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
@@ -25,23 +24,11 @@ def test_accessor__gives_observables_and_figures():
     assert ds.roughvisc.history().sizes == {"time": 3}, "an observable, where a figure is of the same name"
 
 
-def test_plot__draws_maps_with_x_to_the_right():
-    ds = made.rough_creep((22, 16), frames=3)
-    last = rv.plot.maps(ds, times=[-1]).axes
-    for drawn in (ds.roughvisc.plot(times=-1), ds.isel(time=-1).roughvisc.plot()):
-        for found, expected in zip(drawn.axes, last, strict=True):
-            assert found.get_xlim() == expected.get_xlim()
-            assert found.get_xlabel() == expected.get_xlabel()
-            for image, other in zip(found.images, expected.images, strict=True):
-                np.testing.assert_array_equal(image.get_array(), other.get_array())
-                assert image.get_clim() == other.get_clim()
-
-
 def test_plot__of_a_file_that_xarray_alone_has_opened(tmp_path):
     ds = made.rough_creep((22, 16), frames=3)
     with xr.open_dataset(write_result(ds, tmp_path / "r.nc")) as plain:
         assert "x_bounds" in plain
-        assert len(plain.roughvisc.plot().axes) == len(rv.plot.maps(ds).axes)
+        assert len(plain.roughvisc.plot_maps().axes) == len(rv.plot.maps(ds).axes)
         assert [one.number for one in rv.audit(plain)] == pytest.approx([o.number for o in rv.audit(ds)], nan_ok=True)
 
 

@@ -1,20 +1,15 @@
 """Maps of more cells than are drawn: extremes stay, little is read at a time, small maps are as they were."""
 
-import base64
-import io
-
 import numpy as np
 import pytest
 import xarray as xr
-from PIL import Image
 
 import roughvisc as rv
 from roughvisc import recorder as chunks
 from roughvisc.study.storage import store
 from roughvisc.topography import blocks
 from roughvisc.topography.grid import cell_edges
-from roughvisc.views.figures import animate, coarsened, fields, sections
-from roughvisc.views.report import frames
+from roughvisc.views.figures import coarsened, sections
 
 SHAPE, CELL = (50, 37), (2e-6, 3e-6)
 
@@ -65,15 +60,6 @@ def stored(tmp_path, monkeypatch):
         yield dataset, shapes
 
 
-def test_present__of_a_small_map_is_the_map():
-    ds = result()
-    ds["height"][3, 4] = np.nan
-    xr.testing.assert_identical(
-        coarsened.present(ds, "pressure", 1), ds["pressure"].isel(time=1).where(ds["height"].notnull())
-    )
-    assert coarsened.note(ds, "pressure") == ""
-
-
 def test_present__keeps_the_extremes_of_every_block(coarse):
     ds = result(displacement=True)
     ds["height"][:4, :4] = ds["height"][6, 7] = np.nan
@@ -108,32 +94,13 @@ def test_maps__show_a_lone_spot_and_say_so(coarse):
     assert "smallest gap" in told
 
 
-def test_maps__tell_the_largest_pressure_where_it_is_beyond_the_scale(coarse, monkeypatch):
-    monkeypatch.setattr(fields, "_MANY", 10)
-    monkeypatch.setattr(fields, "_SHOWN", 98.0)
-    figure = rv.plot.maps(result(), times=0.2)
-    labels = [ax.get_ylabel() for ax in figure.axes]
-    assert any(label.endswith("\nmax 9 MPa") for label in labels), labels
-
-
-def test_report__shows_a_lone_spot(coarse, monkeypatch):
-    monkeypatch.setattr(frames, "_LADDER", ((2, 5),))
-    found = frames.frames_of(result(), 10**6)
-    assert found["block"] == 12
-    assert found["extremes"]
-    png = base64.b64decode(found["frames"][0]["maps"][0].partition(",")[2])
-    with Image.open(io.BytesIO(png)) as picture:
-        pixels = np.array(picture)
-    assert (pixels != frames._MARKED).sum() == 1, "white but for one cell"
-
-
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(stored, boundary):
     opened, shapes = stored
     opened.attrs["boundary"] = boundary
     loaded = opened.copy(deep=True).load()
     shapes.clear()
-    for name in ("clusters", "percolation", "gap_statistics", "pressure_distribution", "gap_distribution"):
+    for name in ("clusters", "pressure_distribution", "gap_distribution"):
         observe = getattr(rv.observables, name)
         xr.testing.assert_allclose(observe(opened).compute(), observe(loaded), rtol=1e-13)
         xr.testing.assert_allclose(observe(loaded.chunk(time=1)).compute(), observe(loaded), rtol=1e-13)
@@ -150,9 +117,8 @@ def test_figures__of_a_big_file_read_some_rows_at_a_time(stored, coarse):
     shapes.clear()
     rv.plot.maps(opened)
     rv.plot.section(opened)
-    _, move, chosen = animate._moving(opened, None, 2)
-    move(chosen[-1])
-    frames.frames_of(opened, 10**6)
+    film = rv.plot.animation(opened, frames=2)
+    film._draw_was_started = True
     assert max(int(np.prod(shape)) for shape in shapes) <= 8 * SHAPE[1], "rows of one chunk"
     assert not any(opened[name].variable._in_memory for name in ("height", "pressure", "gap", "displacement"))
 
@@ -163,15 +129,6 @@ def test_deformed_line__is_that_of_the_whole_surface(coarse):
         whole = sections.deformed_surface(one, 1)
         np.testing.assert_allclose(sections.deformed_surface(one, 1, y=13), whole.isel(y=13), rtol=1e-12)
     np.testing.assert_allclose(sections.deformed_surface(ds, 1), ds["height"] + ds["gap"].isel(time=1), atol=1e-15)
-
-
-def test_section__is_cut_where_most_is_carried(coarse):
-    ds = result()
-    for axis, along in (("x", "y"), ("y", "x")):
-        carried = ds["pressure"].isel(time=1).sum(along)
-        assert sections.cut_position(ds, 1, axis) == carried.values.argmax()
-        peaks = ds["height"].max(along)
-        assert sections.cut_position(ds.drop_vars("pressure"), 1, axis) == peaks.values.argmax()
 
 
 def test_surface__of_many_points_tells_its_extremes(coarse):
@@ -186,9 +143,3 @@ def test_surface__of_many_points_tells_its_extremes(coarse):
     for end in (before.min(), before.max()):
         assert f"{float(end) * 1e6:.3g} µm" in told
     assert int(height.isnull().sum()) == 1, "the heights given stay as they are"
-
-
-def test_file__of_a_big_grid_is_chunked_by_frame_and_place(stored):
-    opened, _ = stored
-    assert opened["pressure"].encoding["chunksizes"] == (1, 8, 8)
-    assert opened["height"].encoding["chunksizes"] == (8, 8)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
-from support import labels, lines, text_boxes
+from support import lines
 
 import roughvisc as rv
 from roughvisc.labels import annotate
 from roughvisc.variables import NOT_CONVERGED
-from roughvisc.views.figures import animate
+from roughvisc.views import plot
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
 
@@ -49,23 +49,13 @@ def test_friction__open_circles_where_not_converged():
         assert hollow.get_markerfacecolor() == "w"
 
 
-@pytest.mark.parametrize("persson", [False, True])
-def test_friction__has_a_legend_of_the_theory_and_no_label_covers_another(persson):
-    figure = rv.plot.friction(curve(), persson=persson)
-    assert len(labels(figure)) == 3
-    boxes = text_boxes(figure)
-    for i, (one, box) in enumerate(boxes):
-        assert box.x0 >= 0
-        assert box.x1 <= figure.bbox.width, one
-        assert not any(box.overlaps(other) for _, other in boxes[i + 1 :]), one
-    assert len(figure.legends) == persson
-    dotted = [line for ax in figure.axes for line in ax.lines if line.get_linestyle() == ":" and len(line.get_xdata())]
-    if persson:
-        assert "as in full contact" in figure.legends[0].get_texts()[1].get_text()
-        assert [line.get_ydata().tolist() for line in dotted] == [[0.02, 0.3, 0.5], [0.18, 0.09, 0.01]]
-        assert figure.axes[0].get_ylim()[1] > 0.5
-    else:
-        assert dotted == []
+def test_friction__draws_the_theory():
+    figure = rv.plot.friction(curve(), persson=True)
+    dotted = [line for ax in figure.axes for line in ax.lines if line.get_linestyle() == ":"]
+    assert [line.get_ydata().tolist() for line in dotted] == [[0.02, 0.3, 0.5], [0.18, 0.09, 0.01]]
+    assert figure.axes[0].get_ylim()[1] > 0.5
+    with pytest.raises(rv.InputError, match="persson_contact_fraction"):
+        rv.plot.friction(curve().drop_vars("persson_contact_fraction"), persson=True)
 
 
 def test_friction__of_a_body_without_it_and_of_one_speed():
@@ -73,48 +63,19 @@ def test_friction__of_a_body_without_it_and_of_one_speed():
     assert rv.plot.friction(one).axes[0].get_ylim() == (0, 1)
 
 
-@pytest.mark.parametrize(
-    ("other", "message"),
-    [
-        (xr.Dataset(), "'friction_coefficient' over the speed"),
-        (3, "'friction_coefficient' over the speed"),
-        (curve().drop_vars("contact_fraction"), "'contact_fraction' over the speed"),
-        (curve().rename(speed="time"), "'friction_coefficient' over the speed"),
-    ],
-)
-def test_friction__refuses_what_is_no_friction_result(other, message):
-    with pytest.raises(rv.InputError, match=f"expected a result of rv.friction, with {message}"):
+@pytest.mark.parametrize("other", [xr.Dataset(), 3, curve().rename(speed="time")])
+def test_friction__refuses_what_is_no_friction_result(other):
+    with pytest.raises(rv.InputError, match="friction_coefficient"):
         rv.plot.friction(other)
 
 
-def test_friction__refuses_the_theory_where_it_is_not_in_the_result():
-    with pytest.raises(rv.InputError, match="'persson_contact_fraction' over the speed"):
-        rv.plot.friction(curve().drop_vars("persson_contact_fraction"), persson=True)
-
-
-def test_friction__draws_the_grids_error_and_what_the_last_octave_adds_where_these_are_told():
-    told = {
-        "grid_error_friction": [0.1, 0.5, np.nan],
-        "grid_error_area": [0.1, 0.1, 0.1],
-        "last_octave_friction": [0.25, 0.5, 0.1],
-        "last_octave_area": [-0.01, -0.02, 0.0],
-    }
-    figure = rv.plot.friction(annotate(curve().assign({name: ("speed", one) for name, one in told.items()})))
-    left, right = figure.axes
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
-        "computed",
-        "error of the grid",
-        "without the shortest octave of waves",
-    ]
+def test_friction__draws_the_error_of_the_grid_as_a_band():
+    errors = {"grid_error_friction": [0.1, 0.5, np.nan], "grid_error_area": [0.1, 0.1, 0.1]}
+    left, _ = rv.plot.friction(annotate(curve().assign({name: ("speed", one) for name, one in errors.items()}))).axes
     (band,) = left.collections
     points = np.concatenate([path.vertices for path in band.get_paths()])
     assert points[:, 1].max() == pytest.approx(0.3 * 1.1)
     assert (points[:, 1] >= 0).all()
-    (dashed,) = [line for line in left.lines if line.get_linestyle() == "--"]
-    np.testing.assert_allclose(dashed.get_ydata(), [0.005, 0.18, 0.225])
-    assert not [line for line in right.lines if line.get_linestyle() == "--"], "two per cent are not worth a line"
-    boxes = text_boxes(figure)
-    assert not any(box.overlaps(other) for i, (_, box) in enumerate(boxes) for _, other in boxes[i + 1 :])
 
 
 def sliding(direction="x"):
@@ -155,8 +116,6 @@ def test_maps_of_friction__at_speeds_that_are_asked_for():
             rv.plot.maps(sliding(), speeds)
     with pytest.raises(rv.InputError, match="holds no 'pressure'"):
         rv.plot.maps(sliding().drop_vars("pressure"))
-    with pytest.raises(AttributeError, match=r"write rv\.plot\.maps\(ds\)"):
-        _ = rv.plot.friction_maps
 
 
 def several(shift=(1.0, 100.0)):
@@ -180,8 +139,6 @@ def test_friction_of_cases__has_a_line_a_case_and_a_legend():
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["293 K", "313 K", "not converged"]
     assert (friction.get_xlabel(), friction.get_ylabel()) == ("Speed [µm/s]", "Friction coefficient")
     assert (friction.get_xscale(), friction.get_ylim()[0], area.get_ylim()[0]) == ("log", 0, 0)
-    boxes = text_boxes(figure)
-    assert not any(box.overlaps(other) for i, (_, box) in enumerate(boxes) for _, other in boxes[i + 1 :])
 
 
 def test_friction_of_cases__against_the_reduced_speed():
@@ -201,22 +158,41 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
     assert drawn(several((1.0, 1.0))) == ["sweep-friction.png"]
 
 
-def test_figures_over_time__refuse_a_curve_in_plain_words():
-    for draw in (rv.plot.hysteresis, rv.plot.friction_against_distance):
-        with pytest.raises(rv.InputError, match="lies over speed: expected a history over time"):
-            draw(sliding())
+def test_figures_of_a_curve__have_no_history():
+    """Force and pressure are the same at all speeds."""
+    drawn = [name for name, _ in plot.figures_of(sliding().assign(force=("speed", np.ones(3))))]
+    assert drawn == ["friction", "maps", "surface"]
 
 
-def test_film__of_a_curve_of_friction_goes_from_low_to_high_speed():
-    figure, draw, frames = animate._moving(sliding(), None, 3)
-    shown, cells = [], []
-    for frame in frames:
-        draw(frame)
-        shown.append(figure.axes[0].get_title(loc="left").rpartition("  ")[2])
-        cells.append(int((np.ma.getdata(figure.axes[0].images[0].get_array()) > 0).sum()))
-    assert shown == ["V = 0.02 mm/s", "V = 0.2 mm/s", "V = 2 mm/s"]
+def test_animation__of_a_curve_goes_from_low_to_high_speed():
+    film, cells = rv.plot.animation(sliding(), frames=3), []
+    for frame in film.new_frame_seq():
+        film._func(frame)
+        cells.append(int((np.ma.getdata(film._fig.axes[0].images[0].get_array()) > 0).sum()))
     assert cells == [12, 8, 4], "though the rows are not in this order"
-    assert "Friction coefficient" in labels(figure)
+    film._draw_was_started = True
+
+
+#: A stroke, a stop and a stroke back, in micrometres; what is pressed on before is not drawn.
+DISTANCE = [0, 0, 10, 20, 30, 30, 30, 40, 50]
+FRICTION = [np.nan, 0.0, 0.2, 0.3, 0.3, 0.1, 0.05, -0.02, 0.28]
+
+
+def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
+    series = {"friction_coefficient": np.array(FRICTION), "sliding_distance": 1e-6 * np.array(DISTANCE)}
+    series |= {"force": np.ones(9), "approach": np.ones(9), "status": (np.arange(9) == 3).astype(int)}
+    coords = {"time": np.arange(9.0)}
+    slid = annotate(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
+    (ax,) = rv.plot.friction_against_distance(slid).axes
+    drawn = [line.get_xydata().tolist() for line in ax.lines if len(line.get_xdata()) and line.get_color() != "0.3"]
+    assert drawn[0] == [[0, 0.0], [10, 0.2], [20, 0.3], [30, 0.3]]
+    assert drawn[1] == [[30, 0.3], [30, 0.1], [30, 0.05]]
+    assert drawn[2] == [[30, 0.05], [40, -0.02], [50, 0.28]]
+    (crossed,) = [line for line in ax.lines if line.get_marker() == "x"]
+    assert crossed.get_xdata().tolist() == [20]
+    assert ax.get_xlabel() == "Sliding distance [µm]"
+    with pytest.raises(rv.InputError, match="sliding_distance"):
+        rv.plot.friction_against_distance(slid.drop_vars("sliding_distance"))
 
 
 def test_figures_of_rows__name_the_speeds():
