@@ -55,12 +55,18 @@ def cycle_work(dataset: xr.Dataset, *, program: Any = None) -> xr.Dataset:
     number, starts, ends = np.array([(i, *span) for i, span in enumerate(spans, 1)]).T
     slack = _SAME * (ends - starts)
     covered = (times[0] <= starts + slack) & (ends <= times[-1] + slack)
-    before, after = (np.interp(at + slack, times, work) for at in (starts, ends))  # of a jump, the state after it
+    before, after = (_work_at(at, slack, times, work) for at in (starts, ends))
     found = xr.Dataset(
         {"cycle_start": ("cycle", starts[covered]), "cycle_work": ("cycle", (after - before)[covered])},
         coords={"cycle": number[covered].astype("int64")},
     )
     return describe(found)
+
+
+def _work_at(at: np.ndarray, slack: np.ndarray, times: np.ndarray, work: np.ndarray) -> np.ndarray:
+    """Work at some times: that of the step there, of a jump the state after it; else interpolated."""
+    last = np.searchsorted(times, at + slack, side="right") - 1
+    return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
 
 
 def _program_of(dataset: xr.Dataset) -> Any:
