@@ -72,10 +72,10 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     folder = tmp_path / "results" / "ball"
     assert len(list(folder.glob("*.nc"))) == 2
     assert len(list(folder.glob("*.failed.json"))) == 1
-    assert err.startswith("roughvisc: case 2 of 3: ")
+    assert err.startswith("roughvisc: case 1: ")
     assert err.endswith("roughvisc: 1 of 3 cases failed\n")
     for words in (
-        "case 2 of 3 (program.0.load = 50 N): failed: ",
+        "case 1 (program.0.load = 50 N): failed: ",
         "2 of 3 cases done, 1 failed",
         "2, 0 of them before",
     ):
@@ -84,7 +84,7 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
 
     status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
     assert (status, out) == (1, "")
-    assert "case 2 of 3, as before (use --retry-failed to try again): " in err
+    assert "case 1, as before (use --retry-failed to try again): " in err
     assert "as before" not in invoke("run", "ball.toml", "--workers", 0, "--retry-failed")[2]
 
 

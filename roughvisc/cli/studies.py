@@ -180,25 +180,27 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Clien
     from roughvisc.study.execution.task import REFUSED
     from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.index import index_of
+    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
     from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
     from roughvisc.views.console.tables import realisations_tables, sweep_table
 
     outcomes = run_cases(cases, folder, client=client, watch=watcher(not console.quiet, console), **computing)
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
+    listed = sweep_cases(cases)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     if (folder / REALISATIONS).exists():
-        console.print(realisations_tables(realisations_table(index_of(folder, warn=False))))
+        console.print(realisations_tables(realisations_table(index_of(folder, warn=False), listed)))
     say(console, "Results", folder)
     for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
         if (folder / name).exists():
             say(console, what, folder / name)
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
-    number = {case.key: i for i, case in reversed(list(enumerate(cases, 1)))}
+    number = number_by_key(listed)
     told = []
     for outcome in bad:
         again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
-        where = f"case {number[outcome.key]} of {len(cases)}{again}" if len(cases) > 1 else "the case"
+        where = f"case {number[outcome.key]}{again}" if len(cases) > 1 else "the case"
         told.append(f"{where}: {naming_keys(outcome.message)}")
     complain_of_all(told, folder / LOG)
     if missed:

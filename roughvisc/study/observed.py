@@ -21,6 +21,7 @@ from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.store import open_result, result_path, write_result
+from roughvisc.study.storage.sweep_cases import sweep_cases
 from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
@@ -77,7 +78,7 @@ def observe(
     if added and len(cases) > 1:
         index = index_of(folder)
         save_index(folder, index)
-        write_table(folder, index, {case.key: json.loads(case.to_json()) for case in cases})
+        write_table(folder, index, sweep_cases(cases))
     return added
 
 

@@ -18,8 +18,9 @@ from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.statement.case import read_cases, read_study
-from roughvisc.study.storage.index import INDEX, LATEST
+from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.sweep_cases import SWEEP
 from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -151,14 +152,14 @@ def test_damaged_index(tmp_path, count):
     cases, out, rng = read_cases(path), tmp_path / "out", np.random.default_rng(22)
     run_cases(cases, out, watch=Monitor(), workers=0)
     wanted = rv.open_results(out).load()
-    whole = {name: (out / name).read_bytes() for name in (INDEX, LATEST)}
+    whole = {name: (out / name).read_bytes() for name in (INDEX, SWEEP)}
     for number in range(count):
-        name = (INDEX, LATEST)[number % 2]
+        name = (INDEX, SWEEP)[number % 2]
         (out / name).write_bytes(damaged_bytes(rng, whole[name]))
         with within(20):
             xr.testing.assert_identical(rv.open_results(out, cases=cases).load(), wanted)
             try:
                 xr.testing.assert_identical(rv.open_results(out).load(), wanted)
             except InputError as error:
-                assert LATEST in str(error)  # noqa: PT017
+                assert error.key == SWEEP  # noqa: PT017
         (out / name).write_bytes(whole[name])

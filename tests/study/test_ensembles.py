@@ -135,6 +135,7 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
         assert part["case_key"].equals(part["case_key"])
     table = to_table(out)
     assert table["realisation"].tolist() == [1, 2, 3] * 2
+    assert table.index.tolist() == [0, 0, 0, 1, 1, 1]
     area = over_realisations(again["contact_area"]).isel(time=-1)
     told = pd.read_csv(out / REALISATIONS, encoding="utf-8-sig").set_index(["quantity", "program.0.pressure [kPa]"])
     assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
@@ -142,7 +143,7 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
         row = told.loc["contact_area", pressure]
         for name in ("mean", "standard_deviation", "lower", "patch_upper"):
             assert row[name] == pytest.approx(float(area[name][number]), rel=1e-6), name
-        assert row["case"] == number + 1
+        assert row["case"] == number == area["case"][number]
         assert (row["count"], row["unit"], row["where"]) == (3, "m^2", "end")
     sweep(study('[sweep]\n"program.0.pressure" = ["10 kPa", "20 kPa"]\n'), out, workers=0, progress=False)
     assert not (out / REALISATIONS).exists(), "it is of the last sweep"
@@ -157,6 +158,6 @@ def test_open_results__what_is_not_computed_is_missing(study, tmp_path):
     np.testing.assert_array_equal((found["case_key"] == "").values, [[0, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(np.isnan(found["contact_area"][..., -1]), [[0, 0, 0], [0, 1, 0]])
     assert found["pressure"][1, 1].isnull().all()
-    assert found["status"][1, 1].values.tolist() == [-1] * found.sizes["time"]
+    assert found["status"][1, 1].isnull().all()
     assert over_realisations(found["contact_area"])["count"][:, -1].values.tolist() == [3, 2]
     assert found.isel(case=1)["wall_time"].dims == ("realisation", "time")

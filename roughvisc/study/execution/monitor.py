@@ -7,7 +7,7 @@ import logging
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,10 +17,10 @@ from roughvisc.errors import ON_SCREEN, DiskFullError, printable, shortened
 from roughvisc.progress import Display, Pace, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.variation import REALISATION
 from roughvisc.study.storage.failures import forget_failure, record_failure
 from roughvisc.study.storage.files import is_writable
-from roughvisc.study.storage.index import Entry, Index, index_of, save_index
+from roughvisc.study.storage.index import Entry, index_of, save_index
+from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases, write_sweep
 from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
@@ -40,7 +40,7 @@ class Monitor:
     """Who is told how a sweep goes on, times in seconds; this one shows only what the user should know at once."""
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
-        """The distinct cases, in order, and the address of Dask's dashboard if there is one."""
+        """The cases, in the order of the study, and the address of Dask's dashboard if there is one."""
 
     def reached(self, key: str, now: float, end: float) -> None:
         """A running case is at this time of so much; from any thread."""
@@ -88,7 +88,8 @@ class LiveMonitor(Monitor):
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
         self._at = {case.key: case.at for case in cases}
-        self._names = {case.key: _name(case, number, len(cases)) for number, case in enumerate(cases, 1)}
+        numbers = number_by_key(sweep_cases(cases))
+        self._names = {case.key: _name(case, numbers[case.key]) for case in reversed(cases)}
         self._began = time.monotonic()
         if link:
             self._display.say(f"Dashboard: {link}")
@@ -163,12 +164,12 @@ class LiveMonitor(Monitor):
         return [*rows, (f"and {more} more", 0.0, None, "")] if more > 0 else rows
 
 
-def _name(case: Case, number: int, total: int) -> str:
-    """``case 3 of 12 (program.0.load = 20 mN)``."""
+def _name(case: Case, number: int) -> str:
+    """``case 3 (program.0.load = 20 mN)``."""
     varied = ", ".join(f"{key} = {case.written.get(key) or json.dumps(value)}" for key, value in case.varied.items())
     if len(varied) > 60:
         varied = f"{varied[:57]}..."
-    return f"case {number} of {total}" + (f" ({varied})" if varied else "")
+    return f"case {number}" + (f" ({varied})" if varied else "")
 
 
 @dataclass
@@ -179,8 +180,8 @@ class SweepLog:
     ----------
     folder : Path
         Of the results.
-    cases : dict
-        All distinct cases by key.
+    stated : sequence of Case
+        The cases, in the order of the study.
     outcomes : dict
         How those ended that have ended.
     watch : Monitor
@@ -192,15 +193,21 @@ class SweepLog:
     """
 
     folder: Path
-    cases: Mapping[str, Case]
+    stated: Sequence[Case]
     outcomes: dict[str, Outcome]
     watch: Monitor
     entries: list[Entry]
     saved: float = 0.0
 
+    def __post_init__(self) -> None:
+        self.cases = {case.key: case for case in self.stated}
+        self._listed = sweep_cases(self.stated)
+        if is_writable(self.folder):
+            write_sweep(self.folder, self._listed)
+
     def begin(self, link: str = "") -> None:
         self.saved = time.monotonic()
-        self.watch.begin(list(self.cases.values()), link)
+        self.watch.begin(self.stated, link)
         for outcome in self.outcomes.values():
             self.watch.ended(outcome)
         if link:
@@ -238,8 +245,7 @@ class SweepLog:
         self.saved = time.monotonic()
         if not is_writable(self.folder):
             return
-        drawn = {key: case.varied[REALISATION] for key, case in self.cases.items() if REALISATION in case.varied}
-        index = Index(index_of(self.folder, self.entries).entries, tuple(self.cases), realisations=drawn)
+        index = index_of(self.folder, self.entries)
         save_index(self.folder, index)
         held = {key: outcome.message for key, outcome in self.outcomes.items() if outcome.kind == "held"}
-        write_table(self.folder, index, {key: json.loads(case.to_json()) for key, case in self.cases.items()}, held)
+        write_table(self.folder, index, self._listed, held)

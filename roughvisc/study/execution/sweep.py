@@ -177,7 +177,7 @@ def run_cases(
                     folder.rmdir()
                 raise
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        book = SweepLog(folder, distinct, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
+        book = SweepLog(folder, cases, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
         try:
             _tell_beforehand(book, index, todo, writable)
             _compute(todo, folder, book, client, processes, threads)

@@ -45,7 +45,7 @@ def in_sweep(problem: str, where: Sequence[int], changes: Sequence[Mapping[str, 
         return problem
     values = ", ".join(f"{key} = {shown(value)}" for key, value in changes[where[0]].items())
     head, *rows = problem.split("\n")
-    return "\n".join([f"{head} (case {where[0] + 1} of {len(changes)}: {values})", *rows])
+    return "\n".join([f"{head} (case {where[0]}: {values})", *rows])
 
 
 def line(path: Path | None, key: str, problem: str) -> str:

@@ -1,48 +1,33 @@
 """The index of a folder of results: all of them but the fields, in one small file.
 
-It only saves time: it is made anew from the results where it is absent, damaged or older than they are. Which sweep
-ran last cannot be made anew, and stands in a file of its own.
+It only saves time: it is made again from the results if it is absent, damaged or older than they are.
 """
 
 from __future__ import annotations
 
-import io
 import json
 import logging
 import re
-import zlib
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from base64 import b64decode, b64encode
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.storage.files import (
-    UNSEALED,
-    append_checksum,
-    atomic_write,
-    require_folder,
-    unsealed,
-    verify_checksum,
-    warn_once,
-)
+from roughvisc.study.statement.identity import program_version
+from roughvisc.study.storage.files import UNSEALED, require_folder, verify_checksum, warn_once
+from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
 from roughvisc.study.storage.store import NETCDF, is_json_table, result_files, result_path
 from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")
 
-INDEX, LATEST = ".index.npz", ".latest.json"
-#: Raised by whoever changes what an index holds.
-_LAYOUT = 7
-#: What an index that is absent, cut short, damaged or of another version may raise; the results are all there.
-_UNREADABLE: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError)
-_UNREADABLE += (AttributeError, MemoryError, BadZipFile, zlib.error)
+INDEX = ".index.json.gz"
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
 
@@ -115,19 +100,12 @@ class Index:
     ----------
     entries : dict
         Key -> entry.
-    sweep : tuple of str or None
-        Keys of the sweep that ran last in the folder, in its order; None if not known.
     problems : dict
         Key that a file is named by -> why that is not its result.
-    realisations : dict
-        Key -> number of the realisation that a case was in that sweep. A result may have been computed before, as a
-        case that was none.
     """
 
     entries: dict[str, Entry]
-    sweep: tuple[str, ...] | None = ()
     problems: dict[str, str] = field(default_factory=dict)
-    realisations: dict[str, int] = field(default_factory=dict)
 
 
 def read_entry(path: Path) -> Entry:
@@ -185,8 +163,7 @@ def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) ->
         If the folder is absent or is none. What is no result is left out, and the log says so.
     """
     require_folder(folder)
-    stored = _load(folder / INDEX)
-    before = {entry.file: entry for entry in (*stored, *known)}
+    before = _load(folder / INDEX) | {entry.file: entry for entry in known}
     entries: dict[str, Entry] = {}
     problems: dict[str, str] = {}
     for path in result_files(folder):
@@ -208,11 +185,9 @@ def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) ->
             else:
                 found = f"{path}: holds the result of case {entry.key}"
                 problems[path.stem] = f"{found}: expected the one that its name says"
-    sweep, realisations = _latest(folder)
-    index = Index(entries, sweep, problems, realisations)
     if warn:
         warn_of(folder, problems)
-    return index
+    return Index(entries, problems)
 
 
 def warn_of(folder: Path, problems: Mapping[str, str]) -> None:
@@ -222,76 +197,41 @@ def warn_of(folder: Path, problems: Mapping[str, str]) -> None:
 
 
 def save_index(folder: Path, index: Index) -> None:
-    """Write the index of a folder; where that cannot be done, results are only slower to open."""
-    entries = list(index.entries.values())
-    grids = [(entry.x.tobytes(), entry.y.tobytes()) for entry in entries]
-    numbers = {grid: number for number, grid in enumerate(dict.fromkeys(grids))}  # most results are on one
-    head, arrays = [], {}
-    for entry, grid in zip(entries, grids, strict=True):
-        stated = {name: getattr(entry, name) for name in ("file", "stamp", "attributes", "fields", "sealed")}
-        counts = {name: len(values) for name, values in entry.histories.items()}
-        head.append(stated | {"histories": counts, "grid": numbers[grid]})
-        arrays |= {f"x{numbers[grid]}": entry.x, f"y{numbers[grid]}": entry.y}
-    for name in _names_of_histories():
-        columns = [entry.histories[name] for entry in entries if name in entry.histories]
-        if columns:
-            arrays[name] = np.concatenate(columns)
-    text = json.dumps({"layout": _LAYOUT, "entries": head})
-    with suppress(OSError, InputError), atomic_write(folder / INDEX) as temporary:
-        np.savez(temporary, head=np.frombuffer(text.encode(), np.uint8), **arrays)
-        append_checksum(temporary)
-    if index.sweep is not None and (index.sweep, index.realisations) != _latest(folder):
-        keys, drawn = list(index.sweep), index.realisations
-        stated = {"keys": keys} | ({"realisations": drawn} if drawn else {}) | {"checksum": _checksum(keys, drawn)}
-        with suppress(OSError, InputError), atomic_write(folder / LATEST) as temporary:
-            temporary.write_text(json.dumps(stated))
+    """Write the index of a folder; if that is impossible, results are only slower to open."""
+    grids: dict[str, int] = {}
+    results = {}
+    for entry in index.entries.values():
+        grid = json.dumps([_packed(entry.x), _packed(entry.y)])  # most results are on one
+        histories = {name: _packed(values) for name, values in entry.histories.items()}
+        number = grids.setdefault(grid, len(grids))
+        results[entry.file] = [*entry.stamp, entry.attributes, entry.fields, number, entry.sealed, histories]
+    stated = {"version": program_version(), "grids": [json.loads(grid) for grid in grids], "results": results}
+    write_json(folder / INDEX, stated)
 
 
-def _latest(folder: Path) -> tuple[tuple[str, ...] | None, dict[str, int]]:
-    """Keys of the sweep that ran last, and which of them were realisations.
-
-    No keys if no sweep ran, None if what says so is damaged.
-    """
+def _load(path: Path) -> dict[str, Entry]:
+    """File name -> entry of the stored index; none if it is absent, damaged or of another version."""
     try:
-        stated = json.loads((folder / LATEST).read_bytes())
-        keys, drawn = stated["keys"], stated.get("realisations", {})
-        return (tuple(keys), dict(drawn)) if stated["checksum"] == _checksum(keys, drawn) else (None, {})
+        stated = read_json(path)
+        if stated["version"] != program_version():
+            return {}
+        grids = [(_unpacked(x), _unpacked(y)) for x, y in stated["grids"]]
+        entries = {}
+        for file, (size, changed, attributes, fields, grid, sealed, packed) in stated["results"].items():
+            histories = {name: _unpacked(one) for name, one in packed.items()}
+            entries[file] = Entry(file, (size, changed), attributes, fields, histories, *grids[grid], sealed)
+        return entries
     except FileNotFoundError:
-        return (), {}
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return None, {}
+        return {}
+    except DAMAGED as error:
+        log.info("%s is made again: %s", path, error)
+        return {}
 
 
-def _checksum(keys: Sequence[str], drawn: Mapping[str, int]) -> int:
-    return zlib.crc32(" ".join([*keys, *(f"{key}={number}" for key, number in drawn.items())]).encode())
+def _packed(values: NDArray[Any]) -> list[str]:
+    """An array with one axis as text: its type and its bytes."""
+    return [values.dtype.str, b64encode(values.tobytes()).decode()]
 
 
-def _load(path: Path) -> list[Entry]:
-    """Entries of the stored index; none where there is none that can be used."""
-    try:
-        content = unsealed(path)
-        if content is None:
-            return []
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        stored = json.loads(bytes(arrays["head"]))
-        return _entries(stored["entries"], arrays) if stored["layout"] == _LAYOUT else []
-    except _UNREADABLE as error:
-        if not isinstance(error, FileNotFoundError):
-            log.info("%s is made anew: %s", path, error)
-        return []
-
-
-def _entries(heads: Sequence[Mapping[str, Any]], arrays: Mapping[str, NDArray[Any]]) -> list[Entry]:
-    at = dict.fromkeys(arrays, 0)
-    entries = []
-    for head in heads:
-        histories = {}
-        for name, count in head["histories"].items():
-            histories[name] = arrays[name][at[name] : at[name] + count]
-            at[name] += count
-        x, y = arrays[f"x{head['grid']}"], arrays[f"y{head['grid']}"]
-        size, changed = head["stamp"]
-        stamp, sealed = (size, changed), head["sealed"]
-        entries.append(Entry(head["file"], stamp, head["attributes"], head["fields"], histories, x, y, sealed))
-    return entries
+def _unpacked(packed: list[str]) -> NDArray[Any]:
+    return np.frombuffer(b64decode(packed[1]), packed[0])

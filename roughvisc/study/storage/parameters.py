@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.study.statement.variation import REALISATION, SURROGATE
+from roughvisc.study.statement.variation import DRAWN, REALISATION, SURROGATE
 
 #: Coordinate that holds the key of the case.
 CASE_KEY = "case_key"
@@ -63,11 +63,6 @@ def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
     return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
 
 
-def as_realisation(case: Mapping[str, Any], number: int | None) -> Mapping[str, Any]:
-    """A case in JSON, which says of itself which realisation of its surface it is; as it is where that is None."""
-    return case if number is None else {**case, "varied": {**case.get("varied", {}), REALISATION: number}}
-
-
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
     """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
@@ -109,3 +104,26 @@ def combinations(columns: Iterable[Sequence[Any] | NDArray[Any]], count: int) ->
     """
     lists = [np.asarray(column).tolist() for column in columns]
     return [tuple(None if column[i] != column[i] else column[i] for column in lists) for i in range(count)]
+
+
+def case_numbers(parameters: Mapping[str, NDArray[Any]], count: int) -> list[int]:
+    """Number of each of some cases, from 0 in their order; all realisations of one case have its number.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Of all cases, see :func:`parameters_of`.
+    count : int
+        How many cases there are.
+
+    Examples
+    --------
+    >>> loads, numbers = np.array([1.0, 1.0, 2.0, 2.0]), np.array([1, 2, 1, 2])
+    >>> case_numbers({"program.0.load": loads}, 4), case_numbers({"program.0.load": loads, "realisation": numbers}, 4)
+    ([0, 1, 2, 3], [0, 0, 1, 1])
+    """
+    drawn = parameters.get(REALISATION, np.full(count, np.nan))
+    settings = combinations((parameters[key] for key in parameters if key not in (REALISATION, *DRAWN)), count)
+    of_case = [one if drawn[place] == drawn[place] else place for place, one in enumerate(settings)]
+    first = {one: number for number, one in enumerate(dict.fromkeys(of_case))}
+    return [first[one] for one in of_case]

@@ -19,8 +19,9 @@ from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import Entry, Index, index_of
-from roughvisc.study.storage.parameters import as_realisation, combinations, parameters_of
+from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results
+from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, read_sweep
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES
@@ -41,16 +42,17 @@ def to_table(out: str | Path) -> pd.DataFrame:
     Parameters
     ----------
     out : path
-        Results folder. If no sweep ran in it, all its results are included. Cases that have not been computed yet are
-        omitted.
+        Results folder. If no sweep ran in it, all its results are included.
 
     Returns
     -------
     pandas.DataFrame
-        The index is the number of the case. Columns: title; varied parameters under their dotted keys, in the units of
-        the study; at the last kept time force, approach, contact area with its bounds, contact fraction, mean gap,
-        friction if the profile slides, and observables; for a friction curve the same at the speed of largest friction,
-        and this speed; the largest stated error and its parts; status, message and file. Units are in brackets.
+        The index is the number of the case, from 0 in the order of the study, as in :func:`open_results`; the
+        realisations of one case have its number. Columns: title; varied parameters under their dotted keys, in the
+        units of the study; at the last kept time force, approach, contact area with its bounds, contact fraction, mean
+        gap, friction if the profile slides, and observables; for a friction curve the same at the speed of largest
+        friction, and this speed; the largest stated error and its parts; status, message and file. Units are in
+        brackets.
 
     Raises
     ------
@@ -63,15 +65,14 @@ def to_table(out: str | Path) -> pd.DataFrame:
     """
     folder = Path(out).absolute()
     index = index_of(folder)
-    if not index.entries and not index.sweep:
+    cases = read_sweep(folder)
+    if not index.entries and not cases:
         raise no_results(folder)
-    return _table(folder, index, {}, {})
+    return _table(folder, index, cases, {})
 
 
-def write_table(
-    folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], held: Mapping[str, str] | None = None
-) -> None:
-    """Write the table of a sweep as CSV; where that cannot be done, the log says so and the sweep goes on.
+def write_table(folder: Path, index: Index, cases: Sequence[SweepCase], held: Mapping[str, str] | None = None) -> None:
+    """Write the table of a sweep as CSV; if that is impossible, the log says so and the sweep goes on.
 
     Parameters
     ----------
@@ -79,50 +80,62 @@ def write_table(
         Of the results.
     index : Index
         Of the folder.
-    cases : mapping
-        Key -> case in JSON of the sweep.
+    cases : sequence of SweepCase
+        Cases of the sweep.
     held : mapping, optional
         Key -> message, of the cases that another run was at work on.
     """
     tables = {CASES: _table(folder, index, cases, held or {})}
     (folder / REALISATIONS).unlink(missing_ok=True)  # of a sweep before
-    if any(key in index.entries for key in index.realisations):
-        tables[REALISATIONS] = realisations_table(index).set_index("case")
+    found = realisations_table(index, cases)
+    if len(found):
+        tables[REALISATIONS] = found.set_index("case")
     for name, table in tables.items():
         try:
             with atomic_write(folder / name) as temporary:
                 # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
-                table.to_csv(temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n")
+                table.map(_no_formula).to_csv(
+                    temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n"
+                )
         except (OSError, InputError) as error:
             log.warning("%s cannot be written: %s", folder / name, error)
 
 
-def realisations_table(index: Index) -> pd.DataFrame:
+def _no_formula(value: Any) -> Any:
+    """A value of a table; text that a spreadsheet would take for a formula gets an apostrophe in front."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def realisations_table(index: Index, cases: Sequence[SweepCase]) -> pd.DataFrame:
     """Mean, scatter and intervals over the realisations of each case of the last sweep, one row per quantity.
 
     Parameters
     ----------
     index : Index
         Of the folder.
+    cases : sequence of SweepCase
+        Cases of the sweep.
 
     Returns
     -------
     pandas.DataFrame
-        Number of the case; varied parameters as in :func:`to_table`; the quantity, its unit and the row that it is of;
-        then the variables of :func:`roughvisc.over_realisations`. Prescribed quantities are left out.
+        Number of the case and varied parameters as in :func:`to_table`; the quantity, its unit and its row; then the
+        variables of :func:`roughvisc.over_realisations`. Prescribed quantities are left out.
     """
     import pandas as pd
 
-    keys = [key for key in index.sweep or () if key in index.entries and key in index.realisations]
-    stated = [index.entries[key].case for key in keys]
+    stated = [one.case for one in cases]
+    numbers = numbers_of(cases)
     varied = {key: values for key, values in _parameters(stated).items() if key not in (REALISATION, *DRAWN)}
-    groups: dict[Any, list[int]] = {}
-    for place, settings in enumerate(combinations(varied.values(), len(keys))):
-        groups.setdefault(settings, []).append(place)
+    groups: dict[int, list[int]] = {}
+    for place, (number, one) in enumerate(zip(numbers, cases, strict=True)):
+        if one.key in index.entries and REALISATION in one.case.get("varied", {}):
+            groups.setdefault(number, []).append(place)
     rows = []
-    for number, (settings, places) in enumerate(groups.items(), 1):
-        entries = [index.entries[keys[place]] for place in places]
-        drawn = [index.realisations[keys[place]] for place in places]
+    for number, places in groups.items():
+        settings = [values[places[0]] for values in varied.values()]
+        entries = [index.entries[cases[place].key] for place in places]
+        drawn = [cases[place].case["varied"][REALISATION] for place in places]
         axis = AXES[entries[0].along]
         for name in axis.in_table("last"):
             variable = axis.variables[name]
@@ -130,7 +143,8 @@ def realisations_table(index: Index) -> pd.DataFrame:
                 [_summary_row(one, name) if len(one.histories.get(name, ())) else np.nan for one in entries]
             )
             known = values[np.isfinite(values)]
-            if name == axis.name or variable.group or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
+            of_error = name.endswith(("_lower", "_upper")) or name.startswith("grid_error_")
+            if name == axis.name or of_error or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
                 continue
             found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
             told = {str(key): one.item() for key, one in found.data_vars.items()}
@@ -143,16 +157,13 @@ def realisations_table(index: Index) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], held: Mapping[str, str]) -> pd.DataFrame:
+def _table(folder: Path, index: Index, cases: Sequence[SweepCase], held: Mapping[str, str]) -> pd.DataFrame:
     import pandas as pd
 
-    known = {key: entry.case for key, entry in index.entries.items()}
-    failures = {key: stated_failure(folder, key) for key in index.sweep if key not in known}
-    known |= {key: record["case"] for key, record in failures.items() if record}
-    known = {key: as_realisation(case, index.realisations.get(key)) for key, case in known.items()} | dict(cases)
-    keys = [key for key in index.sweep if key in known] or list(index.entries)
-    stated = [known[key] for key in keys]
+    cases = cases or [SweepCase(key, entry.case) for key, entry in index.entries.items()]
+    keys, stated = [one.key for one in cases], [one.case for one in cases]
     entries = [index.entries.get(key) for key in keys]
+    failures = {key: stated_failure(folder, key) for key, entry in zip(keys, entries, strict=True) if entry is None}
     columns: dict[str, Any] = {"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)}
     for rows in dict.fromkeys(entry.along for entry in entries if entry):
         mine = [entry if entry and entry.along == rows else None for entry in entries]
@@ -163,7 +174,7 @@ def _table(folder: Path, index: Index, cases: Mapping[str, Mapping[str, Any]], h
                 for place, entry in enumerate(mine):
                     if entry and len(entry.histories.get(name, ())):
                         column[place] = take(entry, name)
-    table = pd.DataFrame(columns, pd.RangeIndex(1, len(keys) + 1, name="case")).dropna(axis="columns", how="all")
+    table = pd.DataFrame(columns, pd.Index(numbers_of(cases), name="case")).dropna(axis="columns", how="all")
     records = [failures.get(key) or {} for key in keys]
     messages = [held.get(key, "") if entry is None else "" for key, entry in zip(keys, entries, strict=True)]
     return table.assign(

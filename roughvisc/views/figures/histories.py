@@ -210,7 +210,7 @@ def _case_name(results: xr.Dataset, number: int) -> str:
     """What was varied in a case, as its coordinates tell; else its number."""
     texts = []
     for key, coordinate in results.coords.items():
-        if coordinate.dims == ("case",) and key not in ("case", "case_key"):
+        if coordinate.dims == ("case",) and key not in ("case", "case_key", "rows"):
             name = str(coordinate.attrs.get("long_name", key)).rpartition(".")[2].replace("_", " ")
             value, si = coordinate.values[number], coordinate.attrs.get("units")
             texts.append(f"{name} {value if si is None else unit_for([value], si).text(value)}")

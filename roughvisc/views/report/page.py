@@ -26,6 +26,7 @@ from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write, verify_checksum
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import no_results, open_result, result_files
+from roughvisc.study.storage.sweep_cases import read_sweep
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
@@ -100,7 +101,10 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         for one in sources:
             verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
         if in_folder:
-            failures, drawn = _failures(source), realisation_rows(realisations_table(index_of(source)))
+            failures, drawn = (
+                _failures(source),
+                realisation_rows(realisations_table(index_of(source), read_sweep(source))),
+            )
             swept = _swept(source) if len(sources) > 1 else []
         path = path or (source / "report.html" if in_folder else source.with_name(f"{source.stem}-report.html"))
     else:

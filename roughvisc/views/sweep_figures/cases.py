@@ -16,6 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
+from roughvisc.study.storage.results import ROW, ROWS
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
@@ -26,7 +27,7 @@ from roughvisc.views.sweep_figures.ensembles import Band, pooled
 
 #: Quantities that span decades, and of which zero means that there is none.
 _SPANNING = ("leak_rate", "transmissivity", "hydraulic_aperture")
-_NO_PARAMETERS = ("case", "case_key")
+_NO_PARAMETERS = ("case", "case_key", ROWS)
 
 
 @dataclass(frozen=True)
@@ -198,7 +199,7 @@ def cases_of(results: Any) -> Cases:
 
     Parameters
     ----------
-    results : xarray.Dataset or xarray.DataTree
+    results : xarray.Dataset
         As :func:`roughvisc.open_results` gives them.
 
     Raises
@@ -206,20 +207,13 @@ def cases_of(results: Any) -> Cases:
     InputError
         If they are something else, or one case only.
     """
-    if isinstance(results, xr.DataTree):
-        of_rows = [(axis,) for axis in AXES]
-        found = [node.to_dataset() for node in results.children.values()]
-        members = [one[[name for name in one.data_vars if one[name].dims in of_rows]].load() for one in found]
-    elif isinstance(results, xr.Dataset) and "case" in results.dims:
-        over = [dim for dim in ("case", REALISATION) if dim in results.dims]
-        held = [name for name in results.data_vars if set(results[name].dims) <= {*over, *AXES}]
-        table = results[held].load()
-        keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
-        members = [table.isel(dict(zip(over, place, strict=True))) for place in np.argwhere(keys != "")]
-    else:
-        raise InputError(
-            "expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case', or a tree"
-        )
+    if not isinstance(results, xr.Dataset) or "case" not in results.dims:
+        raise InputError("expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case'")
+    over = [dim for dim in ("case", REALISATION) if dim in results.dims]
+    held = [name for name in results.data_vars if set(results[name].dims) <= {*over, ROW, *AXES}]
+    table = results[held].load()
+    keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
+    members = [_own_rows(table.isel(dict(zip(over, place, strict=True)))) for place in np.argwhere(keys != "")]
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
     scalars = [one for name, one in members[0].coords.items() if not one.dims and name not in _NO_PARAMETERS]
@@ -253,6 +247,13 @@ def cases_of(results: Any) -> Cases:
         for key, (values, source) in settings.items()
     ]
     return Cases(together, _independent(varied), bands)
+
+
+def _own_rows(member: xr.Dataset) -> xr.Dataset:
+    """Histories of one case over its own times or speeds, without rows after its last."""
+    if ROW not in member.dims:
+        return member
+    return member.isel({ROW: slice(int(member[ROWS]))}).swap_dims({ROW: axis_of(member.variables)})
 
 
 def _key(coordinate: xr.DataArray) -> str:

@@ -45,8 +45,8 @@ def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | N
 
     Parameters
     ----------
-    results : xarray.Dataset or xarray.DataTree
-        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives; of a tree these may differ.
+    results : xarray.Dataset
+        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
     quantity : str, optional
         A history of every case, such as ``"approach"``; by default the contact area, or
         the contact fraction where the surfaces differ in size.
@@ -183,9 +183,8 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
 
     Parameters
     ----------
-    results : xarray.Dataset or xarray.DataTree
-        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives of a study of friction; of a tree the
-        speeds may differ.
+    results : xarray.Dataset
+        What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives of a study of friction.
     reduced : bool
         Against the speed times the shift factor of the material's temperature, ``a_T V``: curves of several
         temperatures then fall on one master curve.

@@ -24,17 +24,13 @@ from roughvisc.views.sweep_figures.curves import friction_of_cases, histories_of
 from roughvisc.views.sweep_figures.sweeps import sweep, telling_frames_of
 
 
-def results_of(folder: str | Path) -> xr.Dataset | xr.DataTree | None:
-    """Results of the sweep that ran last in a folder, as a tree where times or grids differ; None if below two."""
+def results_of(folder: str | Path) -> xr.Dataset | None:
+    """Results of the sweep that ran last in a folder; None if there are fewer than two."""
     try:
-        tree = open_results(folder, ragged=True)
-        if len(tree.children) < 2:
-            return None
-        with suppress(InputError):
-            return open_results(folder)
-        return tree
+        results = open_results(folder)
     except InputError:
         return None
+    return results if results["case_key"].size > 1 else None
 
 
 #: What files are called after other than the quantity.
@@ -51,7 +47,7 @@ def cases_in(paths: Sequence[Path]) -> dict[Path, tuple[str, str]]:
     return {Path(path): (stems[Path(path).stem], case_words(case)) for path, case in cases.items()}
 
 
-def sweep_figures(results: xr.Dataset | xr.DataTree) -> Iterator[tuple[str, str, Figure]]:
+def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     """Name, title and figure of all that results of several cases allow, one at a time.
 
     What the program prescribes alike in all cases, or a parameter says already, is left out.
@@ -95,9 +91,7 @@ def _known_before(cases: Cases, name: str) -> bool:
     return any(np.allclose(last, values, rtol=0, atol=scale) for values in (last[0], *stated))
 
 
-def save_sweep_figures(
-    results: xr.Dataset | xr.DataTree, folder: Any, *, suffix: str = ".png", dpi: float = 200.0
-) -> list[Path]:
+def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
     """Write the figures of a sweep, as ``sweep-area.png``, ``sweep-approach.png``, ``sweep-histories.png``,
     and what was observed alike.
 
@@ -107,7 +101,7 @@ def save_sweep_figures(
 
     Parameters
     ----------
-    results : xarray.Dataset or xarray.DataTree
+    results : xarray.Dataset
         What :func:`roughvisc.open_results` gives.
     folder : path-like
         Where to write; made if absent.

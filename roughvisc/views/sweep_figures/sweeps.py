@@ -60,7 +60,7 @@ def sweep(
 
     Parameters
     ----------
-    results : xarray.Dataset or xarray.DataTree
+    results : xarray.Dataset
         What :func:`roughvisc.sweep` or :func:`roughvisc.open_results` gives.
     quantity : str, optional
         A history of every case, such as ``"approach"`` or ``"wall_time"``; by default the contact area, or the

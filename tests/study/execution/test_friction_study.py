@@ -144,10 +144,9 @@ def test_results__over_time_and_over_speed_are_not_put_into_one(case, tmp_path):
     cases = [case(), read_study(tmp_path / "ball.toml")]
     for one in cases:
         run_case(one, tmp_path / "out")
-    with pytest.raises(rv.InputError, match=r"lies over speed, .* over time: open them with ragged=True"):
+    with pytest.raises(rv.InputError) as caught:
         open_results(tmp_path / "out", cases=cases)
-    tree = open_results(tmp_path / "out", cases=cases, ragged=True)
-    assert [set(tree[one.key].dims) for one in cases] == [{"speed", "x", "y"}, {"time", "x", "y"}]
+    assert caught.value.key == "cases"
     table = rv.to_table(tmp_path / "out")
     assert table["friction_coefficient"].notna().sum() == table["time [s]"].notna().sum() == 1
     curve = open_result(tmp_path / "out" / f"{cases[0].key}.nc")

@@ -6,7 +6,6 @@ import io
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -27,11 +26,12 @@ from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.statement.case import Case, vary
+from roughvisc.study.statement.case import Case
 from roughvisc.study.storage import failures as sweep_log
 from roughvisc.study.storage.failures import record_path
-from roughvisc.study.storage.index import INDEX, LATEST
-from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.sweep_cases import SWEEP
 from roughvisc.study.storage.table import CASES
 
 RUN = [sys.executable, "-m", "roughvisc", "run"]
@@ -62,7 +62,7 @@ def leftovers(folder):
     return [
         p.name
         for p in folder.iterdir()
-        if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, LATEST, "inputs")
+        if p.suffix != ".nc" and p.name not in ("sweep.log", CASES, INDEX, SWEEP, "inputs")
     ]
 
 
@@ -359,7 +359,7 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
     if not terminal:
         lines = stream.getvalue().splitlines()
         assert lines[0] == "Dashboard: http://127.0.0.1:8787/status"
-        assert lines[1].startswith("case 2 of 4 (program.0.load = 4 mN, ")
+        assert lines[1].startswith("case 1 (program.0.load = 4 mN, ")
         assert lines[1].endswith("failed: too [much] load")
         assert lines[2].startswith("1 of 4 cases done, 1 failed, 1 running, about ")
         assert "left" in lines[2]
@@ -403,214 +403,3 @@ def test_watch__hears_from_workers(study, tmp_path):
     times = heard[cases[0].key]
     assert times == sorted(times)
     assert times[-1] > 0
-
-
-# ----------------------------------------------------------------------------------------------------------------
-# all results as one
-
-
-def synthetic(folder, loads=10, seeds=6, template=None, shape=(8, 6), times=4):
-    """Results of a sweep over loads and seeds, made up: fast to write, in the form that a run writes."""
-    rng = np.random.default_rng(1)
-    series = {
-        name: ("time", rng.random(times)) for name in ("force", "approach", "residual", "time_error", "wall_time")
-    }
-    ds = xr.Dataset(
-        {
-            **series,
-            "status": ("time", np.zeros(times, "int8")),
-            "height": (("x", "y"), rng.random(shape)),
-            "pressure": (("time", "x", "y"), rng.random((times, *shape))),
-        },
-        coords={"time": np.arange(times) * 0.1, "x": np.arange(shape[0]) * 1e-6, "y": np.arange(shape[1]) * 1e-6},
-    )
-    surface = {"generate": "self_affine", "size": [1e-3, 1e-3], "hurst": 0.8, "seed": 0}
-    for i in range(loads):
-        for j in range(seeds):
-            case = {
-                "title": "made up",
-                "surface": {**surface, "seed": j},
-                "program": [{"load": 0.5 * (i + 1), "over": 0.1}, {"hold": 1.0}],
-                "varied": {"program.0.load": 0.5 * (i + 1), "surface.seed": j},
-            }
-            ds.attrs = {"case": json.dumps(case), "case_key": f"{i:08x}{j:08x}", "boundary": "periodic"}
-            ds["force"][:] = 0.5 * (i + 1)
-            ds["pressure"][:] = i + 100 * j
-            write_result(ds, folder / f"{i:08x}{j:08x}.nc")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def sixty(tmp_path_factory):
-    folder = synthetic(tmp_path_factory.mktemp("sixty"))
-    rv.open_results(folder)
-    return folder
-
-
-def test_open_results__varied_parameters_are_coordinates(sixty):
-    ds = rv.open_results(sixty)
-    assert ds.sizes == {"case": 60, "time": 4, "x": 8, "y": 6}
-    assert ds.pressure.dims == ("case", "time", "x", "y")
-    assert ds.pressure.chunks is not None
-    assert ds.height.dims == ("case", "x", "y"), "the seed changes the surface"
-    assert ds.attrs["title"] == "made up"
-    assert ds.pressure.attrs["units"] == "Pa"
-    grid = ds.set_index(case=["program_0_load", "surface_seed"]).unstack("case")
-    assert grid.sizes["program_0_load"], grid.sizes["surface_seed"] == (10, 6)
-    picked = grid.pressure.sel({"program_0_load": 2.0, "surface_seed": 4}).isel(time=-1)
-    assert (picked.values == 403).all()
-    loads = ds.set_xindex("program_0_load").sel(program_0_load=1.5)
-    assert loads.sizes["case"] == 6
-    assert (loads.force == 1.5).all()
-    assert ds.sel(time=0.2).pressure.max("case").compute().shape == (8, 6)
-
-
-def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
-    import netCDF4
-
-    def forbidden(*args, **settings):
-        raise AssertionError("a result was opened")
-
-    monkeypatch.setattr(netCDF4, "Dataset", forbidden)
-    ds = rv.open_results(sixty)
-    assert float(ds.force.sum()) == pytest.approx(0.5 * 55 * 6 * 4)
-    with pytest.raises(AssertionError, match="a result was opened"):
-        ds.pressure.compute(scheduler="sync")
-
-
-def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
-    folder = tmp_path / "copy"
-    shutil.copytree(sixty, folder)
-    paths = sorted(folder.glob("*.nc"))
-    paths[0].unlink()
-    paths[1].write_bytes(b"cut short")
-    assert rv.open_results(folder).sizes["case"] == 58
-    assert f"{paths[1]}: is damaged" in caplog.text
-    (folder / INDEX).write_bytes(b"nonsense")
-    assert rv.open_results(folder).sizes["case"] == 58
-    with open_result(paths[2]) as ds:
-        changed = ds.load()
-    changed["force"][:] = 77.0
-    write_result(changed, paths[2])
-    assert (rv.open_results(folder).force == 77.0).any()
-    folder.chmod(0o500)
-    (folder / INDEX).chmod(0o400)
-    assert rv.open_results(folder).sizes["case"] == 58
-    folder.chmod(0o700)
-
-
-def test_open_results__in_threads(sixty):
-    ds = rv.open_results(sixty)
-    for _ in range(3):
-        assert ds.pressure.isel(time=0, x=0, y=0).compute(scheduler="threads", num_workers=8).shape == (60,)
-
-
-def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
-    ds = rv.open_results(synthetic(tmp_path, loads=2, seeds=1, times=7))
-    assert ds.pressure.chunks[1] == (3, 3, 1)
-    assert ds.height.dims == ("x", "y"), "one surface"
-    for case in range(2):
-        with open_result(tmp_path / f"{case:08x}{0:08x}.nc") as one:
-            np.testing.assert_array_equal(ds.pressure[case].values, one.pressure.values)
-            np.testing.assert_array_equal(ds.height.values, one.height.values)
-
-
-def test_open_results__ragged_times_and_grids_make_a_tree(tmp_path):
-    synthetic(tmp_path, loads=1, seeds=1, times=3)
-    with open_result(tmp_path / f"{0:08x}{0:08x}.nc") as ds:
-        ds = ds.load()
-    ds.attrs["case_key"] = "f" * 16
-    write_result(ds, tmp_path / f"{'f' * 16}.nc")
-    synthetic(tmp_path, loads=1, seeds=1, times=5)
-    with pytest.raises(InputError, match=r"no common times \(5 and 3\): open them with ragged=True"):
-        rv.open_results(tmp_path)
-    tree = rv.open_results(tmp_path, ragged=True)
-    assert isinstance(tree, xr.DataTree)
-    assert tree["f" * 16].sizes["time"] == 3
-    assert tree[f"{0:08x}{0:08x}"].ds.pressure.values.shape == (5, 8, 6)
-    assert float(tree["f" * 16]["program_0_load"]) == 0.5
-
-
-def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):
-    folder = tmp_path / "copy"
-    shutil.copytree(sixty, folder)
-    key = f"{3:08x}{2:08x}"
-    with open_result(folder / f"{key}.nc") as ds:
-        derived = ds.load()
-    derived["force"][:] = 77.0
-    for name in ("000-mean.nc", f"{'f' * 16}.nc", "zz.nc"):
-        write_result(derived, folder / name)
-    (folder / INDEX).unlink()
-    ds = rv.open_results(folder)
-    assert ds.sizes["case"] == 60
-    assert float(ds.force.max()) == 5.0
-    assert f"{'f' * 16}.nc: holds the result of case {key}" in caplog.text
-
-
-def test_open_results__no_bit_of_the_index_changes_what_a_sweep_returns(study, tmp_path):
-    out, cases = tmp_path / "out", study()
-    sweep(cases, out, workers=0, progress=False)
-    assert sweep(cases[:2], out, workers=0, progress=False).sizes["case"] == 2
-    rng = np.random.default_rng(5)
-    for name in (INDEX, LATEST):
-        whole = np.fromfile(out / name, np.uint8)
-        for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
-            damaged = whole.copy()
-            damaged[at] ^= 1 << rng.integers(8)
-            damaged.tofile(out / name)
-            with contextlib.suppress(InputError) if name == LATEST else contextlib.nullcontext():
-                assert list(rv.open_results(out).case_key) == [case.key for case in cases[:2]], at
-        whole.tofile(out / name)
-    (out / LATEST).write_text("[]")
-    with pytest.raises(InputError, match=rf"{LATEST}: is damaged: expected the cases of the sweep that ran last"):
-        rv.open_results(out)
-    assert rv.open_results(out, cases="all").sizes["case"] == 4
-
-
-def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):
-    out = tmp_path / "out"
-    cases = study()
-    sweep(cases, out, workers=0, progress=False)
-    tighter = [vary(case, {"solve.tolerance": 2e-3}) for case in cases[:2]]
-    assert sweep(tighter, out, workers=0, progress=False).sizes["case"] == 2
-    assert list(rv.open_results(out)["solve_tolerance"]) == [2e-3, 2e-3]
-    ds = rv.open_results(out, cases="all")
-    assert sorted(ds["solve_tolerance"].values) == [1e-3] * 4 + [2e-3] * 2
-    reversed_ = rv.open_results(out, cases=cases[::-1])
-    assert list(reversed_.case_key) == [case.key for case in cases[::-1]]
-    with pytest.raises(InputError, match="cases is 'first'"):
-        rv.open_results(out, cases="first")
-
-
-def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path):
-    text = (
-        BALL
-        + '[[sweep]]\n"surface.radius" = ["10 mm", "12 mm"]\n'
-        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n'
-    )
-    ds = sweep(study(text), tmp_path / "out", workers=0, progress=False)
-    assert list(ds["surface_radius"].values) == [10e-3, 12e-3, 10e-3]
-    assert list(ds["solve_edge"].values) == ["error", "error", "accept"]
-    np.testing.assert_array_equal(ds["material_poisson"], [np.nan, np.nan, 0.4], "the others do not state it")
-    assert ds.height.dims == ("case", "x", "y")
-
-
-def test_open_results__nothing_there(tmp_path):
-    with pytest.raises(InputError, match="holds no results"):
-        rv.open_results(tmp_path)
-    with pytest.raises(InputError, match="does not exist: expected a results folder"):
-        rv.open_results(tmp_path / "gone")
-
-
-@pytest.mark.long
-def test_open_results__a_thousand_files(tmp_path, capsys):
-    synthetic(tmp_path, loads=50, seeds=20, shape=(64, 64), times=10)
-    for what in ("without an index", "with an index"):
-        began = time.perf_counter()
-        ds = rv.open_results(tmp_path)
-        seconds = time.perf_counter() - began
-        with capsys.disabled():
-            print(f"\n1,000 results opened {what}: {seconds:.2f} s")
-        assert ds.sizes["case"] == 1000
-        assert seconds < 5

@@ -100,7 +100,7 @@ def test_sweep__over_scans_is_asked_once(study):
     with pytest.raises(rv.InputError) as asked:
         read_cases(path)
     head, *rows = ANSWER.split("\n")
-    assert str(asked.value) == "\n".join([f"{path}: {head} (case 2 of 2: surface.mirror = False)", *rows])
+    assert str(asked.value) == "\n".join([f"{path}: {head} (case 1: surface.mirror = False)", *rows])
 
 
 def test_rows_of_a_message__stay_below_it_beside_another_problem(study):

@@ -624,7 +624,7 @@ def test_read_cases__zipped(study):
         (
             '[sweep]\n"program.0.load" = [1, -2]',
             "program.0.load: found -2: expected a number in N, or a string with a unit of its kind, at least 0 "
-            "(case 2 of 2: program.0.load = -2)",
+            "(case 1: program.0.load = -2)",
         ),
         (
             '[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3]',

@@ -126,7 +126,7 @@ def test_realisations__are_refused_where_they_make_no_sense(study, surface, swee
 
 def test_realisations__a_case_that_is_refused_says_which_it_is(study):
     open_border = SCAN.replace("mirror = true", "")  # whose surrogates repeat, while it does not
-    with pytest.raises(InputError, match=r"solve.boundary: .*\(case 1 of 3: realisation = 0\)"):
+    with pytest.raises(InputError, match=r"solve.boundary: .*\(case 0: realisation = 0\)"):
         read_cases(study(open_border, "[sweep]\nrealisations = 2\n"))
     with pytest.raises(InputError, match=r"realisation: unknown key"):
         read_cases(study(ROUGH, "[sweep]\nrealisation = [1, 2]\n"))

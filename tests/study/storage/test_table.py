@@ -36,7 +36,7 @@ def folder(tmp_path_factory):
 
 def test_table__says_what_the_results_say(folder):
     table = rv.to_table(folder)
-    assert table.index.tolist() == [1, 2, 3, 4]
+    assert table.index.tolist() == [0, 1, 2, 3]
     assert table.index.name == "case"
     assert table["program.0.load [uN]"].tolist() == [500, 1000, 2e6, 3e6], "in the unit that the study states first"
     assert table["material.kelvin_viscosity [MPa s]"].tolist() == [0.1, 0.2, 0.1, 0.1]
@@ -95,7 +95,7 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
     written = pd.read_csv(tmp_path / "out" / CASES)
     assert written["status"].tolist() == ["converged", "not computed"]
     assert written["program.0.load [mN]"].tolist() == [1, 2]
-    assert len(rv.to_table(tmp_path / "out")) == 1
+    assert rv.to_table(tmp_path / "out")["status"].tolist() == ["converged", "not computed"]
 
 
 def test_results__are_frames_of_pandas(folder):

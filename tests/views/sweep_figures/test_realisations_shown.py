@@ -105,16 +105,14 @@ def test_cases_of__a_realisation_that_is_missing_does_not_count():
 
 
 def test_cases_of__realisations_of_other_times_are_compared_at_common_places():
-    nodes = {}
-    for number, times in ((1, [0.0, 1.0, 2.0]), (2, [0.0, 0.5, 2.0])):
-        area = xr.Variable("time", 1e-8 * number * np.array(times), {"units": "m^2"})
-        status = xr.Variable("time", np.full(3, number - 1, "int8"), {"flag_values": np.arange(4, dtype="int8")})
-        nodes[f"{number}"] = xr.Dataset(
-            {"contact_area": area, "status": status}, {"time": times, "realisation": number, "case_key": f"{number}"}
-        )
-    cases = cases_of(xr.DataTree.from_dict(nodes))
+    times = np.array([[0.0, 1.0, 2.0], [0.0, 0.5, 2.0]])
+    area = xr.Variable(("case", "row"), 1e-8 * times * [[1], [2]], {"units": "m^2"})
+    status = xr.Variable(("case", "row"), np.array([[0] * 3, [1] * 3]), {"flag_values": np.arange(4, dtype="int8")})
+    coords = {"time": (("case", "row"), times), "rows": ("case", [3, 3]), "realisation": ("case", [1, 2])}
+    results = xr.Dataset({"contact_area": area, "status": status}, coords)
+    cases = cases_of(results)
     (mean,) = cases.members
     np.testing.assert_allclose(mean["time"], [0, 0.5, 1, 2])
     np.testing.assert_allclose(mean["contact_area"], 1.5e-8 * mean["time"])
     assert mean["status"].values.tolist() == [1, 1, 1, 1]
-    assert lines(plot.histories_of_cases(xr.DataTree.from_dict(nodes)).axes[0])
+    assert lines(plot.histories_of_cases(results).axes[0])

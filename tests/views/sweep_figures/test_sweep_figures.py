@@ -363,17 +363,17 @@ def folder(tmp_path_factory):
     return out / "results"
 
 
-def test_tree__of_cases_with_times_of_their_own(folder):
-    tree = results_of(folder)
-    assert isinstance(tree, xr.DataTree)
-    (ax, *_) = plot.sweep(tree, "approach", along="program.0.load").axes
+def test_sweep__of_cases_with_times_of_their_own(folder):
+    results = results_of(folder)
+    assert results.contact_area.dims == ("case", "row")
+    (ax, *_) = plot.sweep(results, "approach", along="program.0.load").axes
     assert ax.get_xlabel() == "Load [mN]"
     assert ax.get_title(loc="left") == "at the end"
-    held = [node for node in tree.children.values() if float(node["program_1_hold"]) == 0.1]
-    held.sort(key=lambda node: float(node["program_0_load"]))
+    held = results.sel(case=results.program_1_hold == 0.1).sortby("program_0_load")
+    at_end = [float(one[int(rows) - 1]) for one, rows in zip(held.approach, held.rows, strict=True)]
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), [scale * float(node["approach"][-1]) for node in held])
-    assert len(plot.histories_of_cases(tree, "approach").axes[0].lines) == 6
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), [scale * value for value in at_end])
+    assert len(plot.histories_of_cases(results, "approach").axes[0].lines) == 6
 
 
 def test_files__of_a_folder(folder, tmp_path):
@@ -407,8 +407,8 @@ def test_report__shows_the_sweep(folder, tmp_path):
 
 
 def test_units__of_parameters_are_on_their_coordinates(folder):
-    node = next(iter(results_of(folder).children.values()))
-    assert (node["program_0_load"].attrs["units"], node["program_1_hold"].attrs["units"]) == ("N", "s")
+    results = results_of(folder)
+    assert (results["program_0_load"].attrs["units"], results["program_1_hold"].attrs["units"]) == ("N", "s")
 
 
 def test_unit_of__cycles_by_what_they_control():

@@ -1,0 +1,356 @@
+"""All results of a sweep as one Dataset, in numbers and labels those of the single results."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL, LOADS, refused
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.study.execution.sweep import sweep
+from roughvisc.study.statement.case import read_cases, vary
+from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.sweep_cases import SWEEP
+
+SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
+OWN_TIMES = (
+    SMALL.replace("over = 0", 'over = "10 ms"').replace('[0, "0.1 s", "200 ms"]', '"all"')
+    + """
+[sweep]
+"program.0.load" = ["4 mN", "5 mN"]
+"program.0.over" = ["10 ms", "50 ms"]
+"program.1.hold" = ["0.1 s", "10 s"]
+"""
+)
+KEYS = ["program_0_load", "program_0_over", "program_1_hold"]
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study and reads its cases."""
+
+    def write(text=SMALL + LOADS, name="ball"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text)
+        return read_cases(path)
+
+    return write
+
+
+@pytest.fixture(scope="module")
+def own_times(tmp_path_factory):
+    """Folder and results of a sweep over ramps and holds: each case keeps every step of its own."""
+    folder = tmp_path_factory.mktemp("own_times")
+    (folder / "study.toml").write_text(OWN_TIMES)
+    return folder / "out", rv.sweep(folder / "study.toml", folder / "out", workers=0, progress=False)
+
+
+def test_own_times__each_case_is_its_result_and_missing_after_it(own_times):
+    folder, ds = own_times
+    assert ds.pressure.dims == ("case", "row", "x", "y")
+    assert ds.time.dims == ds.force.dims == ds.status.dims == ("case", "row")
+    assert ds.case.values.tolist() == list(range(8))
+    assert len(set(ds.rows.values)) > 1
+    assert ds.pressure.chunks is not None
+    for number, one in ds.groupby("case", squeeze=False):
+        with open_result(folder / f"{one.case_key.item()}.nc") as alone:
+            count = alone.sizes["time"]
+            assert one.rows.item() == count
+            assert one.time[0, count - 1] == one.program_0_over + one.program_1_hold
+            for name in ("time", "force", "contact_area", "status", "pressure"):
+                np.testing.assert_array_equal(one[name][0, :count], alone[name], str(number))
+                assert one[name][0, count:].isnull().all(), name
+            np.testing.assert_array_equal(ds.height, alone.height)
+
+
+def test_own_times__are_a_cube_groups_and_frames(own_times):
+    _, ds = own_times
+    area = ds.contact_area.where(ds.time == ds.time.max("row")).max("row")
+    cube = ds.set_index(case=KEYS).unstack("case")
+    assert {name: cube.sizes[name] for name in KEYS} == dict.fromkeys(KEYS, 2)
+    one = cube.sel(program_0_load=5e-3, program_0_over=10e-3, program_1_hold=10.0)
+    np.testing.assert_array_equal(one.force, ds.force[5])
+    np.testing.assert_array_equal(one.pressure, ds.pressure[5])
+    means = area.groupby("program_1_hold").mean()
+    assert means.sel(program_1_hold=10.0) > means.sel(program_1_hold=0.1), "the ball creeps"
+    frame = ds[["force", "contact_area"]].to_dataframe().dropna(subset=["force"])
+    assert len(frame) == ds.rows.sum()
+    assert frame.query("program_0_load > 4.5e-3")["force"].max() == pytest.approx(5e-3)
+    slower = ds.sel(case=ds.program_0_over > 20e-3)
+    assert slower.case.values.tolist() == [2, 3, 6, 7]
+
+
+def test_own_times__are_drawn_by_xarray_and_by_the_sweep_figure(own_times):
+    _, ds = own_times
+    lines = ds.contact_area.plot.line(x="time", hue="case")
+    assert len(lines) == 8
+    figure = rv.plot.sweep(ds, "approach", times=-1)
+    drawn = np.concatenate([line.get_ydata() for ax in figure.axes for line in ax.lines])
+    at_end = [float(ds.approach[case, rows - 1]) for case, rows in enumerate(ds.rows.values)]
+    for value in at_end:
+        assert np.isclose(drawn, 1e6 * value, rtol=1e-9).any()
+
+
+def test_own_speeds__are_rows(tmp_path):
+    (tmp_path / "slide.toml").write_text("""
+[surface]
+generate = "wavy"
+amplitude = "1 um"
+wavelength = "0.1 mm"
+size = "0.1 mm"
+shape = [16, 12]
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[friction]
+pressure = "10 kPa"
+speeds = ["1 mm/s"]
+[solve]
+boundary = "periodic"
+[[sweep]]
+"friction.speeds" = [["1 mm/s", "10 mm/s"], ["1 mm/s", "2 mm/s", "5 mm/s"]]
+""")
+    ds = rv.sweep(tmp_path / "slide.toml", tmp_path / "out", workers=0, progress=False)
+    assert ds.friction_coefficient.dims == ds.speed.dims == ("case", "row")
+    assert ds.rows.values.tolist() == [2, 3]
+    np.testing.assert_array_equal(ds.speed, [[1e-3, 1e-2, np.nan], [1e-3, 2e-3, 5e-3]])
+    assert ds.friction_coefficient[0, 0] == ds.friction_coefficient[1, 0]
+    assert ds.friction_coefficient.notnull().equals(ds.speed.notnull())
+
+
+def test_open_results__on_different_grids_has_histories(study, tmp_path, caplog):
+    cases = study(SMALL + '[sweep]\n"surface.shape" = [[12, 9], [16, 12]]\n')
+    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert ds.contact_area.dims == ("case", "time")
+    assert not {"x", "y", "pressure", "height"} & set(ds.variables)
+    assert "12 x 9 cells" in caplog.text
+    assert "16 x 12 cells" in caplog.text
+
+
+def test_open_results__scans_with_equal_bytes_keep_both_labels(study, tmp_path):
+    height = rv.self_affine((1e-3, 1e-3), (12, 10), hurst=0.8, rms_height=1e-7, seed=1)
+    height.rename("height").to_netcdf(tmp_path / "one.nc")
+    shutil.copy(tmp_path / "one.nc", tmp_path / "same.nc")
+    recipe = SMALL[SMALL.index("generate") : SMALL.index("[material]")]
+    text = SMALL.replace(recipe, 'file = "one.nc"\n').replace('"free"', '"periodic"')
+    cases = study(text + '[sweep]\n"surface.file" = ["one.nc", "same.nc"]\n')
+    assert cases[0].key == cases[1].key
+    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert ds.case.values.tolist() == [0, 1]
+    assert [name.rpartition("/")[2] for name in ds.surface_file.values] == ["one.nc", "same.nc"]
+    assert (ds.force[0] == ds.force[1]).all()
+    table = rv.to_table(tmp_path / "out")
+    assert table["surface.file"].tolist() == ds.surface_file.values.tolist()
+    assert table.index.tolist() == [0, 1]
+
+
+def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_path):
+    cases = study()
+    sweep(cases, tmp_path / "out", workers=0, progress=False)
+    (tmp_path / "out" / f"{cases[1].key}.nc").unlink()
+    ds, table = rv.open_results(tmp_path / "out"), rv.to_table(tmp_path / "out")
+    assert ds.case.values.tolist() == [0, 2, 3]
+    assert table.index[table["status"] == "converged"].tolist() == [0, 2, 3]
+    np.testing.assert_array_equal(table.loc[ds.case.values, "force [N]"], ds.force[:, -1])
+
+
+def test_list_of_cases__damaged_is_refused(study, tmp_path):
+    out = tmp_path / "out"
+    sweep(study(), out, workers=0, progress=False)
+    whole = (out / SWEEP).read_bytes()
+    for content in (whole[:-3], b"[]", whole.replace(whole[20:24], b"abcd")):
+        (out / SWEEP).write_bytes(content)
+        for read in (rv.open_results, rv.to_table):
+            with refused(SWEEP):
+                read(out)
+    assert rv.open_results(out, cases="all").sizes["case"] == 4
+    (out / SWEEP).write_bytes(whole)
+    assert rv.open_results(out).sizes["case"] == 4
+
+
+def test_index__damaged_is_made_again(study, tmp_path):
+    out = tmp_path / "out"
+    sweep(study(), out, workers=0, progress=False)
+    wanted, whole = rv.open_results(out).load(), np.fromfile(out / INDEX, np.uint8)
+    rng = np.random.default_rng(5)
+    for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
+        damaged = whole.copy()
+        damaged[at] ^= 1 << rng.integers(8)
+        damaged.tofile(out / INDEX)
+        xr.testing.assert_identical(rv.open_results(out).load(), wanted)
+
+
+def synthetic(folder, loads=10, seeds=6, template=None, shape=(8, 6), times=4):
+    """Results of a sweep over loads and seeds, made up: fast to write, in the form that a run writes."""
+    rng = np.random.default_rng(1)
+    series = {
+        name: ("time", rng.random(times)) for name in ("force", "approach", "residual", "time_error", "wall_time")
+    }
+    ds = xr.Dataset(
+        {
+            **series,
+            "status": ("time", np.zeros(times, "int8")),
+            "height": (("x", "y"), rng.random(shape)),
+            "pressure": (("time", "x", "y"), rng.random((times, *shape))),
+        },
+        coords={"time": np.arange(times) * 0.1, "x": np.arange(shape[0]) * 1e-6, "y": np.arange(shape[1]) * 1e-6},
+    )
+    surface = {"generate": "self_affine", "size": [1e-3, 1e-3], "hurst": 0.8, "seed": 0}
+    for i in range(loads):
+        for j in range(seeds):
+            case = {
+                "title": "made up",
+                "surface": {**surface, "seed": j},
+                "program": [{"load": 0.5 * (i + 1), "over": 0.1}, {"hold": 1.0}],
+                "varied": {"program.0.load": 0.5 * (i + 1), "surface.seed": j},
+            }
+            ds.attrs = {"case": json.dumps(case), "case_key": f"{i:08x}{j:08x}", "boundary": "periodic"}
+            ds["force"][:] = 0.5 * (i + 1)
+            ds["pressure"][:] = i + 100 * j
+            write_result(ds, folder / f"{i:08x}{j:08x}.nc")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sixty(tmp_path_factory):
+    folder = synthetic(tmp_path_factory.mktemp("sixty"))
+    rv.open_results(folder)
+    return folder
+
+
+def test_open_results__varied_parameters_are_coordinates(sixty):
+    ds = rv.open_results(sixty)
+    assert ds.sizes == {"case": 60, "time": 4, "x": 8, "y": 6}
+    assert ds.pressure.dims == ("case", "time", "x", "y")
+    assert ds.pressure.chunks is not None
+    assert ds.height.dims == ("case", "x", "y"), "the seed changes the surface"
+    assert ds.attrs["title"] == "made up"
+    assert ds.pressure.attrs["units"] == "Pa"
+    grid = ds.set_index(case=["program_0_load", "surface_seed"]).unstack("case")
+    assert (grid.sizes["program_0_load"], grid.sizes["surface_seed"]) == (10, 6)
+    picked = grid.pressure.sel({"program_0_load": 2.0, "surface_seed": 4}).isel(time=-1)
+    assert (picked.values == 403).all()
+    loads = ds.set_xindex("program_0_load").sel(program_0_load=1.5)
+    assert loads.sizes["case"] == 6
+    assert (loads.force == 1.5).all()
+    assert ds.sel(time=0.2).pressure.max("case").compute().shape == (8, 6)
+
+
+def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
+    import netCDF4
+
+    def forbidden(*args, **settings):
+        raise AssertionError("a result was opened")
+
+    monkeypatch.setattr(netCDF4, "Dataset", forbidden)
+    ds = rv.open_results(sixty)
+    assert float(ds.force.sum()) == pytest.approx(0.5 * 55 * 6 * 4)
+    with pytest.raises(AssertionError, match="a result was opened"):
+        ds.pressure.compute(scheduler="sync")
+
+
+def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    paths = sorted(folder.glob("*.nc"))
+    paths[0].unlink()
+    paths[1].write_bytes(b"cut short")
+    assert rv.open_results(folder).sizes["case"] == 58
+    assert f"{paths[1]}: is damaged" in caplog.text
+    (folder / INDEX).write_bytes(b"nonsense")
+    assert rv.open_results(folder).sizes["case"] == 58
+    with open_result(paths[2]) as ds:
+        changed = ds.load()
+    changed["force"][:] = 77.0
+    write_result(changed, paths[2])
+    assert (rv.open_results(folder).force == 77.0).any()
+    folder.chmod(0o500)
+    (folder / INDEX).chmod(0o400)
+    assert rv.open_results(folder).sizes["case"] == 58
+    folder.chmod(0o700)
+
+
+def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
+    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
+    ds = rv.open_results(synthetic(tmp_path, loads=2, seeds=1, times=7))
+    assert ds.pressure.chunks[1] == (3, 3, 1)
+    assert ds.height.dims == ("x", "y"), "one surface"
+    for case in range(2):
+        with open_result(tmp_path / f"{case:08x}{0:08x}.nc") as one:
+            np.testing.assert_array_equal(ds.pressure[case].values, one.pressure.values)
+            np.testing.assert_array_equal(ds.height.values, one.height.values)
+
+
+def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):
+    folder = tmp_path / "copy"
+    shutil.copytree(sixty, folder)
+    key = f"{3:08x}{2:08x}"
+    with open_result(folder / f"{key}.nc") as ds:
+        derived = ds.load()
+    derived["force"][:] = 77.0
+    for name in ("000-mean.nc", f"{'f' * 16}.nc", "zz.nc"):
+        write_result(derived, folder / name)
+    (folder / INDEX).unlink()
+    ds = rv.open_results(folder)
+    assert ds.sizes["case"] == 60
+    assert float(ds.force.max()) == 5.0
+    assert f"{'f' * 16}.nc: holds the result of case {key}" in caplog.text
+
+
+def test_open_results__of_the_last_sweep_or_of_all(study, tmp_path):
+    out = tmp_path / "out"
+    cases = study()
+    sweep(cases, out, workers=0, progress=False)
+    tighter = [vary(case, {"solve.tolerance": 2e-3}) for case in cases[:2]]
+    assert sweep(tighter, out, workers=0, progress=False).sizes["case"] == 2
+    assert list(rv.open_results(out)["solve_tolerance"]) == [2e-3, 2e-3]
+    ds = rv.open_results(out, cases="all")
+    assert sorted(ds["solve_tolerance"].values) == [2e-3] * 2 + [1e-2] * 4
+    reversed_ = rv.open_results(out, cases=cases[::-1])
+    assert list(reversed_.case_key) == [case.key for case in cases[::-1]]
+    with refused("cases", "first"):
+        rv.open_results(out, cases="first")
+
+
+def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path):
+    text = (
+        BALL
+        + '[[sweep]]\n"surface.radius" = ["10 mm", "12 mm"]\n'
+        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n'
+    )
+    ds = sweep(study(text), tmp_path / "out", workers=0, progress=False)
+    assert list(ds["surface_radius"].values) == [10e-3, 12e-3, 10e-3]
+    assert list(ds["solve_edge"].values) == ["error", "error", "accept"]
+    np.testing.assert_array_equal(ds["material_poisson"], [np.nan, np.nan, 0.4], "the others do not state it")
+    assert ds.height.dims == ("case", "x", "y")
+
+
+def test_open_results__padded_blocks_of_large_fields(tmp_path, monkeypatch):
+    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
+    synthetic(tmp_path, loads=1, seeds=1, times=4)
+    path = tmp_path / f"{0:016x}.nc"
+    with open_result(path) as ds:
+        short = ds.load()
+    short.attrs["case_key"] = "f" * 16
+    synthetic(tmp_path, loads=1, seeds=1, times=7)
+    write_result(short, tmp_path / f"{'f' * 16}.nc")
+    ds = rv.open_results(tmp_path)
+    assert ds.pressure.chunks[1] == (3, 3, 1)
+    assert ds.rows.values.tolist() == [7, 4]
+    np.testing.assert_array_equal(ds.pressure[1, :4], short.pressure)
+    assert ds.pressure[1, 4:].isnull().all()
+    with open_result(path) as long:
+        np.testing.assert_array_equal(ds.pressure[0], long.pressure)
+
+
+def test_open_results__nothing_there(tmp_path):
+    with pytest.raises(InputError, match="holds no results"):
+        rv.open_results(tmp_path)
+    with pytest.raises(InputError, match="does not exist: expected a results folder"):
+        rv.open_results(tmp_path / "gone")
