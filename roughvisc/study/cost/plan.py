@@ -96,6 +96,7 @@ COLUMNS = {
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
     "program_note": ("", "how a measured history became segments"),
+    "late_times": ("", "listed times after the end of the program, which are left out; empty if there are none"),
     "audit": (
         "",
         "assumptions that are broken or doubtful, as far as known before a run; empty if none is, or not marched",
@@ -346,7 +347,12 @@ class _Ahead:
         boundary, height = self.case.solving().boundary, self.surface.height
         row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
         row |= {"boundary": boundary, "padded": boundary == "free", "grows": False, "marched": self.marched}
-        row |= {"refusal": self.problem, "exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
+        row |= {
+            "late_times": _late_times(self.case),
+            "refusal": self.problem,
+            "exponentials": 0,
+            **dict.fromkeys(_COUNTS, 0),
+        }
         if height is not None:
             row |= {"cells_x": height.sizes["x"], "cells_y": height.sizes["y"]}
         return row
@@ -378,6 +384,16 @@ class _Ahead:
                 row |= {f"{prefix}contact_fraction": pressed.fraction}
                 row |= {f"{cells}_x": pressed.shape[0], f"{cells}_y": pressed.shape[1]}
         return row
+
+
+def _late_times(case: Case) -> str:
+    """Listed times after the end of the program, in words."""
+    late = case.settings.late_times()
+    if not late:
+        return ""
+    unit, end = unit_for(late, "s"), case.program().duration
+    texts = ", ".join(unit.text(time) for time in late)
+    return f"{texts} left out: the program ends at {unit_for([end], 's').text(end)}"
 
 
 def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: Available) -> dict[str, Any]:

@@ -124,6 +124,7 @@ _MODELLED = {
     "memory_model": "Memory of the material",
     "scheme": "Time",
     "program_note": "Program",
+    "late_times": "Kept times",
     "audit": "Assumptions",
 }
 #: Cells of a grid on which several threads are used.

@@ -476,8 +476,8 @@ title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 [surface]  =>  [keep]\nfields = ['presure']\n[surface]
 | keep.fields: found 'presure', which is not a field; did you mean 'pressure'?
 
-[surface]  =>  [keep]\ntimes = [1, '6 s']\n[surface]
-| keep.times: found 6 s: expected times up to the end of the program, 5.05 s
+[surface]  =>  [keep]\ntimes = [6, '7 s']\n[surface]
+| keep.times: found 6 s: expected at least one time up to the end of the program, 5.05 s
 
 [surface]  =>  [keep]\ntimes = 0\n[surface]
 | keep.times: found 0: expected a whole number at least 1 and up to 1e+06

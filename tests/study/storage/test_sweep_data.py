@@ -95,6 +95,35 @@ def test_own_times__are_drawn_by_xarray_and_by_the_sweep_figure(own_times):
         assert np.isclose(drawn, 1e6 * value, rtol=1e-9).any()
 
 
+def test_own_times__are_opened_by_xarray_alone(own_times):
+    def by_row(result):
+        return result.swap_dims(time="row").assign_coords(row=range(result.sizes["time"]))
+
+    folder, ds = own_times
+    together = {"combine": "nested", "concat_dim": "case", "coords": "different"}
+    how = together | {"data_vars": "all", "compat": "equals", "join": "outer"}
+    with xr.open_mfdataset(f"{folder}/*.nc", preprocess=by_row, **how) as found:
+        found = found.sortby(KEYS)
+        for name in (*KEYS, "time", "force", "contact_area", "pressure"):
+            np.testing.assert_array_equal(found[name], ds[name], name)
+
+
+def test_listed_times__after_the_end_of_a_program_are_left_out(study, tmp_path):
+    text = SMALL.replace('[0, "0.1 s", "200 ms"]', '[0, "0.1 s", 1, 5]')
+    cases = study(text + '[sweep]\n"program.1.hold" = ["0.2 s", "1 s", "20 s"]\n')
+    assert rv.plan(cases, tmp_path / "out").late_times.values.tolist() == [
+        "1 s, 5 s left out: the program ends at 200 ms",
+        "5 s left out: the program ends at 1 s",
+        "",
+    ]
+    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
+    nan = np.nan
+    np.testing.assert_array_equal(ds.time, [[0, 0.1, nan, nan], [0, 0.1, 1, nan], [0, 0.1, 1, 5]])
+    np.testing.assert_allclose(ds.contact_area[0, :2], ds.contact_area[2, :2], rtol=2e-2)
+    with refused("keep.times"):
+        vary(cases[0], {"keep.times": [1.0, 5.0]})
+
+
 def test_own_speeds__are_rows(tmp_path):
     (tmp_path / "slide.toml").write_text("""
 [surface]

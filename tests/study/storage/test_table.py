@@ -104,3 +104,13 @@ def test_results__are_frames_of_pandas(folder):
     assert len(frame) == 2 * 3
     assert np.array_equal(frame["force"], results.force.values.ravel())
     assert np.array_equal(frame["program_0_load"].unique(), [5e-4, 1e-3])
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@"])
+def test_table__holds_no_formula(tmp_path, sign):
+    title = f"{sign}HYPERLINK(1)"
+    (tmp_path / "balls.toml").write_text(SMALL.replace("A ball", title) + '[sweep]\n"solve.memory" = ["auto"]\n')
+    run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, watch=Monitor())
+    written = pd.read_csv(tmp_path / "out" / CASES)
+    assert written["title"].tolist() == [f"'{title}"]
+    assert rv.to_table(tmp_path / "out")["title"].tolist() == [title]

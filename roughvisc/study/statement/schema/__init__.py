@@ -22,6 +22,8 @@ from roughvisc.study.statement.schema.surface import AnySurface
 
 #: Tables that state an experiment other than a program.
 EXPERIMENTS = ["friction"]
+#: Part of a program's duration by which a kept time may exceed it.
+_ROUNDING = 1e-12
 _SEGMENTS = "a list of [[program]] tables, at least one"
 
 
@@ -91,19 +93,29 @@ class Study(Section):
         stated = [section for name in EXPERIMENTS if (section := getattr(self, name)) is not None]
         return stated[0].experiment() if stated else Loading(self.loading())
 
+    def late_times(self) -> tuple[float, ...]:
+        """Return the listed times after the end of the program, which are not kept. [s]"""
+        if self.program is None or not isinstance(self.keep.times, tuple):
+            return ()
+        end = self.loading().duration * (1 + _ROUNDING)
+        return tuple(time for time in self.keep.times if time > end)
+
     def solving(self) -> Settings:
         """How it is computed and what is kept, as the solver takes it."""
         times = None if self.keep.times == "all" else self.keep.times
+        if late := self.late_times():
+            times = self.keep.times[: -len(late)]
         return Settings(**dict(self.solve), fields=self.keep.fields, times=times, missing=self.surface.missing)
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Study:
+        late = self.late_times()
+        if late and late == self.keep.times:
+            end = self.loading().duration
+            problem = f"found {late[0]:g} s: expected at least one time up to the end of the program, {end:g} s"
+            raise refuse("keep.times", problem)
         for name, found, why in self.experiment().unsupported(self.solving()):
             raise refuse(f"{ENTRIES[name].table}.{name}", f"found {shown(found)}: {why}")
-        if self.program is not None and isinstance(self.keep.times, tuple):
-            late, end = self.keep.times[-1], self.loading().duration
-            if late > end * (1 + 1e-12):
-                raise refuse("keep.times", f"found {late:g} s: expected times up to the end of the program, {end:g} s")
         found = self.observe.problem(self.keep.fields, self.solve.boundary) if self.observe else None
         if found:
             raise refuse(f"observe.{found[0]}", found[1])
