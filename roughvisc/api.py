@@ -228,15 +228,14 @@ def run(
 ) -> xr.Dataset:
     """Compute one case and store it in a file.
 
-    It runs in this process, or on a worker of the default ``dask.distributed.Client`` if there is one.
+    It runs in this process. To run it on a worker of a cluster, use :func:`roughvisc.sweep` with a client.
 
     Parameters
     ----------
     case : Case or path
         A case, or its study file.
     out : path, optional
-        Results folder, under the same path for all workers. Default: ``results/`` and the name of the study, next to
-        the study.
+        Results folder. Default: ``results/`` and the name of the study, next to the study.
     want : dict, optional
         How accurate numbers are wanted, with the keys of the table ``want`` of a study:
         ``{"friction_coefficient": "1 %"}``, or ``{"time": "60 s"}`` for the best in a time. The grid and the tolerance
@@ -245,7 +244,7 @@ def run(
     progress : bool or callable
         A progress bar, or a function called with the current time and the length of the program. [s]
     threads : int, optional
-        Number of threads for a large grid; see :func:`roughvisc.simulate`. Default on a worker: all its threads.
+        Number of threads for a large grid; see :func:`roughvisc.simulate`.
 
     Returns
     -------

@@ -8,18 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import dask
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked
-from roughvisc.study.execution.cluster import has_other_versions
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.execution.single import default_client
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.index import index_of, save_index
-from roughvisc.study.storage.lock import lock_case
+from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import open_result, result_path, write_result
 from roughvisc.study.storage.sweep_cases import sweep_cases
 from roughvisc.study.storage.table import write_table
@@ -40,8 +37,7 @@ def observe(
 
     ``roughvisc run`` does this at the end; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the
     same arguments. Quantities that a file already contains, for the same values, are not computed again. Frames are
-    Dask tasks: on the default client if there is one and all its workers have this version of roughvisc, otherwise in
-    threads.
+    Dask tasks: on the default client if there is one, otherwise in threads.
 
     Parameters
     ----------
@@ -66,15 +62,12 @@ def observe(
     distinct = {case.key: case for case in cases if case.settings.observe is not None}
     folder = result_folder(cases[0], out, to_write=False).absolute()
     added = []
-    client = default_client() if distinct else None
-    here = {"scheduler": "threads"} if client is not None and has_other_versions(client) else {}
-    with dask.config.set(here):
-        for number, case in enumerate(distinct.values()):
-            if progress is not None:
-                progress(number, len(distinct))
-            path = result_path(folder, case.key)
-            if path.exists() and _add(case, path):
-                added.append(path)
+    for number, case in enumerate(distinct.values()):
+        if progress is not None:
+            progress(number, len(distinct))
+        path = result_path(folder, case.key)
+        if path.exists() and _add(case, path):
+            added.append(path)
     if added and len(cases) > 1:
         index = index_of(folder)
         save_index(folder, index)
@@ -100,7 +93,7 @@ def _add(case: Case, path: Path) -> bool:
             found, compat="equals", join="exact"
         )
         whole.attrs = result.attrs | told
-        with lock_case(path.with_name(f".{case.key}.lock")):
+        with lock_case(lock_path(path.parent, case.key)):
             write_result(whole, path, precision=case.settings.keep.precision)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True

@@ -35,10 +35,10 @@ from roughvisc.study.budget.grids import (
 from roughvisc.study.budget.population import OfPopulation, mean_of_population
 from roughvisc.study.budget.solves import FOLDER, Bench
 from roughvisc.study.budget.sources import stated_errors
-from roughvisc.study.execution.cluster import local_client
+from roughvisc.study.execution.cluster import default_client, local_client
 from roughvisc.study.execution.monitor import Monitor, watcher
 from roughvisc.study.execution.run import is_result_of, result_folder
-from roughvisc.study.execution.single import default_client, run_stated
+from roughvisc.study.execution.single import run_stated
 from roughvisc.study.quantities import known_quantity
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.evaluation import BEST, WANTED

@@ -10,7 +10,8 @@ import signal
 import sys
 import threading
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from importlib import metadata
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from roughvisc.errors import InputError
 from roughvisc.experiment.resources import PART, PROCESS, WORTH_ASKING, cores, memory_available
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import program_version
 from roughvisc.topography.grid import nominal_area
 
 if TYPE_CHECKING:
@@ -26,21 +26,6 @@ if TYPE_CHECKING:
 
 #: What a worker imports anyway, xarray's look for other kinds of arrays included.
 _PRELOADED = ["distributed.nanny", "roughvisc.study.execution.task", "dask.array", "pint"]
-#: What a process executes to say which version of roughvisc it has: a text, as it may have no such function.
-SOURCE = """
-def version():
-    try:
-        from roughvisc.study.statement.identity import program_version
-        return program_version()
-    except ImportError:
-        pass
-    try:
-        return "roughvisc " + __import__("roughvisc").__version__
-    except ImportError:
-        return "no roughvisc"
-"""
-#: The version of a process, for :func:`eval` with the name ``source``.
-VERSION = "exec(source, names := {}) or names['version']()"
 #: Signals that the process of a sweep answers for its workers too.
 _OURS = (signal.SIGINT, signal.SIGTERM)
 #: A file that is smaller holds no surface of :data:`WORTH_ASKING` cells. [byte]
@@ -99,6 +84,8 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.scheduler.allowed-failures": 1,
         "distributed.comm.timeouts.connect": "60s",
+        # a worker that was killed may take long to start again on a busy machine: until then it is not given up
+        "distributed.deploy.lost-worker-timeout": "300s",
         # one long task a worker: nobody reads its statistical profile, and sampling takes time from it
         "distributed.worker.profile.enabled": False,
         # a process that computes for seconds need not wake up fifty times a second to see whether it is awake
@@ -153,12 +140,6 @@ def _interrupts_wait() -> Iterator[None]:
         signal.raise_signal(number)
 
 
-def has_other_versions(client: Client) -> bool:
-    """Whether a worker of a client has another version of roughvisc, or none."""
-    found = client.run(eval, VERSION, {"source": SOURCE}, on_error="return")
-    return any(version != program_version() for version in found.values())
-
-
 def _quick_start() -> dict[str, str]:
     """Settings with which workers are forked from one process that has imported everything: each saves a second."""
     if sys.platform != "linux":  # elsewhere a fork is not safe, or there is none
@@ -211,8 +192,50 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
         client = Client(**where, set_as_default=False, timeout="20s")
     except (OSError, ValueError) as error:
         raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
-    with client:
+    with _quiet("distributed", "distributed.client"), client:  # a lost scheduler is reported by the sweep, once
         yield client
+
+
+@contextmanager
+def _quiet(*names: str) -> Iterator[None]:
+    """Have some loggers report nothing but critical errors."""
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def default_client() -> Client | None:
+    """The client that the user has made the default; none within a Dask task, which is there to compute itself."""
+    distributed = sys.modules.get("distributed")
+    if distributed is None:  # nobody has made one
+        return None
+    with suppress(ValueError):
+        distributed.get_worker()
+        return None
+    with suppress(ValueError):
+        return distributed.default_client()
+    return None
+
+
+def require_same_version(client: Client) -> None:
+    """Refuse a cluster that has a worker with another version of roughvisc, or without it.
+
+    Raises
+    ------
+    InputError
+        With the address of the worker and both versions.
+    """
+    here = metadata.version("roughvisc")
+    for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
+        version = found["packages"].get("roughvisc")
+        if version != here:
+            raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 
 
 def _leave_interrupts_to_the_sweep() -> None:

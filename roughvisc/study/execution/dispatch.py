@@ -1,8 +1,4 @@
-"""Cases on the workers of a Dask client: one future each, submitted anew where its worker was lost.
-
-Only workers with the version of this process compute. A worker cannot be sent anything of roughvisc before its version
-is known: where it cannot unpickle what it gets, it closes. So the task is a text that looks at the version first.
-"""
+"""Cases on the workers of a Dask client: one future each, submitted again if its worker is lost."""
 
 from __future__ import annotations
 
@@ -12,21 +8,16 @@ import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from distributed import CancelledError, Client, KilledWorker, as_completed
 
-from roughvisc import errors
-from roughvisc.errors import DiskFullError, InputError, RoughviscError
-from roughvisc.study.execution.cluster import SOURCE, VERSION
-from roughvisc.study.execution.monitor import Monitor, SweepLog, watcher
-from roughvisc.study.execution.task import INPUTS, Outcome, Progress, Report, serialize_with_inputs, stop_sweep
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import program_version
+from roughvisc.errors import DiskFullError, RoughviscError
+from roughvisc.study.execution.monitor import SweepLog
+from roughvisc.study.execution.task import Outcome, Report, on_worker, stop_sweep
 
 log = logging.getLogger("roughvisc")
 
@@ -40,13 +31,10 @@ _SUBMISSIONS = 20
 _LINGERING = 90.0
 #: Seconds that running cases get to reach the end of their step when a sweep is interrupted.
 _PATIENCE = 120.0
+#: The message if the scheduler does not answer any more.
+_LOST = "the scheduler was lost: finished results are kept; repeat the command to resume"
 #: Without any worker for so long, the user is told; and so often it is looked. [s]
 _ALONE_AFTER, _LOOK_EVERY = 30.0, 5.0
-#: The task of a worker, for :func:`eval`: the case's outcome, or the worker's address and version if that is another.
-_TASK = (
-    f"__import__('roughvisc.study.execution.task', fromlist=['']).on_worker(*arguments) if ({VERSION}) == version"
-    f" else (__import__('distributed').get_worker().address, {VERSION})"
-)
 
 
 @dataclass
@@ -97,10 +85,6 @@ class _Dispatch:
     ----------
     waiting : deque of str
         Keys of the cases that are to be submitted.
-    refused : dict
-        Address of each worker with another version -> that version.
-    named : set of str
-        Those of them that the user was told of.
     """
 
     client: Client
@@ -112,61 +96,20 @@ class _Dispatch:
     courses: dict[str, _CaseStatus]
     futures: dict[Any, str] = field(default_factory=dict)
     waiting: deque[str] = field(default_factory=deque)
-    refused: dict[str, str] = field(default_factory=dict)
-    named: set[str] = field(default_factory=set)
 
     def feed(self) -> None:
-        """Submit the cases that wait.
+        """Submit the waiting cases."""
+        while self.waiting:
+            self.submit(self.waiting.popleft())
 
-        Where workers with another version must be left out, no more cases are submitted than the others have threads:
-        a worker that comes later then gets cases, too.
-        """
-        if not self.refused:
-            while self.waiting:
-                self.submit(self.waiting.popleft())
-        elif self.waiting:
-            matching = {address: n for address, n in self.client.nthreads().items() if address not in self.refused}
-            for _ in range(min(len(self.waiting), sum(matching.values()) - len(self.futures))):
-                self.submit(self.waiting.popleft(), matching)
-
-    def submit(self, key: str, workers: Collection[str] | None = None) -> None:
-        """Submit a case to any worker, or to one of some."""
+    def submit(self, key: str) -> None:
+        """Submit a case."""
         course = self.courses[key]
         course.submissions += 1
-        names = {"source": SOURCE, "version": program_version(), "arguments": (self.texts[key], key, *self.arguments)}
-        name, where = f"{self.name}-{key}-{course.submissions}", list(workers or ()) or None
-        future = self.client.submit(eval, _TASK, names, key=name, pure=False, workers=where)
+        name = f"{self.name}-{key}-{course.submissions}"
+        future = self.client.submit(on_worker, self.texts[key], key, *self.arguments, key=name, pure=False)
         self.futures[future] = key
         self.finished.add(future)
-
-    def resubmit_stranded(self) -> None:
-        """Have cases wait again that were submitted to workers of which none is left."""
-        processing = {key for keys in self.client.processing().values() for key in keys}
-        stranded = [one for one in self.futures if one.key not in processing and one.status == "pending"]
-        for future in stranded:
-            self.waiting.append(self.futures.pop(future))
-        self.client.cancel(stranded)
-
-    def matching(self, workers: Iterable[str]) -> set[str]:
-        """Those of some workers that are not known to have another version."""
-        return {address for address in workers if address not in self.refused}
-
-    def name_refused(self) -> None:
-        """Say of each worker that is left out that it is, once."""
-        if others := self.refused.keys() - self.named:
-            self.named |= others
-            self.book.tell(f"{self.other_versions(others)}: no case runs there, the other workers are used")
-
-    def have_begun(self) -> bool:
-        """Whether a worker has begun with a case, so that one with this version is known."""
-        return any(course.begun for course in self.courses.values())
-
-    def other_versions(self, workers: Iterable[str]) -> str:
-        """What is wrong with some workers that were refused."""
-        found = [(address, self.refused[address]) for address in sorted(workers)]
-        named = [f"worker {address} has {version}" for address, version in found[:3]]
-        more = [f"{len(found) - 3} more workers have other versions, too"] if len(found) > 3 else []
-        return f"{', '.join(named + more)}, while this process has {program_version()}"
 
     def heard(self, event: tuple[float, Report]) -> None:
         report = event[1]
@@ -176,15 +119,8 @@ class _Dispatch:
     def take(self, going_on: bool) -> None:
         """Take up what has ended; submit anew, if the sweep goes on, what a lost worker has left behind."""
         for future, result in self.finished.next_batch(block=False):
-            key = self.futures.pop(future, None)
-            if key is None:  # it was stranded, and waits again
-                continue
-            if future.status == "finished" and isinstance(result, tuple):
-                worker, version = result
-                self.refused[worker] = version
-                self.waiting.append(key)
-                continue
-            outcome = _outcome(key, result, self.courses[key])
+            key = self.futures.pop(future)
+            outcome = _outcome(key, result, self.courses[key], self.client)
             if outcome.kind != "interrupted":
                 self.book.ended(outcome)
             elif going_on:
@@ -210,8 +146,6 @@ def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads
 
     Raises
     ------
-    InputError
-        If all workers have another version of roughvisc.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt, SystemExit
@@ -231,70 +165,29 @@ def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads
             book.watch.stopping()
             _stop(cases)
             raise
+        except OSError as error:
+            if client.status == "running":
+                raise
+            raise RoughviscError(_LOST) from error
     finally:
         with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be gone
             client.unsubscribe_topic(name)
 
 
-def run_on(client: Client, case: Case, folder: Path, progress: bool | Progress, threads: int | None = None) -> Path:
-    """Bring one case to its file on a worker, and give the file's path.
-
-    Raises
-    ------
-    RoughviscError
-        As :func:`roughvisc.study.execution.run.run_case`; what else went wrong there is one, too.
-    """
-    watch = ProgressForwarder(progress) if callable(progress) else watcher(progress)
-    book = SweepLog(folder, {case.key: case}, {}, watch, [])
-    try:
-        packed = {case.key: serialize_with_inputs(case, folder / INPUTS)}
-        distribute(packed, book, client, threads, client.dashboard_link)
-    finally:
-        watch.close()
-    outcome = book.outcomes[case.key]
-    if outcome.entry is None:
-        kind = getattr(errors, outcome.error, RoughviscError)
-        raise kind(outcome.message)
-    return folder / outcome.entry.file
-
-
-class ProgressForwarder(Monitor):
-    """Passes the times reached on to a function."""
-
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
-
-    def reached(self, key: str, now: float, end: float) -> None:
-        if end:
-            self._progress(now, end)
-
-
 def _go_on(cases: _Dispatch) -> None:
-    """Take up what ends, until nothing is left; say it if no worker is, or some have another version."""
+    """Record finished cases until none is left; tell the user if the cluster has no worker."""
     looked = seen = time.monotonic()
     said = False
     while cases.futures or cases.waiting:
         cases.feed()
         cases.take(going_on=True)
         cases.book.watch.tick()
-        if cases.have_begun() or not (cases.futures or cases.waiting):
-            cases.name_refused()
         time.sleep(0.1)
-        due = time.monotonic() - looked >= _LOOK_EVERY
-        if not due and not (cases.refused and cases.waiting):
-            continue
-        there = _workers(cases.client)
-        if there and not cases.matching(there) and not cases.have_begun():
-            _end_without_workers(cases, there)
-        if not due:
+        if time.monotonic() - looked < _LOOK_EVERY:
             continue
         looked = time.monotonic()
-        if cases.matching(there):
+        if _workers(cases.client):
             seen, said = looked, False
-            if cases.refused:
-                cases.resubmit_stranded()
-        elif looked - seen >= _ALONE_AFTER and there:
-            _end_without_workers(cases, there)
         elif looked - seen >= _ALONE_AFTER and not said:
             said = True
             cases.book.tell(
@@ -305,23 +198,13 @@ def _go_on(cases: _Dispatch) -> None:
             )
 
 
-def _end_without_workers(cases: _Dispatch, workers: Collection[str]) -> None:
-    """End a sweep whose workers all have another version."""
-    cases.client.cancel(list(cases.futures))
-    raise InputError(
-        f"{cases.other_versions(workers)}: expected workers with the same version; what is finished is kept"
-    )
-
-
 def _stop(cases: _Dispatch) -> None:
     """Have the running cases stop at the end of their step, and wait for those whose workers are there."""
     client = cases.client
 
-    workers = list(cases.matching(_workers(client)))
-
     def tell() -> None:
         with suppress(OSError, RuntimeError, ValueError):  # a worker that does not answer holds up nothing
-            client.run(stop_sweep, cases.name, workers=workers, on_error="ignore")
+            client.run(stop_sweep, cases.name, on_error="ignore")
 
     threading.Thread(target=tell, daemon=True).start()
     until = time.monotonic() + _PATIENCE
@@ -341,8 +224,8 @@ def _workers(client: Client) -> set[str]:
     return set(client.nthreads())
 
 
-def _outcome(key: str, result: Any, course: _CaseStatus) -> Outcome:
-    """What a future came to; ``interrupted`` is a case that another worker should go on with."""
+def _outcome(key: str, result: Any, course: _CaseStatus, client: Client) -> Outcome:
+    """Return how a future ended; ``interrupted`` is a case that is to be submitted again."""
     if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
         result = result[1]
     again = course.submissions < _SUBMISSIONS
@@ -361,5 +244,7 @@ def _outcome(key: str, result: Any, course: _CaseStatus) -> Outcome:
             "KilledWorker",
         )
     if isinstance(result, CancelledError | concurrent.futures.CancelledError):
-        raise RoughviscError("the scheduler was lost: finished results are kept; repeat the command to resume")
+        if client.status == "running" and again:  # another client has restarted the workers
+            return Outcome(key, "interrupted")
+        raise RoughviscError(_LOST)
     return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)

@@ -199,13 +199,12 @@ def run_case(
     keep_memory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with lock_case(lock_path(folder, case.key)) as lock:
+        with lock_case(lock_path(folder, case.key)):
             for torn in partial_files(path):
                 torn.unlink()
             keeper = CheckpointWriter(
                 folder / f".{case.key}.unfinished",
                 case.key,
-                lock.check,
                 case.experiment().states,
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
@@ -248,7 +247,6 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Checkpo
     """Compute what is missing of a case and write its file."""
     try:
         dataset = compute(case, progress=progress, keeper=keeper, threads=threads)
-        keeper.check()
         keep(dataset, case, folder)
     except TransientError:
         raise

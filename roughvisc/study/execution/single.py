@@ -1,9 +1,7 @@
-"""One case, in this process or on the client that the user has made the default."""
+"""One case in this process."""
 
 from __future__ import annotations
 
-import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,6 @@ from roughvisc.study.storage.store import open_result, result_path
 
 if TYPE_CHECKING:
     import xarray as xr
-    from distributed import Client
 
 
 def run_stated(
@@ -26,30 +23,12 @@ def run_stated(
     threads: int | None = None,
 ) -> xr.Dataset:
     """Bring a case as it is stated to its file; see :func:`roughvisc.run`."""
-    folder, client = result_folder(case, out, to_write=False), default_client()
+    folder = result_folder(case, out, to_write=False)
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
-    if client is None:
-        path = run_case(case, folder, progress=progress, threads=threads)
-    else:
-        from roughvisc.study.execution.dispatch import run_on
-
-        path = run_on(client, case, folder.absolute(), progress, threads)
+    path = run_case(case, folder, progress=progress, threads=threads)
     dataset = open_result(path)
     complaint = unconverged(dataset)
     if complaint:
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
     return dataset
-
-
-def default_client() -> Client | None:
-    """The client that the user has made the default; none within a Dask task, which is there to compute itself."""
-    distributed = sys.modules.get("distributed")
-    if distributed is None:  # nobody has made one
-        return None
-    with suppress(ValueError):
-        distributed.get_worker()
-        return None
-    with suppress(ValueError):
-        return distributed.default_client()
-    return None

@@ -13,18 +13,19 @@ from typing import TYPE_CHECKING
 from roughvisc.errors import DiskFullError, InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.study.execution.cluster import (
+    default_client,
     local_client,
     refuse_unguarded_script,
+    require_same_version,
     side_by_side,
     threads_each,
 )
 from roughvisc.study.execution.monitor import Monitor, SweepLog
 from roughvisc.study.execution.run import result_folder, set_aside_damaged
-from roughvisc.study.execution.single import default_client
-from roughvisc.study.execution.task import INPUTS, REFUSED, Outcome, outcome_of, run_case_safely, serialize_with_inputs
+from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
 from roughvisc.study.statement.case import Case, read_cases
-from roughvisc.study.storage.failures import LOG, forget_failure, log_file, recorded_failure
-from roughvisc.study.storage.files import UNSEALED, is_writable, refuse_link, require_writable
+from roughvisc.study.storage.failures import forget_failure, log_file, recorded_failure
+from roughvisc.study.storage.files import UNSEALED, is_writable, require_writable
 from roughvisc.study.storage.index import Index, index_of, warn_of
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.upkeep import clean_folder
@@ -136,7 +137,7 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong, or a link stands in the folder where a run writes.
+        If a setting is wrong.
     DiskFullError
         If the disk is full; the cases that are left are not begun.
     RoughviscError
@@ -155,11 +156,6 @@ def run_cases(
     if not folder.exists():
         require_writable(folder)
         folder.mkdir(parents=True)
-    refuse_link(folder / LOG, "the log of a sweep")
-    refuse_link(folder / INPUTS, "the folder of copied inputs")
-    for key in distinct:
-        for kind in ("lock", "unfinished"):
-            refuse_link(folder / f".{key}.{kind}", f"what an unfinished run has left ({kind})")
     with log_file(folder) if writable else nullcontext():
         if writable:
             clean_folder(folder)
@@ -248,11 +244,11 @@ def _compute(
         return
     from roughvisc.study.execution.dispatch import distribute
 
+    texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:
-        texts = {key: serialize_with_inputs(case, folder / INPUTS) for key, case in todo.items()}
+        require_same_version(client)
         distribute(texts, book, client, threads, client.dashboard_link)
         return
-    texts = {key: case.to_json() for key, case in todo.items()}
     with local_client(processes) as own:
         link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
         distribute(texts, book, own, threads or threads_each(processes), link)

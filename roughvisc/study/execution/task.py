@@ -1,16 +1,9 @@
-"""The task of a sweep on a Dask worker: computes one case, reports progress, stops on request, records errors.
-
-The input files of its case are copies where every worker can read them.
-"""
+"""The task of a sweep on a Dask worker: computes one case, reports progress, stops on request, records errors."""
 
 from __future__ import annotations
 
 import errno
-import hashlib
-import json
 import logging
-import os
-import shutil
 import signal
 import threading
 import time
@@ -18,18 +11,15 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 
 import numpy as np
 from distributed.core import Status
 
-from roughvisc.errors import ChangedError, DiskFullError, InputError, InUseError, RoughviscError, TransientError
+from roughvisc.errors import DiskFullError, InUseError, RoughviscError, TransientError
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
-from roughvisc.study.storage.files import atomic_write, refuse_link
 from roughvisc.study.storage.index import Entry, read_entry
-from roughvisc.topography.cards import read_toml
-from roughvisc.topography.readers import sha256
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -53,8 +43,6 @@ _stopped: set[str] = set()
 _one_at_a_time = threading.Lock()
 #: States of a worker that was told to leave: by a signal, or since its lifetime is over.
 _LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
-#: Folder of the copies, in that of the results.
-INPUTS = "inputs"
 
 
 def close_on_sigterm(worker: Worker) -> None:
@@ -215,7 +203,8 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
             threads = threads or worker.state.nthreads
             return run_case_safely(case, Path(folder), progress=report, stop=stop, threads=threads)
         except RoughviscError as error:  # a file that this machine does not have
-            return Outcome(key, "hindered", f"on {worker.address}: {error}", type(error).__name__)
+            advice = "expected the files of the study where every worker can read them, under the same path"
+            return Outcome(key, "hindered", f"on {worker.address}: {error}; {advice}", type(error).__name__)
         except KeyboardInterrupt:  # would take the worker down with it
             return Outcome(key, "interrupted")
 
@@ -223,60 +212,3 @@ def on_worker(text: str, key: str, folder: str, sweep: str, threads: int | None)
 def stop_sweep(sweep: str) -> None:
     """Have the cases of a sweep stop at their next step, in this process."""
     _stopped.add(sweep)
-
-
-def serialize_with_inputs(case: Case, folder: Path) -> str:
-    """JSON of a case whose files are copies in a folder; its key is the same, since files count by their content.
-
-    Parameters
-    ----------
-    case : Case
-        What to compute.
-    folder : Path
-        Where the copies go, each in a folder of its own named by its content; made if need be.
-    """
-    stated = json.loads(case.to_json())
-    return json.dumps(stated | {table: _moved(stated[table], folder) for table in ("surface", "material")})
-
-
-def _moved(stated: Any, folder: Path) -> Any:
-    if isinstance(stated, list):
-        return [_moved(entry, folder) for entry in stated]
-    if not isinstance(stated, dict):
-        return stated
-    return {
-        key: str(_copy(Path(value), folder)) if key == "file" and isinstance(value, str) else _moved(value, folder)
-        for key, value in stated.items()
-    }
-
-
-def _copy(path: Path, folder: Path) -> Path:
-    """Copy of a file, and of the scan that it names if it is a card, as they lie to each other."""
-    path = path.absolute()
-    named = _named_by(path)
-    files = [path] if named is None else [path, Path(os.path.normpath(path.parent / named))]
-    root = Path(os.path.commonpath([file.parent for file in files]))
-    digests = {file.relative_to(root): sha256(file) for file in files}
-    whole = "".join(f"{place}\0{digest}\0" for place, digest in digests.items())
-    there = folder / hashlib.sha256(whole.encode()).hexdigest()[:16]
-    for place, digest in digests.items():
-        copy = there / place
-        for above in (folder, *(one for one in reversed(copy.parents) if folder in one.parents)):
-            refuse_link(above, "a folder of copied inputs")
-        if not copy.is_file() or sha256(copy) != digest:
-            with atomic_write(copy) as temporary:
-                shutil.copyfile(root / place, temporary)
-                if sha256(temporary) != digest:
-                    raise ChangedError(f"{root / place}: was changed while it was copied: run the study again")
-    return there / path.relative_to(root)
-
-
-def _named_by(path: Path) -> str | None:
-    """Relative path of the scan that a surface card names."""
-    if path.suffix.lower() != ".toml":
-        return None
-    try:
-        named = read_toml(path, "a surface card in TOML").get("file")
-    except InputError:
-        return None  # it is refused where it is opened
-    return named if isinstance(named, str) and not Path(named).is_absolute() else None

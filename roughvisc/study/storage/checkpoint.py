@@ -150,12 +150,9 @@ class RowFile:
     ----------
     path : path
         Opened as it is; say by :meth:`keep_first` how much of it counts.
-    check : callable
-        Called before anything is written.
     """
 
-    def __init__(self, path: Path, check: Callable[[], None]) -> None:
-        self._check = check
+    def __init__(self, path: Path) -> None:
         self.plain: list[dict[str, Any]] = []
         self._begins = [0]  # of the rows in the file, and where the next is to begin
         self._waiting: list[Mapping[str, Array]] = []
@@ -180,7 +177,6 @@ class RowFile:
                 begins.append(self._stream.tell())
         except Damaged:
             return False
-        self._check()
         self._stream.truncate(begins[-1])
         self.plain, self._begins = plain, begins
         self._waiting, self._weight = [], 0
@@ -211,8 +207,6 @@ class RowFile:
         """Write the rows that wait; on a full disk those that do not fit wait on."""
         first = len(self._begins) - 1
         try:
-            if self._waiting:
-                self._check()
             for row, arrays in enumerate(self._waiting, first):
                 self._stream.seek(self._begins[-1])
                 size = write_record(self._stream, self.plain[row], arrays)
@@ -321,8 +315,6 @@ class CheckpointWriter:
         Of this run alone; made if need be.
     key : str
         Of the case.
-    check : callable
-        Called before anything is written: may raise that this run has lost its right to.
     states : sequence of type
         Dataclasses that the state of the experiment is made of.
     seconds, steps : float, int or None
@@ -341,7 +333,6 @@ class CheckpointWriter:
         self,
         folder: Path,
         key: str,
-        check: Callable[[], None],
         states: Sequence[type] = (),
         *,
         seconds: float = 30.0,
@@ -353,13 +344,13 @@ class CheckpointWriter:
         for path in self._paths:
             refuse_link(path, "a checkpoint of a run")
         folder.mkdir(exist_ok=True)
-        self.rows = RowFile(folder / "rows", check)
+        self.rows = RowFile(folder / "rows")
         self.in_memory = False
         #: How far the run has come: no state of an earlier step is held.
         self.latest = Checkpoint()
         self._folder = folder
         self._key = key
-        self.check, self._interval, self._steps, self._stop = check, seconds, steps, stop
+        self._interval, self._steps, self._stop = seconds, steps, stop
         self._states = states
         self._pending, self._last_save = 0, time.monotonic()
 
@@ -404,7 +395,6 @@ class CheckpointWriter:
         if not self._pending:
             return
         began = time.monotonic()
-        self.check()
         self.rows.sync()  # first: a checkpoint counts on its rows
         save_checkpoint(self._paths[0], self.latest, self._key)
         self._paths.reverse()
@@ -413,7 +403,6 @@ class CheckpointWriter:
 
     def remove(self) -> None:
         """Remove all that was kept: the result is written, or cannot be had."""
-        self.check()
         self.rows.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-from roughvisc.errors import FolderError, InputError
+from roughvisc.errors import InputError
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION, program
-from roughvisc.study.storage.files import atomic_write, open_unlinked
+from roughvisc.study.storage.files import atomic_write
 
 log = logging.getLogger("roughvisc")
 
@@ -98,21 +98,15 @@ def append(folder: Path, message: str) -> Path | None:
         return None
     record = logging.LogRecord("roughvisc", logging.ERROR, "", 0, message, None, None)
     try:
-        with os.fdopen(
-            _opened(str(path), os.O_WRONLY | os.O_APPEND), "a", encoding="utf-8", errors="backslashreplace"
-        ) as stream:
+        with path.open("a", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(f"{_formatter().format(record)}\n")
-    except (OSError, FolderError):
+    except OSError:
         return None
     return path
 
 
 def _formatter() -> logging.Formatter:
     return logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s")
-
-
-def _opened(path: str, flags: int) -> int:
-    return open_unlinked(path, flags, "the log of a sweep")
 
 
 @contextmanager
@@ -133,13 +127,10 @@ def log_file(folder: Path) -> Iterator[None]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log that stops nothing where it cannot be written, and follows no link."""
-
-    def _open(self) -> TextIO:
-        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=_opened)
+    """A log file that stops nothing if it cannot be written."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        with suppress(OSError, FolderError):  # it cannot be opened
+        with suppress(OSError):  # it cannot be opened
             super().emit(record)
 
     def handleError(self, record: logging.LogRecord) -> None:

@@ -146,7 +146,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> lis
     if needed == paths:
         return []
     with suppress(InUseError, OSError), lock_case(lock, patience=0.0):
-        return [path for path in paths if path not in needed and _removed(path)]
+        return [path for path in paths if path not in needed and (path == lock or _removed(path))]
     return []
 
 

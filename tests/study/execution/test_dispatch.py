@@ -7,23 +7,19 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
-from types import SimpleNamespace
 
 import dask
 import pytest
 import xarray as xr
-from distributed import Client, KilledWorker, LocalCluster
-from support import LOADS, LONG, assert_same, numbers
+from distributed import Client, LocalCluster
+from support import BALL, LOADS, LONG, assert_same, numbers, refused
 
 import roughvisc as rv
-from roughvisc.errors import EdgeContactError, InputError, InUseError, RoughviscError
+from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
-from roughvisc.study.execution.cluster import connect, has_other_versions
+from roughvisc.study.execution.cluster import connect, default_client
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.execution.task import Outcome
-from roughvisc.study.statement.case import vary
-from roughvisc.study.statement.identity import program_version
 from roughvisc.study.storage.failures import record_path
 
 pytestmark = pytest.mark.filterwarnings(
@@ -40,6 +36,16 @@ def bare_cluster():
         LocalCluster(
             n_workers=0, processes=False, protocol="tcp://", host="127.0.0.1", dashboard_address="127.0.0.1:0"
         ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def thread_workers(count):
+    """Client of a cluster whose workers are threads of this process."""
+    with (
+        LocalCluster(n_workers=count, processes=False, dashboard_address="127.0.0.1:0") as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
@@ -71,10 +77,7 @@ class Ear(Monitor):
         self.messages.append(text)
 
     def wait_until(self, condition):
-        until = time.monotonic() + 60
-        while not condition(self.heard):
-            assert time.monotonic() < until, "never heard of"
-            time.sleep(0.02)
+        wait_for(lambda: condition(self.heard))
 
 
 @pytest.mark.long
@@ -103,98 +106,114 @@ def test_lifetime__of_each_worker_is_shorter_than_the_sweep(study, tmp_path):
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# workers with another version of roughvisc
-
-
 @contextmanager
 def foreign_worker(client, folder):
     """A worker process with a package of the same name that states another version and holds nothing else."""
-    (folder / "other" / "roughvisc").mkdir(parents=True)
-    (folder / "other" / "roughvisc" / "__init__.py").write_text('__version__ = "0.0.7"\n')
-    command = [sys.executable, "-m", "dask", "worker", client.scheduler.address, "--nthreads", "1"]
-    process = subprocess.Popen(
-        [*command, "--no-nanny", "--no-dashboard"],
-        cwd=folder / "other",
-        stdout=-3,
-        stderr=-3,
-    )
+    (folder / "roughvisc").mkdir(parents=True)
+    (folder / "roughvisc" / "__init__.py").touch()
+    (folder / "roughvisc-0.0.7.dist-info").mkdir()
+    (folder / "roughvisc-0.0.7.dist-info" / "METADATA").write_text("Name: roughvisc\nVersion: 0.0.7\n")
+    command = [sys.executable, "-m", "dask", "worker", client.scheduler.address, "--nthreads", "1", "--no-nanny"]
+    process = subprocess.Popen([*command, "--no-dashboard"], cwd=folder, stdout=-3, stderr=-3)
     try:
-        yield process
+        yield
     finally:
         process.terminate()
         process.wait(60)
 
 
-def test_other_version__of_all_workers_ends_the_sweep_and_of_some_leaves_them_out(study, tmp_path):
-    cases, version = study(), program_version()
-    with bare_cluster() as client, foreign_worker(client, tmp_path) as process:
-        with pytest.raises(InputError) as caught:  # it joins when the sweep waits already
-            run_cases(cases, tmp_path / "out", watch=Monitor(), client=client)
-        ((foreign, _),) = client.nthreads().items()
-        beginning = f"worker {foreign} has roughvisc 0.0.7, while this process has {version}: expected "
-        assert str(caught.value).startswith(beginning)
-        assert not list((tmp_path / "out").glob("*.failed.json"))
-
-        client.cluster.scale(1)
-        client.wait_for_workers(2, timeout=60)
-        assert has_other_versions(client)
-        outcomes = run_cases(cases, tmp_path / "out", watch=(ear := Ear()), client=client)
-        assert [one.kind for one in outcomes.values()] == ["done"] * 4
-        (message,) = ear.messages
-        assert message.startswith(f"worker {foreign} has roughvisc 0.0.7, while this process has {version}: no ")
-        assert process.poll() is None, "it was sent nothing that it cannot load"
+def test_worker_with_another_version__is_refused_by_its_address(study, tmp_path):
+    with bare_cluster() as client, foreign_worker(client, tmp_path / "other"):
+        client.wait_for_workers(1, timeout=60)
+        ((address, _),) = client.nthreads().items()
+        with refused(f"worker {address}", "0.0.7"):
+            run_cases(study(), tmp_path / "out", watch=Monitor(), client=client)
+    assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
-def test_other_version__cases_of_lost_workers_go_to_those_that_match(study, tmp_path, monkeypatch):
-    """A worker leaves while its cases wait for it alone, and another one comes."""
-    monkeypatch.setattr(dispatch, "_LOOK_EVERY", 0.1)
-    submit, cases = dispatch._Dispatch.submit, study()[:2]
-
-    def nowhere_at_first(self, key, workers=None):
-        lost = self.courses[key].submissions == 0
-        self.refused |= {"tcp://10.0.0.9:1": "0.0.7"}
-        submit(self, key, ["tcp://10.0.0.8:1"] if lost else workers)
-
-    monkeypatch.setattr(dispatch._Dispatch, "submit", nowhere_at_first)
-    with bare_cluster() as client:
-        client.cluster.scale(1)
-        outcomes = run_cases(cases, tmp_path / "out", watch=Ear(), client=client)
-        assert [one.kind for one in outcomes.values()] == ["done"] * 2
-        assert not has_other_versions(client)
+def test_scan_that_a_worker_cannot_read__fails_no_case(study, tmp_path):
+    height = rv.self_affine((1e-3, 1e-3), (24, 20), hurst=0.8, rms_height=1e-6, seed=1)
+    rv.save_scan(height, tmp_path / "rough.nc")
+    surface = BALL[BALL.index("generate") : BALL.index("[material]")]
+    cases = study(BALL.replace(surface, 'file = "rough.nc"\n').replace('"free"', '"periodic"'))
+    assert cases[0].key, "this process has read the scan"
+    (tmp_path / "rough.nc").rename(tmp_path / "elsewhere.nc")
+    with thread_workers(1) as client:
+        (outcome,) = run_cases(cases, tmp_path / "out", watch=Monitor(), client=client).values()
+    assert outcome.kind == "hindered"
+    assert str(tmp_path / "rough.nc") in outcome.message
+    assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# the client that the user has made the default
+def test_default_client__computes_sweeps_but_not_within_a_task(study, tmp_path):
+    cases = study()
+    with thread_workers(1) as client, client.as_current():
+        assert default_client() is client
+        assert client.submit(default_client, pure=False).result() is None
+        found = rv.sweep(cases[:1], tmp_path / "out", progress=False)
+        stored = [key for _, events in client.get_events().items() for _, event in events if (key := key_of(event))]
+    assert found.sizes["case"] == 1
+    assert set(stored) == {cases[0].key}, "the worker has reported it"
 
 
-def test_default_client__computes_cases_and_sweeps(study, tmp_path, monkeypatch):
-    cases, reached, submitted = study(), [], []
-    submit = dispatch._Dispatch.submit
+def key_of(event):
+    return event.get("key") if isinstance(event, dict) and {"key", "now", "end"} <= event.keys() else None
 
-    def noted(self, key, workers=None):
-        submitted.append(key)
-        submit(self, key, workers)
 
-    monkeypatch.setattr(dispatch._Dispatch, "submit", noted)
-    first, second, third, fourth = (case.key for case in cases)
-    rv.run(cases[0], tmp_path / "here", progress=False)
-    with (
-        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster) as client,
-    ):
-        ds = rv.run(cases[0], tmp_path / "one", progress=lambda now, end: reached.append(end))
-        rv.sweep(cases[:2], tmp_path / "several", progress=False)
-        within = client.submit(rv.run, cases[2], tmp_path / "task", progress=False, pure=False).result()
-        rv.sweep(cases[3:], tmp_path / "several", workers=0, progress=False)
-        with pytest.raises(EdgeContactError, match="boundary"):
-            rv.run(vary(cases[0], {"program.0.load": 50.0}), tmp_path / "one", progress=False)
-    assert submitted[:-1] == [first, first, second], "but neither within a task nor with workers of its own"
-    assert within.attrs["case_key"] == third
-    assert (tmp_path / "several" / f"{fourth}.nc").exists()
-    assert ds.encoding["source"] == str(tmp_path / "one" / f"{first}.nc")
-    assert_same(numbers(tmp_path / "one"), numbers(tmp_path / "here"))
-    assert all(end == pytest.approx(0.2) for end in reached)
+@pytest.mark.timeout(300)
+def test_restart__by_another_client_loses_nothing(study, tmp_path):
+    (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
+    restarted = []
+
+    class Restarter(Monitor):
+        def reached(self, key, now, end):
+            if now > 0 and not restarted:
+                restarted.append(now)
+                threading.Thread(target=restart).start()
+
+    def restart():
+        with Client(client.scheduler.address, set_as_default=False) as other:
+            other.restart()
+
+    with bare_cluster() as client, worker_process(client):
+        outcomes = run_cases([case], tmp_path / "out", watch=Restarter(), client=client)
+    assert restarted
+    assert [o.kind for o in outcomes.values()] == ["done"]
+    run_cases([case], tmp_path / "calm", watch=Monitor(), workers=0)
+    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
+
+
+@pytest.mark.timeout(300)
+def test_lost_scheduler__is_one_message_and_no_traceback(study, tmp_path):
+    study(LONG)
+    scheduler = [sys.executable, "-m", "dask", "scheduler", "--scheduler-file", "s.json", "--host", "127.0.0.1"]
+    quiet = {"cwd": tmp_path, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen([*scheduler, "--port", "0", "--no-dashboard"], **quiet)
+    wait_for(lambda: (tmp_path / "s.json").exists())
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "dask", "worker", "--scheduler-file", "s.json", "--nthreads", "1", "--no-dashboard"],
+        **quiet,
+    )
+    try:
+        command = [sys.executable, "-m", "roughvisc", "run", "ball.toml", "--scheduler-file", "s.json", "-q"]
+        run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        wait_for(lambda: list((tmp_path / "results" / "ball").glob(".*.unfinished")))
+        process.kill()
+        out, err = run.communicate(timeout=120)
+    finally:
+        for one in (process, worker):
+            one.kill()
+            one.wait(60)
+    assert (run.returncode, out) == (1, "")
+    assert "scheduler" in err
+    assert err.count("\n") == 1
+
+
+def wait_for(condition):
+    until = time.monotonic() + 120
+    while not condition():
+        assert time.monotonic() < until, "it never came"
+        time.sleep(0.05)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -235,8 +254,7 @@ def kill_working(client, times):
         while len(killer.victims) < times and time.monotonic() < until:
             busy = [worker for worker, keys in client.processing().items() if keys]
             for worker in busy[:1]:
-                begun = "__import__('roughvisc.study.execution.task') and __import__('os').getpid()"
-                pid = client.run(eval, begun, workers=[worker], on_error="ignore").get(worker)
+                pid = client.run(os.getpid, workers=[worker], on_error="ignore").get(worker)
                 time.sleep(0.3)
                 if pid and pid not in killer.victims and client.processing().get(worker):
                     os.kill(pid, signal.SIGKILL)
@@ -247,46 +265,6 @@ def kill_working(client, times):
     killer.victims = []
     killer.start()
     return killer
-
-
-def killed_worker():
-    worker = SimpleNamespace(address="tcp://10.0.0.7:4000")
-    return KilledWorker("task", worker, 3)
-
-
-def course(*reports, submissions=1):
-    made = dispatch._CaseStatus(submissions=submissions)
-    for now, end in reports:
-        made.heard({"key": "k", "worker": "tcp://10.0.0.7:4000", "now": now, "end": end})
-    return made
-
-
-@pytest.mark.parametrize(
-    ("reports", "kind"),
-    [
-        ([], "interrupted"),  # it merely queued there
-        ([(0, 0)], "interrupted"),
-        ([(0, 0), (0, 0)], "hindered"),
-        ([(0, 0), (0.5, 2.0), (0, 0), (0.5, 2.0)], "hindered"),
-        ([(0, 0), (0.5, 2.0), (0, 0), (0.6, 2.0)], "interrupted"),  # it came further each time
-        ([(0, 0), (0.5, 2.0), (0, 0), (0.6, 2.0), (0, 0)], "hindered"),
-    ],
-)
-def test_lost_workers__condemn_no_innocent_case(reports, kind):
-    """A case is tried again unless it was itself at work when its workers were lost, twice, and came no further."""
-    assert dispatch._outcome("k", killed_worker(), course(*reports)).kind == kind
-
-
-def test_lost_workers__whatever_is_known_a_case_is_not_submitted_for_ever():
-    found = dispatch._outcome("k", killed_worker(), course(submissions=dispatch._SUBMISSIONS))
-    assert found.kind == "hindered"
-    assert "10.0.0.7" in found.message
-
-
-def test_lost_workers__may_still_hold_the_lock_of_their_case():
-    refused = Outcome("k", "hindered", "at work", InUseError.__name__)
-    assert dispatch._outcome("k", refused, course((0, 0))) is refused, "another run is at work"
-    assert dispatch._outcome("k", refused, course((0, 0), (0, 0))).kind == "interrupted"
 
 
 @pytest.mark.timeout(60)  # Ctrl-C waits for nobody where there is nobody

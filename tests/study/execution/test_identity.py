@@ -1,7 +1,6 @@
 """A case's key, the checksum in its result and the heights that were pressed are those of the same bytes."""
 
 import hashlib
-import json
 
 import numpy as np
 import pytest
@@ -9,12 +8,11 @@ import xarray as xr
 from support import BALL
 
 from roughvisc.api import run
-from roughvisc.errors import ChangedError, InputError, RoughviscError
+from roughvisc.errors import ChangedError, InputError
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.statement.case import Case, read_cases, read_study
+from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.failures import record_path
 from roughvisc.topography import readers
 from roughvisc.topography.scans import open_scan
@@ -109,20 +107,3 @@ def test_open_scan__a_file_that_changes_while_it_is_read(scan, monkeypatch):
     monkeypatch.setattr(readers, "_plausible", slow)
     with pytest.raises(InputError, match=r"scan\.npy: was changed while it was read"):
         open_scan(scan, unit="m", spacing=4e-5)
-
-
-def test_pack__a_copy_is_what_was_asked_for(study, scan, tmp_path):
-    case = read_cases(study)[0]
-    packed = Case.from_json(serialize_with_inputs(case, tmp_path / "inputs"))
-    copy = type(scan)(json.loads(packed.to_json())["surface"]["file"])
-    assert packed.key == case.key
-    copy.write_bytes(b"damaged")
-    assert Case.from_json(serialize_with_inputs(case, tmp_path / "inputs")).key == case.key
-    assert copy.read_bytes() == scan.read_bytes()
-
-
-def test_pack__a_file_that_changes_while_it_is_copied(study, scan, tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.copyfile", lambda _, to: bump(to.open("wb"), 3e-5).close())
-    with pytest.raises(RoughviscError, match=r"scan\.npy: was changed while it was copied"):
-        serialize_with_inputs(read_cases(study)[0], tmp_path / "inputs")
-    assert not [path for path in (tmp_path / "inputs").rglob("*") if path.is_file()]

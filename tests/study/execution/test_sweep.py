@@ -1,7 +1,6 @@
 """Many cases: the same numbers wherever they are computed, nothing lost, and all of them seen as one."""
 
 import contextlib
-import hashlib
 import io
 import json
 import os
@@ -23,14 +22,11 @@ from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscErr
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.cluster import connect
-from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage import failures as sweep_log
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX
-from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.sweep_cases import SWEEP
 from roughvisc.study.storage.table import CASES
 
@@ -96,30 +92,6 @@ def test_sweep__on_two_threads_gives_the_bits_of_one(study, tmp_path):
         assert outcome.kind == "done"
         found.append(numbers(tmp_path / str(threads)))
     assert_same(*found)
-
-
-def test_sweep__on_a_cluster_takes_the_scan_along(study, tmp_path, by_hand):
-    scans = tmp_path / "scans" / "data"
-    scans.mkdir(parents=True)
-    height = rv.self_affine((1e-3, 1e-3), (24, 20), hurst=0.8, rms_height=1e-6, seed=1)
-    height.rename("height").to_netcdf(scans / "rough.nc")
-    (tmp_path / "scans" / "cards").mkdir()
-    checksum = hashlib.sha256((scans / "rough.nc").read_bytes()).hexdigest()
-    card = f'file = "../data/rough.nc"\nsha256 = "{checksum}"\n[conditioning]\nlevel = 1\n'
-    (tmp_path / "scans" / "cards" / "rough.toml").write_text(card)
-    surface = BALL[BALL.index("generate") : BALL.index("[material]")]
-    text = BALL.replace(surface, 'file = "scans/cards/rough.toml"\n').replace('"free"', '"periodic"')
-    cases = study(text + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
-    wanted = sweep(cases, tmp_path / "here", workers=0, progress=False)
-    packed = Case.from_json(serialize_with_inputs(cases[0], tmp_path / "inputs"))
-    assert packed.key == cases[0].key
-    assert packed.settings.surface.file.startswith(str(tmp_path / "inputs"))
-    xr.testing.assert_equal(packed.height(), cases[0].height())
-    with connect(file=by_hand) as client:
-        found = sweep(cases, tmp_path / "there", client, progress=False)
-    xr.testing.assert_equal(found.drop_vars("wall_time").load(), wanted.drop_vars("wall_time").load())
-    with open_result(tmp_path / "there" / f"{cases[0].key}.nc") as ds:
-        assert str(tmp_path / "there" / "inputs") in ds.attrs["case"]
 
 
 def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.study.execution.dispatch import serialize_with_inputs
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.treatment import treatment
@@ -69,15 +68,6 @@ def test_second__counts_in_the_key_and_nothing_does_without_one(one, two):
     assert Case.from_json(two.to_json()).key == two.key
     assert "second" not in json.loads(one.to_json())["surface"]
     assert two.surface_sha256 == one.surface_sha256  # that of the first face
-
-
-def test_second__a_file_travels_with_the_case(one, tmp_path):
-    scan = tmp_path / "scan.toml"
-    scan.write_text('generate = "sphere"\nradius = 1e-2\nsize = 1e-3\nshape = 20\n')
-    case = vary(one, {"surface.second": {"file": str(scan)}})
-    moved = Case.from_json(serialize_with_inputs(case, tmp_path / "inputs"))
-    assert Path(moved.settings.surface.second.file).is_relative_to(tmp_path / "inputs")
-    assert moved.key == case.key
 
 
 def test_second__runs_and_says_so(two, tmp_path):

@@ -63,7 +63,7 @@ def test_waiting_rows__are_weighed_once_each(tmp_path):
             weighed += 1
             return super().values()
 
-    rows = RowFile(tmp_path / "rows", lambda: None)
+    rows = RowFile(tmp_path / "rows")
     for number in range(50):
         rows.append({"row": number}, Fields())
     assert weighed == 50
@@ -81,7 +81,7 @@ def test_waiting_rows__that_do_not_fit_wait_on(tmp_path, monkeypatch):
         return write_record(stream, plain, arrays)
 
     monkeypatch.setattr(records, "write_record", write)
-    rows = RowFile(tmp_path / "rows", lambda: None)
+    rows = RowFile(tmp_path / "rows")
     fields = [{"p": field(1.0, number)} for number in range(4)]
     for number, arrays in enumerate(fields):
         rows.append({"row": number}, arrays)
