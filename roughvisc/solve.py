@@ -16,7 +16,7 @@ from scipy import fft
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.protocol import Experiment, Rows
-from roughvisc.experiment.resources import retain_arena, threads_for
+from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import annotate, in_order, warnings_of, warnings_text
 from roughvisc.mechanics.arrays import reused
 from roughvisc.mechanics.bodies.body import separability_error
@@ -107,7 +107,7 @@ def _solve_once(
     began = time.perf_counter()
     reached = recorder.latest
     spent = reached.wall_time - began
-    with fft.set_workers(threads), retain_arena(8 * problem.height.size):
+    with fft.set_workers(threads):
         rows = experiment.rows(problem, reached.state, in_memory=recorder.in_memory)
         if reached.state is not None:
             log.info("resumes after %s", experiment.progress(reached.done, rows.end))

@@ -7,7 +7,6 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment import loading
-from roughvisc.experiment import resources as malloc
 from roughvisc.experiment.resources import march_bytes
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics import arrays as passes
@@ -69,7 +68,6 @@ def study(tmp_path_factory):
     [ELASTIC, {}, *(pytest.param(one, marks=pytest.mark.long) for one in (FREE, {"material": THREE}, DIRECT, FULL))],
 )
 def test_march__takes_the_memory_that_is_stated(study, changes, monkeypatch):
-    monkeypatch.setattr(malloc, "expect_arrays", lambda size: None)  # is never touched
     # as on a wide grid: by parts that are a small part of it, in memory that is used again
     monkeypatch.setattr(passes, "_BLOCK", 1 << 12)
     monkeypatch.setattr(reuse, "_FROM", 1 << 17)

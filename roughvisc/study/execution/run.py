@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
-from roughvisc.experiment.resources import keep_memory, require_surface
+from roughvisc.experiment.resources import require_surface
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
@@ -196,7 +196,6 @@ def run_case(
     if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
         return path  # and no run has left behind what it needs no longer
     made = [place for place in (folder, *folder.parents) if not place.exists()]
-    keep_memory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with lock_case(lock_path(folder, case.key)):
