@@ -141,7 +141,7 @@ def test_command_line__plans_runs_draws_reports_and_audits(study, tmp_path, invo
     assert {path.name.rpartition("-")[2] for path in out.glob("*.png")} == {"history.png", "maps.png"}
     invoke("plot", "--all", out)
     pictures = {path.name.rpartition("-")[2] for path in out.glob("*.png")}
-    assert {"history.png", "maps.png", "section.png", "distributions.png", "surface.png"} <= pictures
+    assert {"history.png", "maps.png", "section.png", "surface.png"} <= pictures
     result = next(out.glob("*.nc"))
     page = tmp_path / "page.html"
     invoke("report", result, "-o", page)

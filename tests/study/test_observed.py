@@ -153,13 +153,13 @@ CONDUCTANCE = '[observe.conductance]\nresistivity = ["5 K m/W", 0]\n'
 
 
 def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pictures, monkeypatch):
-    monkeypatch.setattr(rv.plot, "FIGURES", {"conductance": rv.plot.FIGURES["conductance"]})
+    monkeypatch.setattr(rv.plot, "FIGURES", {"history": rv.plot.FIGURES["history"]})
     status, told, _ = invoke("run", study(CONDUCTANCE), "--out", "out")
     assert status == 0
     assert "Thermal conductance at the end" in told
     assert "infinite: full contact" in told
     (path,) = (tmp_path / "out").glob("*.nc")
-    assert (tmp_path / "out" / f"{path.stem}-conductance.png").exists()
+    assert (tmp_path / "out" / f"{path.stem}-history.png").exists()
     with rv.open_result(path) as ds:
         again = rv.observables.conductance(ds, (5.0, 0.0))
         xr.testing.assert_allclose(ds.thermal_conductance, again.thermal_conductance)
