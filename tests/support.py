@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
@@ -17,7 +16,6 @@ from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage.store import open_result
-from roughvisc.units import quantity
 
 RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
 RUBBER = rv.zener(3e6, 3e6, 0.3e6)
@@ -193,43 +191,6 @@ def told(figure):
         found += ax.get_legend().get_texts() if ax.get_legend() else []
     found += [text for legend in figure.legends for text in legend.get_texts()]
     return [text.get_text() for text in found if text is not None and text.get_gid() != "exaggeration"]
-
-
-_TOLD = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?: ((?:[fpnµmkMGT]?(?:m²|m|Pa|N|J|s)|h|d|%)(?!\w)))?")
-
-
-def numbers_told(figure):
-    """Numbers with their units in what a figure says, in SI; formulas are left out."""
-    texts = [re.sub(r"\$[^$]*\$", "", text) for text in told(figure)]
-    units = {"%": "1", "h": "s", "d": "s", "": "1"}
-    found = [match.groups(default="") for text in texts for match in _TOLD.finditer(text)]
-    si = [units.get(unit) or re.sub("^[fpnµmkMGT](?=.)", "", unit).replace("²", "2") for _, unit in found]
-    pairs = zip(found, si, strict=True)
-    return sorted(quantity(f"{number} {unit}".strip(), one.replace("m2", "m^2")) for (number, unit), one in pairs)
-
-
-def text_boxes(figure):
-    """Boxes of all texts that are seen, inset by a pixel."""
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    figure.draw_without_rendering()
-    found = []
-    for ax in figure.axes:
-        for axis in (ax.xaxis, ax.yaxis):
-            if not axis.get_visible():
-                continue
-            low, high = sorted(axis.get_view_interval())
-            slack = 1e-9 * (high - low)
-            ticks = [t for t in axis.get_major_ticks() if low - slack <= t.get_loc() <= high + slack]
-            ticks += [t for t in axis.get_minor_ticks() if low - slack <= t.get_loc() <= high + slack]
-            found += [tick.label1 for tick in ticks if tick.label1.get_visible()]
-            found += [tick.label2 for tick in ticks if tick.label2.get_visible()]
-            found += [axis.label, axis.offsetText]
-        found += [ax.title, ax._left_title, ax._right_title]
-        found += ax.get_legend().get_texts() if ax.get_legend() else []
-    found += [text for text in (figure._suptitle, figure._supxlabel, figure._supylabel) if text]
-    for legend in figure.legends:
-        found += legend.get_texts()
-    return [(text.get_text(), text.get_window_extent(renderer).padded(-1)) for text in found if text.get_text().strip()]
 
 
 def changed_package(folder, page, test, places):

@@ -1,4 +1,4 @@
-"""Statistics over realisations as rows of text, for the command line and the report."""
+"""Statistics of realisations as rows of text, for the command line and the report."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def realisation_rows(table: pd.DataFrame) -> tuple[list[str], list[list[str]], l
     last = [name.rpartition(".")[2] for name in varied]
     pairs = zip(last, varied, strict=True)
     headings = [short.replace("_", " ") if last.count(short) == 1 else name for short, name in pairs]
-    headings += ["quantity", "mean", "95 % of the mean", "95 % of patches", *(["scan", "ratio"] if scan else [])]
+    headings += ["quantity", "mean", "95 % of the mean", "95 % prediction interval"] + ["scan", "ratio"] * scan
     rows = []
     told = table[~table["quantity"].isin(_FOLLOW)]
     for one in told.to_dict("records"):

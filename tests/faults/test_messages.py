@@ -140,7 +140,7 @@ def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke)
         assert err.startswith(f"roughvisc: case 1 of 2: {lock_path(out, first.key)}: {holder} is at work on this case")
         assert err.endswith("roughvisc: 1 of 2 cases are in use by another run: repeat the command when it has ended\n")
         assert "1 held by another run" in said
-        assert re.search(r"^Held by another run +1 *$", said, re.M)
+        assert re.search(r"^Locked by another run +1 *$", said, re.M)
         logged = (out / "sweep.log").read_text()
         assert f"{first.key} held by another run" in logged
         assert "failed" not in said + err + logged

@@ -39,7 +39,15 @@ def test_realisation_rows__say_what_a_reader_needs():
     leak = {"quantity": "leak_rate", "unit": "m^3/s", "mean": 1e-12, "zeros": 3, "standing": "not known"}
     leak |= dict.fromkeys(("lower", "upper", "patch_lower", "patch_upper"), float("nan"))
     headings, rows, notes = realisation_rows(pd.DataFrame([ROW, ROW | leak]))
-    assert headings == ["load [mN]", "quantity", "mean", "95 % of the mean", "95 % of patches", "scan", "ratio"]
+    assert headings == [
+        "load [mN]",
+        "quantity",
+        "mean",
+        "95 % of the mean",
+        "95 % prediction interval",
+        "scan",
+        "ratio",
+    ]
     assert rows[0] == ["20", "contact area", "2000 µm²", "1900 to 2100", "1500 to 2500", "1700 µm²", "0.85"]
     assert rows[1][3:5] == ["none", "none"]
     assert notes == [
@@ -72,6 +80,6 @@ def test_a_sweep_of_realisations__is_told_on_the_screen_and_in_the_report(tmp_pa
     console.print(realisations_tables(realisations_table(index_of(out))))
     assert "Over 3 Gaussian surrogates of the scan, values at the end." in console.file.getvalue()
     page = report(out).read_text()
-    assert "<th>95 % of patches</th><th>Scan</th><th>Ratio</th>" in page
+    assert "<th>95 % prediction interval</th><th>Scan</th><th>Ratio</th>" in page
     assert "Contact area over time, mean and band of the realisations" in page
     assert "Contact area against force, one line per case" not in page

@@ -59,8 +59,8 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     for kind, label in (
         ("unconverged", "Not converged"),
         ("failed", "Failed"),
-        ("hindered", "Hindered"),
-        ("held", "Held by another run"),
+        ("hindered", "Interrupted"),
+        ("held", "Locked by another run"),
     ):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
     rows += accuracy_rows([entry.histories for entry in entries])

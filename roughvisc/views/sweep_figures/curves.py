@@ -39,7 +39,8 @@ _MOST_PANELS = 9
 def histories_of_cases(results: Any, quantity: str | None = None, *, by: str | None = None) -> Figure:
     """A history of every case over its axis, coloured by what was varied; kept times are dots, where these are few.
 
-    Of realisations the mean is drawn, the band in which 95 % of patches lie and, of a scan, the scan itself.
+    Of realisations the mean is drawn with the 95 % prediction interval of a single one and, of a scan, the measured
+    scan.
 
     Up to eight values have a legend, more a colour bar. Other parameters make panels, up to nine.
 
@@ -179,7 +180,7 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one of every case, against the logarithm of the speed.
 
     Lines are coloured by what was varied. Speeds that did not converge are open circles. Of realisations the mean is
-    drawn, the band in which 95 % of patches lie and, of a scan, the scan itself.
+    drawn with the 95 % prediction interval of a single one and, of a scan, the measured scan.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Realisations of one case drawn as one: their mean, the band in which a patch lies, and the scan itself."""
+"""Realisations of one case drawn as one: their mean, the prediction interval, and the measured scan."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ ITSELF_STYLE = {"ls": (0, (4, 1.5)), "lw": 1.1}
 
 @dataclass(frozen=True)
 class Band:
-    """Where a patch lies among the realisations of a case.
+    """Prediction interval of a single realisation of a case.
 
     Attributes
     ----------
     lower, upper : xarray.Dataset
-        Interval of a patch at 95 %, of every history; missing where there is none.
+        Ends of the interval at 95 %, of every history; missing where there is none.
     count : int
         Number of realisations.
     itself : xarray.Dataset or None
@@ -127,7 +127,7 @@ def band_legend(bands: Iterable[Band | None]) -> dict[str, Artist]:
     surrogates = any(band.itself is not None for band in known)
     drawn = "Gaussian surrogates" if surrogates else "realisations"
     named: dict[str, Artist] = {f"mean of {number} {drawn}": Line2D([], [], color="0.3", lw=1.6)}
-    named["95 % of patches"] = Patch(color="0.3", alpha=0.22, lw=0)
+    named["95 % prediction interval"] = Patch(color="0.3", alpha=0.22, lw=0)
     if surrogates:
-        named["the scan itself"] = Line2D([], [], color="0.3", **ITSELF_STYLE)
+        named["measured scan"] = Line2D([], [], color="0.3", **ITSELF_STYLE)
     return named

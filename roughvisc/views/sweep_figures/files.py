@@ -53,7 +53,7 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     What the program prescribes alike in all cases, or a parameter says already, is left out.
     """
     cases = cases_of(results)
-    each = "a line a case" if not any(cases.bands) else "mean and band of the realisations"
+    each = "one line per case" if not any(cases.bands) else "mean and band of the realisations"
     if AXES[cases.axis].telling == "friction_coefficient":
         yield "friction", f"Friction and contact area against the speed, {each}", friction_of_cases(results)
         if _is_shifted(cases):

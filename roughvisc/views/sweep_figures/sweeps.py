@@ -1,4 +1,4 @@
-"""A quantity against what was varied in a sweep, as lines or as a map."""
+"""A quantity against the swept parameters, as lines or as a map."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def sweep(
     along: str | Sequence[str] | None = None,
     kind: Literal["auto", "lines", "map"] = "auto",
 ) -> Figure:
-    """A quantity against what was varied in a sweep: lines, or a map of two parameters.
+    """Draw a quantity against the swept parameters: lines, or a map of two parameters.
 
     Numbers lie on linear axes, or on logarithmic ones where they span decades; anything else, such as materials,
-    files and seeds, makes categories. Points that did not converge are crossed out. Of realisations the mean is drawn,
-    the band in which 95 % of patches lie and, of a scan, the scan itself; a map has the mean.
+    files and seeds, makes categories. Points that did not converge are crossed out. Of realisations the mean is drawn
+    with the 95 % prediction interval of a single one and, of a scan, the measured scan; a map has the mean.
 
     Parameters
     ----------
