@@ -17,7 +17,8 @@ Kind = Literal["shear", "tensile"]
 
 def check_poisson(poisson: float) -> None:
     if not -1 < poisson <= 0.5:
-        raise InputError(f"poisson is {poisson!r}: expected a number above -1 and up to 0.5")
+        wanted = "a number above -1 and up to 0.5"
+        raise InputError(f"poisson is {poisson!r}: expected {wanted}", key="poisson", found=poisson, expected=wanted)
 
 
 def tensile_to_shear(kind: Kind, poisson: float) -> float:

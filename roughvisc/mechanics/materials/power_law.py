@@ -62,7 +62,9 @@ class PowerLaw(PrintedAsBuilt):
         check_number("time_scale", self.time_scale, "s")
         check_poisson(self.poisson)
         if not 0 < self.exponent < 1:
-            raise InputError(f"exponent is {self.exponent!r}: expected a number above 0 and below 1")
+            wanted = "a number above 0 and below 1"
+            message = f"exponent is {self.exponent!r}: expected {wanted}"
+            raise InputError(message, key="exponent", found=self.exponent, expected=wanted)
 
     def _built(self) -> Built:
         """With readable units."""

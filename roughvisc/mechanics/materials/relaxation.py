@@ -142,5 +142,6 @@ def in_volume(shear: Prony, poisson: float | None, bulk_modulus: float | None) -
     if bulk_modulus is None:
         return dataclasses.replace(shear, poisson=0.5 if poisson is None else poisson)
     if poisson is not None:
-        raise InputError(f"poisson is {poisson!r} and bulk_modulus is {bulk_modulus!r}: expected one of them")
+        message = f"poisson is {poisson!r} and bulk_modulus is {bulk_modulus!r}: expected one of them"
+        raise InputError(message, key="bulk_modulus", found=bulk_modulus, expected="poisson or bulk_modulus")
     return with_elastic_bulk(shear, bulk_modulus)

@@ -1,16 +1,14 @@
 """Influence of one cell: full precision at any distance, positive symbols."""
 
 import math
-import pickle
 
 import mpmath
 import numpy as np
 import pytest
-from support import direct
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
-from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE, love_kernel
+from roughvisc.mechanics.bodies.kernel import free_space_symbol, periodic_symbol
 
 
 def love_exact(x, y, dx, dy):
@@ -59,28 +57,3 @@ def test_kernels__refuse_impossible_grids(shape, spacing):
         love_kernel(shape, spacing)
     with pytest.raises(InputError, match="expected two positive"):
         periodic_symbol(HALF_SPACE, shape, spacing)
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (7, 4)])
-def test_under_rectangle__sums_the_influence_of_all_cells(shape):
-    spacing, (nx, ny) = (1.3, 0.7), shape
-    before = (np.arange(nx), np.arange(ny))
-    after = (nx - 1 - before[0], ny - 1 - before[1])
-    expected = direct(np.ones(shape), spacing)
-    assert Kernel.under_rectangle(HALF_SPACE, before, after, spacing) == pytest.approx(expected, rel=1e-14)
-    assert HALF_SPACE.under_rectangle(before, after, spacing) == pytest.approx(expected, rel=1e-14)
-
-
-def test_half_space__is_a_value():
-    assert Love() == HALF_SPACE
-    assert pickle.loads(pickle.dumps(HALF_SPACE)) == HALF_SPACE
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
-def test_periodic_symbol__refuses_a_transfer_function_that_is_not_positive(value):
-    class Wrong(Love):
-        def transfer(self, qx, qy):
-            return np.where(np.hypot(qx, qy) > 3, value, super().transfer(qx, qy))
-
-    with pytest.raises(InputError, match=r"transfer function of .* expected a positive number"):
-        periodic_symbol(Wrong(), (8, 9), (1.0, 1.0))

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
-from scipy import fft
 from strategies import boundaries, examples, seeds, shapes
 from support import direct
 
@@ -88,33 +86,6 @@ def scattered(pressure):
     return Scattered.over_largest(pressure.shape, cells, pressure.reshape(-1)[cells])
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("blocked", [False, True])
-def test_scattered_field__is_taken_and_given_back_as_the_whole_one(request, boundary, mirrored, blocked):
-    if blocked:
-        request.getfixturevalue("in_small_blocks")
-    operator = Operator((33, 46), (1.0, 0.7), boundary, mirrored=mirrored)
-    few = scattered(np.random.default_rng(4).random((33, 46)) * 1e-50)
-    field = few.rows(slice(0, 33))
-    assert 0 < np.count_nonzero(field) == few.cells.size < 0.4 * field.size
-    assert np.array_equal(operator.displacement_single(few), operator.displacement_single(field))
-    expected = operator.approximate_inverse(field).reshape(-1)[few.cells].astype(float) * few.size
-    np.testing.assert_allclose(operator.approximate_inverse_within(few), expected, rtol=1e-6)
-
-
-@given(st.integers(1, 5000), st.integers(1, 20_000), st.sampled_from([np.float32, np.complex64, np.complex128]))
-def test_columns_of_a_block__are_never_few(count, points, kind):
-    """A block of one column, as 2^n points would have, takes as long as it takes to wait for it."""
-    blocks = operators._column_blocks(count, points, np.dtype(kind))
-    together = max((1 << 20) // (points * np.dtype(kind).itemsize), 32)
-    assert np.concatenate([np.arange(count)[block] for block in blocks]).tolist() == list(range(count))
-    *others, last = (block.stop - block.start for block in blocks)
-    assert set(others) <= {together}
-    assert last <= 1.125 * together
-    assert not others or last > together // 8
-
-
 @FIELDS
 @KINDS
 def test_fields__do_not_depend_on_threads(in_small_blocks, boundary, mirrored):
@@ -126,39 +97,6 @@ def test_fields__do_not_depend_on_threads(in_small_blocks, boundary, mirrored):
         found.append(fields_by(operator, pressure))
     for others in found[1:]:
         assert all(np.array_equal(*pair) for pair in zip(found[0], others, strict=True))
-
-
-@FIELDS
-@KINDS
-def test_fields__are_the_same_by_blocks(monkeypatch, boundary, mirrored):
-    pressure = np.random.default_rng(4).random((33, 46))
-    made = {"boundary": boundary, "mirrored": mirrored}
-    whole = fields_by(Operator((33, 46), (1.0, 0.7), **made), pressure)
-    for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
-        monkeypatch.setattr(operators, name, value)
-    blocked = fields_by(Operator((33, 46), (1.0, 0.7), **made), pressure)
-    for one, other, precision in zip(whole, blocked, (1e-13, 3e-6, 3e-6, 3e-6, 3e-6), strict=True):
-        assert other.dtype == one.dtype
-        assert np.abs(one - other).max() < precision * np.abs(one).max()
-
-
-def test_threads__are_those_of_scipy_on_a_large_grid():
-    assert Operator((1024, 1024), (1.0, 1.0), "periodic").threads == 1
-    with fft.set_workers(2):
-        assert Operator((1024, 1024), (1.0, 1.0), "periodic").threads == 2
-        assert Operator((1024, 1023), (1.0, 1.0), "periodic").threads == 1
-        assert Operator((1024, 1024), (1.0, 1.0), "periodic", workers=3).threads == 3
-
-
-@pytest.mark.parametrize("shape", [(64, 128), (45, 150)])
-def test_transforms_work__from_the_beginning_of_a_line_by_an_odd_number_of_lines(shape):
-    """Blocks of 32 columns share no line, and columns do not all fall on the same places of the cache."""
-    operator = Operator(shape, (1.0, 1.0), "periodic", workers=2)
-    for kind in (np.float32, np.float64):
-        work = operator._work_on(shape, np.dtype(kind))
-        for memory in (work.spectrum, *work.rooms[0]):
-            assert memory.ctypes.data % 64 == 0
-            assert memory.strides[0] % 128 == 64
 
 
 def test_boundary__is_named_when_unknown():
@@ -229,16 +167,6 @@ def test_self_influence__with_periodic_boundaries_is_the_mean_of_the_symbol():
     qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((7, 6), (1.3, 0.7), strict=True))
     q = np.hypot(qx[:, None], qy).ravel()[1:]
     assert found == pytest.approx((2 / q).sum() / 42, rel=1e-12)
-
-
-@pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
-def test_turned_spectrum__is_that_of_the_field_seen_from_farther(shape):
-    """Of a periodic field: cell ``i`` shows what was at ``i + cells``."""
-    operator = Operator(shape, (1.0, 2.0), "periodic")
-    field = np.random.default_rng(3).random(shape)
-    for axis, cells in [(0, 1), (0, -4), (1, 3), (1, -1)]:
-        turned = operator.spectrum(field) * operator.turn(cells, axis)
-        np.testing.assert_allclose(operator.field_of(turned), np.roll(field, -cells, axis), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])

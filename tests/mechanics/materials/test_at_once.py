@@ -3,13 +3,10 @@
 References: a flat punch sinks by its load times the compliance, on any grid; a sphere by Lee and Radok's solution.
 """
 
-import time
-
 import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.scene import shortest_age
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.closed_forms.growing_contact import lee_radok_step
 
@@ -33,9 +30,8 @@ def sunk(material, program, times, tolerance=1e-3):
 @pytest.mark.parametrize("material", LAWS, ids=str)
 def test_power_law__jumps_by_what_is_there_at_once(material):
     times = [0.0, 1e-6, 1e-3, 1.0, 10.0]
-    found, ds = sunk(material, rv.Program().load(2.0, over=0).hold(10.0), times)
+    found, _ = sunk(material, rv.Program().load(2.0, over=0).hold(10.0), times)
     assert found == pytest.approx(2.0 * material.contact_compliance(times), rel=1e-3, abs=0)
-    assert f"at once and from {1e-4 * 1e-6:.1g} s" in ds.attrs["memory"]
 
 
 @pytest.mark.parametrize("first", [(), (0.0,)])
@@ -82,16 +78,14 @@ def test_sphere__follows_lee_and_radok_from_the_jump_on():
     assert ds.approach.values == pytest.approx(exact, rel=1e-3, abs=0)
 
 
-def test_wide_table__runs_in_seconds():
+def test_wide_table__takes_few_steps():
     """60 rows from 1e-9 of the program on: with kinks between them they are not passive to a tenth of the tolerance."""
     t = np.geomspace(1e-9, 1.0, 60)
     table = rv.Tabulated(t, 1e-6 * creep(t))
     ball, program = rv.sphere(1e-3, 2e-4, 33), rv.Program().load(1e-4, over=0.1).hold(0.9)
-    began = time.perf_counter()
     ds = rv.simulate(ball, table, program, times=[0.1, 1.0], tolerance=1e-4, fields=(), progress=False)
-    assert time.perf_counter() - began < 20
-    assert "made passive: deviates from the rows by at most 0.0" in ds.attrs["memory"]
     assert ds.attrs["series_error"] == 0
+    assert int(ds.roughvisc.steps.sizes["step"]) < 600
 
 
 def test_noisy_table__dissipates():
@@ -101,15 +95,3 @@ def test_noisy_table__dissipates():
     times = np.append(0, np.geomspace(1e-4, 10.0, 40))
     _, ds = sunk(table, rv.Program().approach(1.0, over=0).hold(10.0), times)
     assert (np.diff(ds.force.values) < 0).all()
-    assert "made passive" in ds.attrs["memory"]
-
-
-def test_shortest_age__follows_from_the_shortest_interval():
-    program = rv.Program().load(1.0, over=1e-3).hold(1e4)
-    assert shortest_age(program, (1e-3, 1e4), 1e-3) == pytest.approx(1e-4 * 1e-3)
-    assert shortest_age(program, (1e-3, 1e-3 + 1e-5), 1e-2) == pytest.approx(1e-3 * 1e-5)
-    assert shortest_age(program, None, 1e-2) == pytest.approx(1e-6 * 1e-3)
-    assert shortest_age(program, (1e4,), 1e-9) == pytest.approx(1e-6 * 1e-3)
-    cycled = rv.Program().load(1.0, over=1.0) + rv.Program.cycle(1.0, 0.5, 1e-2, 1000)
-    assert shortest_age(cycled, (1.0, 11.0), 1e-3) == pytest.approx(1e-4 * 1e-2)
-    assert shortest_age(rv.Program().load(1.0, over=0), (0.0,), 1e-3) == 0

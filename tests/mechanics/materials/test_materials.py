@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate
 from strategies import examples, positive, series, series_with_common_times
+from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.materials import models as materials
-from roughvisc.mechanics.materials.models import one_less_mean_decay
 
 
 def test_zener__creep_from_glassy_to_rubbery():
@@ -41,13 +41,6 @@ def test_contact_integral__is_the_integral(material, t):
         for a, b in itertools.pairwise(breaks)
     ]
     assert material.contact_integral(t) == pytest.approx(sum(parts), rel=1e-10)
-
-
-@pytest.mark.parametrize("x", [1e-16, 1e-8, 0.1, 0.299, 0.301, 1.0, 50.0, 1e12])
-def test_one_less_mean_decay__keeps_its_digits(x):
-    series = sum((-1) ** (k + 1) * x**k / math.factorial(k + 1) for k in range(1, 30)) if x < 2 else None
-    expected = series if series is not None else 1 + math.expm1(-x) / x
-    assert float(one_less_mean_decay(x)) == pytest.approx(expected, rel=4e-15)
 
 
 @pytest.mark.parametrize("equilibrium", [0.0, 1e-9, 5.0])
@@ -81,21 +74,37 @@ def test_from_relaxation__satisfies_the_convolution_identity():
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "key", "found"),
     [
-        (lambda: rv.elastic(-1.0), r"shear_modulus is -1\.0: expected a positive number \[Pa\]"),
-        (lambda: rv.zener(1.0, 0.0, 1.0), r"kelvin_modulus is 0\.0: expected a positive"),
-        (lambda: rv.maxwell(1.0, math.nan), r"viscosity is nan"),
-        (lambda: rv.elastic(1.0, poisson=0.6), r"poisson is 0\.6: expected a number above -1 and up to 0\.5"),
-        (lambda: rv.elastic(1.0, poisson=-1.0), r"poisson is -1\.0"),
-        (lambda: rv.Prony(1.0, compliances=(1.0,)), r"1 compliances for 0 times"),
-        (lambda: rv.Prony(0.0), r"all compliances are zero"),
-        (lambda: rv.from_relaxation(0.0, (), ()), r"all moduli are zero"),
-        (lambda: rv.kelvin_voigt(1.0, 1.0).relaxation_spectrum(), r"no finite relaxation modulus"),
+        (lambda: rv.elastic(-1.0), "shear_modulus", -1.0),
+        (lambda: rv.zener(1.0, 0.0, 1.0), "kelvin_modulus", 0.0),
+        (lambda: rv.maxwell(1.0, math.nan), "viscosity", math.nan),
+        (lambda: rv.elastic(1.0, poisson=0.6), "poisson", 0.6),
+        (lambda: rv.elastic(1.0, poisson=-1.0), "poisson", -1.0),
+        (lambda: rv.PowerLaw(0.0, 1.0, 1.0), "exponent", 1.0),
+        (lambda: rv.PowerLaw(0.0, 1.0, 0.0), "exponent", 0.0),
+        (lambda: rv.PowerLaw(-1.0, 1.0, 0.5), "glassy", -1.0),
+        (lambda: rv.PowerLaw(0.0, 0.0, 0.5), "coefficient", 0.0),
+        (lambda: rv.PowerLaw(0.0, 1.0, 0.5, time_scale=0.0), "time_scale", 0.0),
     ],
 )
-def test_bad_input__is_named(make, message):
-    with pytest.raises(rv.InputError, match=message):
+def test_number_out_of_range__is_refused(make, key, found):
+    with refused(key, found):
+        make()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: rv.Prony(1.0, compliances=(1.0,)),
+        lambda: rv.Prony(0.0),
+        lambda: rv.from_relaxation(0.0, (), ()),
+        lambda: rv.kelvin_voigt(1.0, 1.0).relaxation_spectrum(),
+    ],
+    ids=["fewer times", "rigid", "no stiffness", "infinite modulus"],
+)
+def test_impossible_material__is_refused(make):
+    with pytest.raises(rv.InputError):
         make()
 
 
@@ -120,7 +129,7 @@ def transformed(material, s):
 
 
 @pytest.mark.parametrize("name", SHEAR)
-@pytest.mark.parametrize("ratio", 10.0 ** np.arange(-3, 8.1, 1.0))
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 30.0, 1e8])
 def test_bulk_modulus__satisfies_the_correspondence_principle(name, ratio):
     """``(1 - nu)/G = 1/2 (1/G + 3/(3K + G))`` with the transformed modulus; twice the contact compliance."""
     bulk = 2.0 * ratio
@@ -151,9 +160,9 @@ def test_bulk_modulus__large_is_incompressible(name):
 
 @pytest.mark.parametrize("name", SHEAR)
 def test_bulk_modulus__excludes_a_poisson_ratio(name):
-    with pytest.raises(rv.InputError, match=r"poisson is 0\.5 and bulk_modulus is 3\.0: expected one of them"):
+    with refused("bulk_modulus", 3.0):
         SHEAR[name](poisson=0.5, bulk_modulus=3.0)
-    with pytest.raises(rv.InputError, match=r"bulk_modulus is 0\.0: expected a positive number \[Pa\]"):
+    with refused("bulk_modulus", 0.0):
         SHEAR[name](bulk_modulus=0.0)
 
 
@@ -258,37 +267,6 @@ def test_pair__adds_whatever_the_bodies_are():
     assert 0.5 * (1 - both.poisson) * both.creep_compliance(t) == pytest.approx(both.contact_compliance(t))
     assert both == materials.pair(a, b)
     assert hash(both) == hash(materials.pair(a, b))
-
-
-def test_pair__keeps_both_notes():
-    table = materials.Tabulated((1.0, 2.0), (1.0, 2.0))
-    both = materials.pair(materials.elastic(1.0, bulk_modulus=2.0), table)
-    assert both.note.startswith("a: effective compliance")
-    assert both.note.endswith(f"b: {table.note}")
-    joined = materials.pair(materials.elastic(1.0), materials.elastic(1.0, bulk_modulus=2.0))
-    assert joined.note.startswith("b: effective compliance")
-
-
-def test_note__is_no_part_of_a_comparison():
-    assert materials.Prony(1.0, note="fitted") == materials.Prony(1.0)
-    assert materials.PowerLaw(0.0, 1.0, 0.5, note="fitted") == materials.PowerLaw(0.0, 1.0, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: materials.PowerLaw(0.0, 1.0, 1.0), r"exponent is 1\.0: expected a number above 0 and below 1"),
-        (lambda: materials.PowerLaw(0.0, 1.0, 0.0), r"exponent is 0\.0"),
-        (lambda: materials.PowerLaw(0.0, 1.0, math.nan), r"exponent is nan"),
-        (lambda: materials.PowerLaw(-1.0, 1.0, 0.5), r"glassy is -1\.0: expected a non-negative"),
-        (lambda: materials.PowerLaw(0.0, 0.0, 0.5), r"coefficient is 0\.0: expected a positive number \[1/Pa\]"),
-        (lambda: materials.PowerLaw(0.0, 1.0, 0.5, time_scale=0.0), r"time_scale is 0\.0"),
-        (lambda: materials.PowerLaw(0.0, 1.0, 0.5, poisson=0.51), r"poisson is 0\.51"),
-    ],
-)
-def test_bad_power_law__is_named(make, message):
-    with pytest.raises(rv.InputError, match=message):
-        make()
 
 
 def test_contact_compliance__of_a_solid_has_its_rubbery_limit():

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.materials.scaled import Scaled
-from roughvisc.mechanics.materials.series import series_of
 
 GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)
 
@@ -64,16 +62,6 @@ def test_shifted__is_the_material_in_reduced_time(material, factor):
     assert rv.shifted(moved, 1 / factor).contact_compliance(t) == pytest.approx(material.contact_compliance(t))
 
 
-def test_shifted__keeps_its_kind_so_that_what_knows_the_kind_goes_on():
-    for material in MATERIALS[:-1]:
-        assert type(rv.shifted(material, 3.0)) is type(material)
-    own = rv.shifted(Own(), 3.0)
-    assert isinstance(own, Scaled)
-    assert own == rv.shifted(Own(), 3.0)
-    assert own.poisson == 0.5
-    assert series_of(own, 1e-3, 100.0, 1e-4).error <= 1e-4
-
-
 def test_shifted__a_table_ends_later_in_the_cold():
     cold = rv.shifted(MATERIALS[5], 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
@@ -110,8 +98,3 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
 def test_shift__refuses(wrong, said):
     with pytest.raises(rv.InputError, match=said):
         wrong()
-
-
-def test_wlf__far_from_any_number_is_zero_or_infinite_and_refused_later():
-    with pytest.raises(rv.InputError, match="shift factor is inf"):
-        rv.shifted(MATERIALS[0], rv.wlf_shift(248.4001, 300.0, 17.44, 51.6))

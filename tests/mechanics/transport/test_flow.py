@@ -104,19 +104,6 @@ def test_network__equals_one_written_cell_by_cell(shape, wrap):
         assert_allclose(found.conductance, expected, rtol=1e-9, atol=1e-30)
 
 
-def test_closed__where_a_wall_or_a_corner_is_between():
-    gap = np.ones((6, 5)) * 1e-6
-    gap[3] = 0.0
-    found = flow(gap, CELL)
-    assert found.is_closed
-    assert found.conductance == found.lower == found.upper == 0.0
-    assert np.isnan(found.pressure).all()
-    staircase = np.eye(5) * 1e-6  # cells that share corners alone
-    assert flow(staircase, CELL).is_closed
-    assert flow(np.zeros((4, 4)), CELL).is_closed
-    assert flow(np.full((4, 4), -1e-6), CELL).is_closed
-
-
 def test_sides_that_meet__open_a_path():
     gap = np.zeros((3, 5))
     gap[0, 0] = gap[1, 0] = gap[1, 4] = gap[2, 4] = 1e-6
