@@ -29,8 +29,8 @@ from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_mem
 from roughvisc.settings import Settings
 from roughvisc.units import said
 
-#: Times that differ by less, in lengths of the program, are one.
-_ROUNDING = 1e-12
+#: Times that differ by at most this many units in the last place are one: sums and logarithms of times err by a few.
+_ROUNDING = 64
 #: In a hold the first of them lies no later than this part of it. [-]
 _FIRST = 1e-3
 Array = NDArray[np.float64]
@@ -59,10 +59,10 @@ def kept_times(program: Program, times: int | Sequence[float] | None) -> tuple[f
     kept: list[float] = []
     for value in listed:
         nearest = float(corners[np.argmin(np.abs(corners - value))])
-        snapped = nearest if abs(nearest - value) <= _ROUNDING * duration else float(value)
+        snapped = nearest if abs(nearest - value) <= _ROUNDING * math.ulp(nearest) else float(value)
         if not 0 <= snapped <= duration:
             raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
-        if not kept or snapped - kept[-1] > _ROUNDING * duration:
+        if not kept or snapped - kept[-1] > _ROUNDING * math.ulp(snapped):
             kept.append(snapped)
     return tuple(kept)
 
