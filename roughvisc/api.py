@@ -63,8 +63,9 @@ def simulate(
         (:func:`roughvisc.mirror`), as long as their heights are unchanged; any other surface needs an explicit choice.
     tolerance : float
         Relative tolerance on ``stated_error`` at each output time: the error of pressure (L1), force and approach from
-        time steps, contact solver and exponential series, over the largest force and approach so far. Rows that exceed
-        it state their error, and the attribute ``warnings`` counts them. The grid error is not included.
+        time steps, contact solver and exponential series, over the largest force and approach of the kept rows so far.
+        Rows that exceed it state their error, and the attribute ``warnings`` counts
+        them. The grid error is not included.
     times : int or sequence of float or str, optional
         Output times, reached exactly: a number of times (the corners of the program, and the others where the result
         changes most); a list; or None for all corners and every accepted step that meets the tolerance. [s]
@@ -101,7 +102,7 @@ def simulate(
     EdgeContactError
         If contact reached the border of a free-space domain.
     ConvergenceError
-        If a step did not converge and no row was kept; otherwise ``status`` marks the rows that did not converge.
+        If the contact of a step is not solved; the message states the time, the error and what to try.
 
     Examples
     --------

@@ -71,8 +71,8 @@ class LoadingState:
     ----------
     march : State
         Of the march itself.
-    converged : bool
-        Whether all steps since the last kept row are.
+    largest : tuple of float
+        Largest force [N] and approach [m] of the kept rows.
     growths : int
         How many times the grid or the window has grown.
     border : float or None
@@ -80,7 +80,7 @@ class LoadingState:
     """
 
     march: State
-    converged: bool = True
+    largest: tuple[float, float] = (0.0, 0.0)
     growths: int = 0
     border: float | None = None
 
@@ -241,35 +241,36 @@ class LoadingRows(Rows):
         self._start = None  # its fields are not needed beyond the first step
         every = scene.times is None
         to_keep = set(scene.program.corners if scene.times is None else scene.times)
-        converged = start is None or start.converged
+        largest = (0.0, 0.0) if start is None else start.largest
         steps = march(scene, None if start is None else start.march) if fast else march_seed(scene)
         del start
         for step in steps:
             # when contact comes to the border of a free-space domain, in a step that is kept or not
             if self._border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
                 self._border = float(step.shown.time)
-            converged = converged and step.converged
             # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-            kept = step.shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error))
+            shown, before = step.shown, largest
+            largest = max(before[0], shown.force), max(before[1], abs(shown.approach))
+            kept = shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error, largest))
             state = None
             if fast:
-                state = LoadingState(step.state, converged or kept, self.profile.growths, self._border)
-            if kept:
-                row = self.row(step, converged, state=state)
-            elif not every and is_end_value(step):
-                row = self.row(step, step.converged, kept=False, state=state)
+                state = LoadingState(step.state, largest if kept else before, self.profile.growths, self._border)
+            if kept or (not every and is_end_value(step)):
+                row = self.row(step, largest, kept, state)
             else:
                 row = Row(step.shown.time, state=state, done=step.shown.time)
-            converged = converged or kept
-            del step, state  # their fields are not needed while the next one is computed
+            largest = largest if kept else before
+            del step, state, shown  # their fields are not needed while the next one is computed
             yield row
             del row
 
-    def row(self, step: Step, converged: bool, kept: bool = True, state: LoadingState | None = None) -> Row:
+    def row(
+        self, step: Step, largest: tuple[float, float], kept: bool = True, state: LoadingState | None = None
+    ) -> Row:
         """Make the row of an accepted step.
 
-        ``state`` is that from which an interrupted run continues; ``converged`` tells whether all steps since the last
-        kept row did.
+        ``largest`` are force [N] and approach [m] of the kept rows so far, this one included; ``state`` is that from
+        which an interrupted run continues.
         """
         if not is_wide(step.scene.gap.size):
             step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
@@ -293,10 +294,10 @@ class LoadingRows(Rows):
             "work": step.work,
             "stored_energy": step.stored,
             "dissipated_energy": step.dissipated,
-            "time_error": step.time_error,
+            "time_error": step.uncertainty.relative(*largest),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
-            "status": self._status(step, converged, count),
+            "status": self._status(step, count),
             "contact_area": area,
             "contact_area_counted": touching,
             "contact_fraction": self.profile.contact_fraction(area),
@@ -306,7 +307,7 @@ class LoadingRows(Rows):
         if self._has_mean_plane:  # separation of the profile's and the undeformed plane in free space [m]
             row["mean_plane_separation"] = self.profile.mean_gap - shown.approach
         if kept:
-            row |= error_columns(step, self._choice.series_error) | area_columns(step, contact, touching, area)
+            row |= error_columns(step, self._choice.series_error, largest) | area_columns(step, contact, touching, area)
         facts = {
             "level": step.level,
             "corner": self.profile.corner,
@@ -461,10 +462,8 @@ class LoadingRows(Rows):
         if not self.profile.all_present:
             gap[~self.profile.present[rows]] = np.nan
 
-    def _status(self, step: Step, converged: bool, count: int) -> int:
-        if not converged:
-            meaning = "not_converged"
-        elif step.shown.force == 0:
+    def _status(self, step: Step, count: int) -> int:
+        if step.shown.force == 0:
             meaning = "open"
         elif self.profile.window.whole and count == np.count_nonzero(self.profile.present):
             meaning = "full_contact"

@@ -104,7 +104,7 @@ def friction_columns(step: Step) -> dict[str, float]:
     }
 
 
-def error_columns(step: Step, series_error: float) -> dict[str, float]:
+def error_columns(step: Step, series_error: float, largest: tuple[float, float] | None = None) -> dict[str, float]:
     """What is stated of the accuracy of a step.
 
     Parameters
@@ -113,27 +113,30 @@ def error_columns(step: Step, series_error: float) -> dict[str, float]:
         An accepted step.
     series_error : float
         Relative error of the series that stands for the material.
+    largest : tuple of float, optional
+        Largest force [N] and approach [m] of the kept rows so far, to which the errors are relative. Default: of all
+        steps so far.
 
     Notes
     -----
     The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
-    under a given load is of second order in that of the pressure: the duality gap over the load, ``bound^2 / 2`` of
-    the approach. The series' error is one of the largest values so far: what is left after unloading is a
-    difference of such values.
+    under a given load is of second order in that of the pressure: the duality gap over the load. The series' error is
+    one of the largest values of all steps: what is left after unloading is a difference of such values.
     """
     state, unknown, shown = step.state, step.uncertainty, step.shown
-    largest_force, largest_approach = state.largest_force, state.largest_approach
+    largest_force, largest_approach = largest or (state.largest_force, state.largest_approach)
+    of_force, of_approach = series_error * state.largest_force, series_error * state.largest_approach
     is_viscoelastic, unit = step.scene.is_viscoelastic, step.scene.tolerance if largest_force > 0 else 0.0
     solved = step.solver_error + _INHERITED * unit if is_viscoelastic else max(step.solver_error, _LEAST * unit)
     force = approach = 0.0
     if step.control == "approach" or not step.given:
-        force = unknown.force + solved * shown.force + series_error * largest_force
+        force = unknown.force + solved * shown.force + of_force
     if step.control == "load" or not step.given:
-        approach = unknown.approach + 0.5 * step.bound**2 * abs(shown.approach) + series_error * largest_approach
-        approach += _INHERITED_APPROACH * unit * largest_approach if is_viscoelastic else 0.0
+        approach = unknown.approach + step.solver_error_approach + of_approach
+        approach += _INHERITED_APPROACH * unit * state.largest_approach if is_viscoelastic else 0.0
     pressure = solved
     if largest_force > 0:
-        pressure = (unknown.pressure + solved * shown.force) / largest_force + series_error
+        pressure = (unknown.pressure + solved * shown.force + of_force) / largest_force
     relative = max(
         pressure,
         force / largest_force if largest_force > 0 else 0.0,
@@ -152,7 +155,7 @@ def error_columns(step: Step, series_error: float) -> dict[str, float]:
     }
 
 
-def meets_tolerance(step: Step, series_error: float) -> bool:
+def meets_tolerance(step: Step, series_error: float, largest: tuple[float, float] | None = None) -> bool:
     """Whether an accepted step is worth a row where every step is kept: what is promised of it is within the tolerance.
 
     Where hardly any compliance is there at once, pressure jumps in each cell that enters. Only the approach is
@@ -162,7 +165,7 @@ def meets_tolerance(step: Step, series_error: float) -> bool:
     scene, state = step.scene, step.state
     if scene.time_step is not None or in_slide(step):  # the steps are as long as they are
         return True
-    found = error_columns(step, series_error)
+    found = error_columns(step, series_error, largest)
     most = _AT_MOST * scene.tolerance
     if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
         return False
@@ -173,7 +176,7 @@ def meets_tolerance(step: Step, series_error: float) -> bool:
         return False
     if before is not None and step.control == "approach" and np.any(now.pressure[before.pressure == 0] > 0):
         return False
-    return not found["approach_error"] > scene.tolerance * state.largest_approach
+    return not found["approach_error"] > scene.tolerance * (largest or (0.0, state.largest_approach))[1]
 
 
 def in_slide(step: Step) -> bool:

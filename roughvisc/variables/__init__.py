@@ -221,8 +221,8 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "stated relative error",
         "the largest of pressure (L1), force and approach: "
-        "sum of what time steps, contact solver and series leave, over the largest force and the largest approach so "
-        "far; comparable to the tolerance; the grid's part is stated apart",
+        "sum of what time steps, contact solver and series leave, over the largest force and approach of the kept "
+        "rows so far; comparable to the tolerance; the grid's part is stated apart",
         may_be_missing=True,
         in_table="largest",
     ),
@@ -231,7 +231,8 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "error due to time steps",
         "part of stated_error, "
-        "from the difference to a companion march in steps twice as long; over what is largest so far",
+        "from the difference to a companion march in steps twice as long; over the largest values of the kept rows so "
+        "far",
         every_step=True,
         may_be_missing=True,
         in_table="largest",
@@ -256,7 +257,7 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "1",
         "stated error of the pressure",
-        "its absolute values summed (L1), over the largest force so far",
+        "its absolute values summed (L1), over the largest force of the kept rows so far",
         may_be_missing=True,
     ),
     "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
+from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.materials.models import Prony
 from roughvisc.mechanics.sparse import Sparse, Sum
@@ -158,7 +158,7 @@ def march_seed(scene: Scene) -> Iterator[Step]:
     if scene.program.segments and scene.program.segments[0].duration > 0:
         nothing, unknown = np.zeros_like(scene.gap), math.nan
         yield Step(
-            state.now, Sum.whole(nothing), None, 0.0, "load", True, unknown, unknown, UNKNOWN, True, scene, state
+            state.now, Sum.whole(nothing), None, 0.0, "load", True, unknown, unknown, unknown, UNKNOWN, scene, state
         )
     increments: list[tuple[float, Array]] = []  # 6. (5) starts at n = 1, with no pressure before it
     for index, segment in enumerate(scene.program.segments):
@@ -199,6 +199,11 @@ def _advance(
         solution = SeedSolution(np.zeros_like(gap), np.zeros_like(gap), float(np.min(gap)), 0, 0, True)
     else:
         solution = conjugate_gradients(operator, gap, glassy, load, epsilon=1e-2 * scene.tolerance)
+    if not solution.stagnated:
+        raise ConvergenceError(
+            f"at {time:.6g} s the contact is not solved after {solution.iterations} iterations: try a looser tolerance "
+            "or method='fast'"
+        )
     contact = Sparse.whole(solution.pressure)
     if at_edge(scene, contact):
         raise edge_error(scene, time)
@@ -224,8 +229,8 @@ def _advance(
         given=True,
         bound=math.nan,
         solver_error=math.nan,
+        solver_error_approach=math.nan,
         uncertainty=UNKNOWN,
-        converged=solution.stagnated,
         scene=scene,
         state=state,
     )

@@ -313,10 +313,10 @@ class Step:
         Bound on the relative error of the pressure left by the contact solver, in the energy norm.
     solver_error : float
         Estimated error of the pressure that the contact solver leaves (L1). [-]
+    solver_error_approach : float
+        Error of the approach under a load that the contact solver leaves. [m]
     uncertainty : Uncertainty
         Error that the time steps leave.
-    converged : bool
-        Whether the contact solver reached its tolerance.
     scene : Scene
         The scene, on the grid that it has by now.
     state : State
@@ -331,8 +331,8 @@ class Step:
     given: bool
     bound: float
     solver_error: float
+    solver_error_approach: float
     uncertainty: Uncertainty
-    converged: bool
     scene: Scene
     state: State
 
@@ -352,11 +352,6 @@ class Step:
             return self
         shown = replace(self.shown, contact=Sparse.whole(self.shown.pressure))
         return replace(self, shown=shown, displaced=Sum.whole(self.displacement))
-
-    @property
-    def time_error(self) -> float:
-        """Relative error of pressure (L1), force and approach that the time steps leave. [-]"""
-        return self.uncertainty.relative(self.state.largest_force, self.state.largest_approach)
 
     @property
     def stored(self) -> float:
@@ -386,6 +381,7 @@ class Trial:
     control: Control = "load"
     bound: float = 0.0
     solver_error: float = 0.0
+    solver_error_approach: float = 0.0
     converged: bool = True
     iterations: int = 0
     convolutions: int = 0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import EdgeContactError, InputError
+from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.mechanics.arrays import blockwise, empty
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
@@ -136,6 +136,7 @@ def trial_step(
         control,
         contact.bound,
         contact.error,
+        contact.approach_error,
         contact.converged,
         contact.iterations,
         contact.convolutions + (scene.memory.acts_on in ("pressure", "waves")),
@@ -161,6 +162,7 @@ def carried_into_step(
 
 def advance_trajectory(scene: Scene, state: AnyTrajectory, trial: Trial) -> AnyTrajectory:
     """A trajectory that has accepted a trial."""
+    require_solved(scene, trial)
     now, acts_on = trial.instant, scene.memory.acts_on
     if acts_on == "displacement":
         assert now.unit_displacement is not None
@@ -189,6 +191,22 @@ def advance_trajectory(scene: Scene, state: AnyTrajectory, trial: Trial) -> AnyT
         energy=spent,
         unresolved=False,
     )
+
+
+def require_solved(scene: Scene, trial: Trial) -> None:
+    """Raise unless the contact of a trial is solved.
+
+    Raises
+    ------
+    ConvergenceError
+        The message states the time, the estimated error of the pressure and what to try.
+    """
+    if not trial.converged:
+        raise ConvergenceError(
+            f"at {trial.instant.time:.6g} s the contact is not solved: the estimated error of the pressure is "
+            f"{trial.solver_error:.2g} after {trial.iterations} iterations, the tolerance {scene.tolerance:g}; try a "
+            "looser tolerance, a coarser grid, or layers whose moduli differ less"
+        )
 
 
 def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState, **more: Any) -> State:
@@ -271,7 +289,7 @@ def cost_after(state: State, trial: Trial) -> dict[str, Any]:
 
 def step_of(scene: Scene, state: State, trial: Trial) -> Step:
     """What is yielded of an accepted trial; as uncertain as the state is."""
-    shown, converged, displaced, now = trial, trial.converged, displacement_after(scene, state, trial), state.now
+    shown, displaced, now = trial, displacement_after(scene, state, trial), state.now
     level = now.approach
     kept = trial.length > 0 and not trial.is_open and scene.keeps(state.now.time)
     if kept and scene.lacks_instantaneous_compliance(trial.length):
@@ -282,7 +300,7 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
             scene, alone, "load", state.now.force, _DISCARDED * trial.length, "right", estimate_error=True
         )
         state = replace(state, **cost_after(state, shown))
-        converged = converged and shown.converged
+        require_solved(scene, shown)
         displaced = displacement_after(scene, alone, shown, shown.length, shown.rule)
         now, level = replace(now, contact=shown.instant.contact), shown.instant.approach
     return Step(
@@ -294,8 +312,8 @@ def step_of(scene: Scene, state: State, trial: Trial) -> Step:
         given=scene.program.gives(segment_number(state)),
         bound=shown.bound,
         solver_error=shown.solver_error,
+        solver_error_approach=shown.solver_error_approach,
         uncertainty=state.uncertainty,
-        converged=converged,
         scene=scene,
         state=state,
     )

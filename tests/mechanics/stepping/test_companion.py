@@ -93,7 +93,13 @@ def matrix():
 @pytest.mark.thorough
 def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     true = np.concatenate([true_errors(*rows) for rows in matrix.values()])
-    said = np.array([step.time_error for found, _ in matrix.values() for step in found.values()])
+    said = np.array(
+        [
+            step.uncertainty.relative(step.state.largest_force, step.state.largest_approach)
+            for found, _ in matrix.values()
+            for step in found.values()
+        ]
+    )
     seen = true > 1e-3 * TOLERANCE
     assert np.count_nonzero(seen) > 150
     assert np.mean(said[seen] >= 0.8 * true[seen]) >= 0.98, np.sort(said[seen] / true[seen])[:10]
@@ -202,7 +208,7 @@ def test_area_in_doubt__is_counted_cell_by_cell():
 def test_elastic__has_no_companion_and_nothing_unknown():
     steps = list(march(sphere(rv.elastic(1.0), PROGRAMS["triangle"], times=TIMES)))
     assert all(step.state.companion is None for step in steps)
-    assert all(step.time_error == 0 for step in steps)
+    assert all(step.uncertainty.relative(1.0, 1.0) == 0 for step in steps)
 
 
 def test_row_right_after_a_corner__is_judged():

@@ -100,7 +100,7 @@ def test_one_kept_time__costs_less_and_is_as_right_as_asked(name, what, monkeypa
     off = np.abs(last.shown.pressure - exact.shown.pressure).sum() * made.operator.cell_area
     assert off <= 1e-3 * exact.state.largest_force
     assert abs(last.work - exact.work) <= 1e-3 * exact.state.largest_work
-    assert last.time_error <= 1e-3 * 1.5
+    assert last.uncertainty.relative(last.state.largest_force, last.state.largest_approach) <= 1e-3 * 1.5
 
 
 @pytest.mark.parametrize("name", SERIES)

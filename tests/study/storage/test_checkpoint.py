@@ -233,7 +233,7 @@ def test_checkpoint__holds_the_state_exactly(tmp_path):
     history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
     for memory in (modes, history):
         state = State(now, strange, memory, before=None, pace=ControllerState(0.1, 0.5, True), convolutions=2**40)
-        reached = Checkpoint(LoadingState(state, False, 3, 0.1), 0.1 + 0.2, 2, 1e-17)
+        reached = Checkpoint(LoadingState(state, (0.1, 2e-7), 3, 0.1), 0.1 + 0.2, 2, 1e-17)
         save_checkpoint(tmp_path / "c", reached, "key")
         back = loaded(tmp_path / "c", "key")
         assert repr(replace(back, state=None)) == repr(replace(reached, state=None))

@@ -1,0 +1,67 @@
+"""Stated errors, kept times and unsolved contacts, seen through ``rv.simulate``."""
+
+import numpy as np
+import pytest
+
+import roughvisc as rv
+
+BALL = rv.sphere(10e-3, 1e-3, 25)
+FLUID = rv.maxwell(3e6, 1e5)
+
+
+def test_unsolved_contact__raises():
+    """A plate 1,000 times stiffer than its base, pressed over four times its thickness."""
+    side, cells = 1.6e-3, 129
+    ball = rv.from_array(rv.sphere(10e-3, side, cells).values, spacing=side / cells)
+    plate = rv.layer(rv.elastic(3e9), 1e-4, on=rv.elastic(3e6))
+    with pytest.raises(rv.ConvergenceError):
+        rv.simulate(ball, plate, rv.Program().load(1.3, over=0), boundary="free", progress=False)
+
+
+@pytest.mark.parametrize("body", [FLUID, rv.layer(FLUID, 1e-4, on=rv.elastic(3e6)), rv.layer(FLUID, 1e-4, on=FLUID)])
+def test_stated_error__of_full_contact_by_creep(body):
+    """A wave in full contact has its mean plane at the approach; a relaxed fluid stores hardly any energy there."""
+    amplitude = 1e-7
+    wave = rv.wavy(amplitude, 1e-3, 1e-3, (31, 32))
+    program = rv.Program().load(0.002, over=0.01).hold(10.0)
+    ds = rv.simulate(wave, body, program, boundary="periodic", times=[10.01], fields=(), progress=False)
+    assert float(ds.contact_fraction[0]) == 1.0
+    mean_gap = float((wave.max() - wave.mean()).item())
+    error = abs(float(ds.approach[0]) / mean_gap - 1)
+    assert error <= float(ds.stated_error[0]) <= 1e-3
+
+
+def test_every_requested_time__has_a_row():
+    """However short it is beside the program; the approach of a ball goes as the compliance to the power 2/3."""
+    material = rv.zener(3e6, 1e6, 1e5)
+    program = rv.Program().load(1e-3, over=0).hold(1e9).load(1e-3, over=1.0)
+    times = [1e-4, 1e-3, 1.0, 1e9, 1e9 + 1e-3, 1e9 + 1.0]
+    ds = rv.simulate(BALL, material, program, times=times, fields=(), progress=False)
+    assert ds.time.values.tolist() == times
+    compliance = material.contact_compliance(np.array(times))
+    expected = (compliance / compliance[-1]) ** (2 / 3)
+    np.testing.assert_allclose(ds.approach / ds.approach[-1], expected, rtol=2e-2)
+
+
+def test_times__that_differ_by_rounding_alone_are_one():
+    third = 1.0 / 3.0
+    times = [third, np.nextafter(third, 1.0), third + 1e-9, np.nextafter(1.0, 0.0), 1.0]
+    program = rv.Program().load(1e-3, over=1.0)
+    ds = rv.simulate(BALL, rv.kelvin_voigt(1e6, 1e5), program, times=times, fields=(), progress=False)
+    assert ds.time.values.tolist() == [third, third + 1e-9, 1.0]
+
+
+def test_stated_error__covers_rows_after_a_jump_that_is_not_kept():
+    """At constant approach the contact stays, and the force relaxes as the modulus; it falls to 1/3000 here."""
+    equilibrium, moduli, relaxation = 1e3, (3e6, 3e5), (1e-2, 1.0)
+    times = np.array([1.0, 2.0, 10.0])
+    program = rv.Program().approach(5e-6, over=0).hold(10.0)
+    settings = {"fields": (), "progress": False}
+    material = rv.from_relaxation(equilibrium, moduli, relaxation)
+    ds = rv.simulate(BALL, material, program, times=times.tolist(), **settings)
+    glassy = rv.simulate(BALL, rv.elastic(equilibrium + sum(moduli)), program, times=[10.0], tolerance=1e-8, **settings)
+    left = equilibrium + sum(g * np.exp(-times / tau) for g, tau in zip(moduli, relaxation, strict=True))
+    expected = float(glassy.force[-1]) * left / (equilibrium + sum(moduli))
+    error = np.abs(ds.force.values - expected) / np.maximum.accumulate(expected)
+    assert error.max() > 1e-3
+    assert (error <= ds.stated_error.values).all()
