@@ -80,7 +80,6 @@ TABLES = {
     "observe.leakage": ("observe.leakage", evaluation.LeakageTable.model_fields),
     "observe.conductance": ("observe.conductance", evaluation.ConductanceTable.model_fields),
     "audit": ("audit", evaluation.AuditSection.model_fields),
-    "want": ("want", evaluation.WantSection.model_fields),
 }
 #: first word of a table's name -> the table whose meanings hold where it has none of its own
 _SHARED = {"generate": "generate: any", "material": "material: any"}
@@ -96,7 +95,6 @@ _WORDS = {
     "solve": "a table",
     "keep": "a table",
     "audit": "a table",
-    "want": "a table",
     "sweep": "a table of lists, or several",
     "precision": "a number above 0 and below 1",
     "generate": "one of " + ", ".join(surface.GENERATED),

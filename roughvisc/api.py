@@ -238,10 +238,9 @@ def run(
     out : path, optional
         Results folder. Default: ``results/`` and the name of the study, next to the study.
     want : dict, optional
-        How accurate numbers are wanted, with the keys of the table ``want`` of a study:
-        ``{"friction_coefficient": "1 %"}``, or ``{"time": "60 s"}`` for the best in a time. The grid and the tolerance
-        are then chosen, and those of the case are not used. Default: what the study states; without a target the case
-        is computed as it is stated.
+        Wanted relative errors of numbers at 95 %, such as ``{"friction_coefficient": "1 %"}``, and known errors as
+        :func:`roughvisc.budget` takes them, such as ``{"modulus_error": "5 %"}``. The grid and the tolerance are then
+        chosen, and those of the case are not used. Default: the case is computed as it is stated.
     progress : bool or callable
         A progress bar, or a function called with the current time and the length of the program. [s]
     threads : int, optional
@@ -258,8 +257,8 @@ def run(
     Raises
     ------
     InputError
-        If the input is invalid; nothing is written. If what is wanted cannot be had: the message says how accurate
-        the number is at best, and what would help.
+        If the input is invalid; nothing is written. If a wanted error cannot be reached: the message says how accurate
+        the number is at best, and by which sources.
     TooLargeError
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.
@@ -270,7 +269,7 @@ def run(
     from roughvisc.study.statement.case import Case, read_study
 
     stated = case if isinstance(case, Case) else read_study(case)
-    if want is None and not stated.is_to_be_chosen:
+    if want is None:
         return run_stated(stated, out, progress=progress, threads=threads)
     from roughvisc.study.budget import target
 

@@ -93,7 +93,6 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, bu
 _OPTIONS = {
     "quantity": "What number; may be repeated. [default: contact_area]",
     "at": "Time or speed; may be repeated. [default: all kept]",
-    "sharp": "Compute cells half as long too: four times the cost, a sharper error of the grid.",
     "ensemble": "The number of the roughness, of which the scan is one sample, or of this patch. [default: patch]",
     "out": "Folder of what is found. [default: budget in the results]",
 }
@@ -103,7 +102,6 @@ _OPTIONS = {
 @click.argument("study", metavar="STUDY|RESULT", type=PATH)
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help=_OPTIONS["quantity"])
 @click.option("--at", "places", multiple=True, metavar="VALUE", help=_OPTIONS["at"])
-@click.option("--sharp", is_flag=True, help=_OPTIONS["sharp"])
 @click.option("--modulus-error", metavar="PART", help="Relative error of the moduli at 95 %: 10%.")
 @click.option("--time-scale-error", metavar="PART", help="Relative error of the times of the material at 95 %.")
 @click.option("--cutoff", metavar="LENGTH", help="Shortest wavelength that the real surface has: '2 um'.")
@@ -115,7 +113,6 @@ def budget(
     study: Path,
     quantities: tuple[str, ...],
     places: tuple[str, ...],
-    sharp: bool,
     modulus_error: str | None,
     time_scale_error: str | None,
     cutoff: str | None,
@@ -124,12 +121,11 @@ def budget(
     workers: int | None,
     quiet: bool,
 ) -> None:
-    """State the whole error of a number: by source, and together.
+    """Estimate the total uncertainty of a number, by source.
 
-    The case is solved again on other grids, without its shortest waves, on other patches of the same roughness and with
-    another material, as far as what is asked needs it. What is known of errors and not said here comes from [want] of
-    the study. A table is printed; a NetCDF and a figure are written for each quantity. What was solved is kept, and
-    used again.
+    Solves the case again on other grids, without its shortest waves, on other patches of the same roughness and with
+    another material, as needed. Prints a table, and writes a NetCDF file and a figure for each quantity. All solves are
+    kept and used again.
 
     \b
     Example:
@@ -158,7 +154,6 @@ def budget(
         case,
         list(quantities) or ["contact_area"],
         at=[stated_quantity(one, unit, "--at") for one in places] or None,
-        sharp=sharp,
         known=known,
         out=folder,
         workers=workers,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from roughvisc.study.statement.case import Case
 
 
-_FOR = "How accurate a number is wanted: '1 % friction_coefficient', or the best in a time: '60 s'; may be repeated."
+_FOR = "Wanted error of a number: '1 % friction_coefficient'; may be repeated."
 
 
 @click.command()
@@ -57,8 +57,8 @@ def run(
     others continue. Repeat the command to resume an interrupted run: finished cases are not computed again, failed
     ones only with --retry-failed.
 
-    With --for, or [want] in the study, the grid and the tolerance are chosen: coarse to fine, until the whole error of
-    the number is as small as wanted. If no grid can give that, the command says why and what would help.
+    With --for, the grid and the tolerance are chosen: coarse to fine, until the whole error of the number is as small
+    as wanted. If no grid can give that, the command names the sources of the error.
 
     \b
     Example:
@@ -74,26 +74,19 @@ def run(
 
     keep_long_messages(study_folder(study, out))
     cases = read_cases(study)
-    if targets:
-        from roughvisc.study.budget.target import parse_targets, wanting
-
-        want = parse_targets(targets)
-        cases = [wanting(case, want) for case in cases]
-    chosen = [case for case in cases if case.is_to_be_chosen]
-    if chosen and len(cases) > 1:
-        where = "--for" if targets else "want"
-        raise InputError(f"{study}: {where}: found a target beside a sweep of {len(cases)} cases: expected one case")
+    if targets and len(cases) > 1:
+        raise InputError(key="--for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
     folder = result_folder(cases[0], out, to_write=False)
     console = Console(quiet=quiet)
     elsewhere = bool(scheduler or scheduler_file)
     with connect(scheduler, scheduler_file) if elsewhere else nullcontext() as client:
-        if len(cases) > 1 or (elsewhere and not chosen):
+        if len(cases) > 1 or (elsewhere and not targets):
             _run_all(cases, folder, console, client=client, retry_failed=retry_failed, **computing)
             return
         case, budgets = cases[0], {}
-        if chosen:
-            case, budgets = _choose(case, folder, console, client=client, **computing)
-        complaint = _run_one(case, folder, study.stem, console, not no_plots, computing["threads"], bool(chosen))
+        if targets:
+            case, budgets = _choose(case, targets, folder, console, client=client, **computing)
+        complaint = _run_one(case, folder, study.stem, console, not no_plots, computing["threads"], bool(targets))
         for name, one in budgets.items():
             show(console, one, folder / "budget", name, not no_plots)
         if complaint:
@@ -101,18 +94,20 @@ def run(
             raise Failure("1 of 1 cases failed", 1)
 
 
-def _choose(case: Case, folder: Path, console: Console, **computing: Any) -> tuple[Case, Mapping[str, xr.Dataset]]:
-    """The case that the target of one takes, and the whole errors around it; say what it is and why."""
+def _choose(
+    case: Case, targets: Sequence[str], folder: Path, console: Console, **computing: Any
+) -> tuple[Case, Mapping[str, xr.Dataset]]:
+    """Return the case with the chosen grid and tolerance, and its budgets; print what was chosen and why."""
     from functools import partial
 
-    from roughvisc.study.budget.target import choose
+    from roughvisc.study.budget.target import choose, parse_targets
     from roughvisc.study.execution.monitor import watcher
 
     def tell(line: str) -> None:
         console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
 
     watch = partial(watcher, not console.quiet, console, summary=False)
-    choice = choose(case, folder, watch=watch, tell=tell, **computing)
+    choice = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
     tell("Chosen")
     for reason in choice.reasons:
         tell(f"  {reason}")

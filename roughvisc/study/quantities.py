@@ -16,13 +16,10 @@ from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.study.statement.case import Case
 from roughvisc.variables.axes import AXES
-from roughvisc.variables.grid_errors import GRID_ERROR
 
 Array = NDArray[np.float64]
 #: Keyword arguments of the observables, as ``[observe]`` of a study states them.
 Observe = Mapping[str, Mapping[str, Any]]
-#: Quantity -> that whose error of the grid is its own: the load does not depend on the grid.
-_ERROR_OF = {"friction_coefficient": "friction_force"}
 
 
 @dataclass(frozen=True)
@@ -38,14 +35,11 @@ class Observable:
     fields : tuple of str
         Fields that it is derived from.
     grid_factor : float
-        Safety factor of the error of the grid, by three grids. This factor and the next were chosen on 45 rough
-        surfaces, and what they hold was measured on 45 others (workflows/benchmarks/whole_error.py).
+        Error of the grid over the difference to cells twice as long: Roache's factor of two grids, at the order 1.5.
+        The larger factors, and the next, were chosen on 45 rough surfaces, and what they hold was measured on 45 others
+        (workflows/benchmarks/whole_error.py).
     octave_factor : float
         What the next octave of waves changes at most, over what the last one did.
-    of_longest_waves : bool
-        Whether the longest waves of the height rule it.
-    octave : str
-        Variable that states what the shortest octave of waves adds to it; empty where there is none.
     stated : callable, optional
         Error that the rows of a result state of it, in its unit. Default: the stated error of the row over the largest
         value, which holds for any quantity that follows pressure or approach in proportion.
@@ -55,10 +49,8 @@ class Observable:
     units: str
     derive: Callable[[xr.Dataset, Observe], xr.DataArray] | None = None
     fields: tuple[str, ...] = ()
-    grid_factor: float = 1.5
+    grid_factor: float = 3 / (2**1.5 - 1)
     octave_factor: float = 1.1
-    of_longest_waves: bool = False
-    octave: str = ""
     stated: Callable[[xr.Dataset, Array], Any] | None = None
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
@@ -75,24 +67,6 @@ class Observable:
             error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.log1p(np.asarray(error, dtype=float) / np.abs(values))
-
-    def stated_grid(self, result: xr.Dataset, axis: str) -> Array | None:
-        """What the grid leaves of its logarithm, as all rows of a result state it; None if they do not. [-]"""
-        variable = GRID_ERROR.get(_ERROR_OF.get(self.name, self.name), "")
-        if variable not in result:
-            return None
-        values = np.abs(result[self.name].values)
-        of = values if axis == "speed" else np.fmax.reduce(values, initial=0.0)  # of a history it is over the largest
-        error = result[variable].values * of
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.log1p(error / values), dtype=float)
-
-    def stated_octave(self, result: xr.Dataset) -> Array | None:
-        """Logarithm of its value over that without the shortest octave, as all rows state it; None if they do not."""
-        if self.octave not in result:
-            return None
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(-np.log1p(-result[self.octave].values), dtype=float)
 
 
 def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
@@ -139,12 +113,12 @@ _CONDUCTED: dict[str, Any] = {"fields": ("pressure",), "grid_factor": 2.5, "octa
 QUANTITIES = {
     one.name: one
     for one in (
-        Observable("contact_area", "m^2", octave_factor=1.6, octave="last_octave_area", stated=_of_area),
-        Observable("mean_gap", "m", grid_factor=1.0, of_longest_waves=True, stated=_OF_APPROACH),
-        Observable("approach", "m", of_longest_waves=True, stated=_OF_APPROACH),
+        Observable("contact_area", "m^2", octave_factor=1.6, stated=_of_area),
+        Observable("mean_gap", "m", stated=_OF_APPROACH),
+        Observable("approach", "m", stated=_OF_APPROACH),
         Observable("force", "N", stated=_variable("force_error")),
-        Observable("friction_coefficient", "1", grid_factor=1.0, octave_factor=1.8, octave="last_octave_friction"),
-        Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), of_longest_waves=True, stated=_of_gap),
+        Observable("friction_coefficient", "1", octave_factor=1.8),
+        Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), stated=_of_gap),
         Observable("thermal_conductance", "W/K", _thermal, **_CONDUCTED),
         Observable("incremental_stiffness", "N/m", _stiffness, **_CONDUCTED),
     )
@@ -172,10 +146,10 @@ def known_quantity(name: Any, case: Case) -> Observable:
     """
     axis = case.experiment().axis
     if name not in QUANTITIES:
-        raise InputError(f"quantity is {name!r}: expected one of {', '.join(QUANTITIES)}")
+        raise InputError(key="quantity", found=name, expected=f"one of {', '.join(QUANTITIES)}")
     if name == "friction_coefficient" and name not in observables_of(case):
-        raise InputError("quantity is 'friction_coefficient': expected a study in which the surface slides")
+        raise InputError(key="quantity", found=name, expected="a number of a surface that does not slide")
     if not _is_over(name, axis):
         has = ", ".join(one for one in QUANTITIES if _is_over(one, axis))
-        raise InputError(f"quantity is {name!r}: results over {axis} have none: expected one of {has}")
+        raise InputError(key="quantity", found=name, expected=f"one of {has}, as results over {axis} have them")
     return QUANTITIES[name]

@@ -110,11 +110,10 @@ def scene(family, load, material, number, friction, start, cells):
         path = Path(folder) / "scan.toml"
         path.write_text(study(family, load, material, seed, cells, friction, cells))
         found = {"family": family, "load": load, "material": material, "budgets": {}, "truth": {}}
-        for population, sharp in (("patch", False), ("patch", True), ("ensemble", False), ("ensemble", True)):
+        for population in ("patch", "ensemble"):
             stated = rv.budget(
                 path,
                 names,
-                sharp=sharp,
                 modulus_error=0.0,
                 time_scale_error=0.0,
                 cutoff=cutoff * SIDE / cells,
@@ -123,8 +122,7 @@ def scene(family, load, material, number, friction, start, cells):
                 workers=0,
                 progress=False,
             )
-            label = f"{population}, {'sharp' if sharp else 'cheap'}"
-            found["budgets"][label] = {
+            found["budgets"][population] = {
                 name: {
                     "value": one["value"].values.tolist(),
                     "lower": one["lower"].values.tolist(),
@@ -163,11 +161,10 @@ def summary(lines):
     if not lines:
         return
     for label in lines[0]["budgets"]:
-        truth = label.partition(",")[0]
         for name in lines[0]["budgets"][label]:
             rows = []
             for line in lines:
-                one, wanted = line["budgets"][label][name], line["truth"][truth][name]
+                one, wanted = line["budgets"][label][name], line["truth"][label][name]
                 for place, true in enumerate(wanted):
                     value, lower, upper = (one[end][place] for end in ("value", "lower", "upper"))
                     if value and value > 0 and true > 0:

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.study.budget.solves import FOLDER, Array, Bench, Reading, nearest_rows, read, stated_by
+from roughvisc.study.budget.solves import FOLDER, Array, Bench, Reading, finished_result, nearest_rows, read
 from roughvisc.study.budget.sources import SURROGATES, Asked, Found, Population, Values, judge, known_errors, together
 from roughvisc.study.budget.variants import Variants, with_rows
 from roughvisc.study.ensembles import STANDING, STANDING_ATTRIBUTES, ratio, standing
@@ -35,7 +35,6 @@ def budget(
     quantity: str | Sequence[str] = "contact_area",
     *,
     at: Sequence[Quantity] | Quantity | None = None,
-    sharp: bool = False,
     modulus_error: Quantity | None = None,
     time_scale_error: Quantity | None = None,
     cutoff: Quantity | None = None,
@@ -57,13 +56,9 @@ def budget(
         what is conducted.
     at : float, str, or a sequence of these, optional
         Times or speeds, as the study has them; text states the unit. Default: all that the study keeps.
-    sharp : bool
-        Compute the case on cells half as long too, which costs four times as much as the case, takes the value from
-        there, and makes the error of the grid some times smaller.
     modulus_error, time_scale_error : float or str, optional
         Relative errors of the moduli of the material and of its times, at 95 %: of a measured curve, or from batch
-        to batch. Default of these and the next two: what the table ``want`` of the study states. Without them these
-        sources stay open. [-]
+        to batch. Without them these sources stay open. [-]
     cutoff : float or str, optional
         Shortest wavelength that the real surface has, where it ends or where it no longer counts. Without it the
         waves that the scan does not hold stay open. [m]
@@ -109,7 +104,6 @@ def budget(
         case,
         [quantity] if isinstance(quantity, str) else list(quantity),
         at=at,
-        sharp=sharp,
         known={
             "modulus_error": modulus_error,
             "time_scale_error": time_scale_error,
@@ -134,7 +128,6 @@ def budgets(
     *,
     known: Mapping[str, Any] | None = None,
     at: Sequence[Quantity] | Quantity | None = None,
-    sharp: bool = False,
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
@@ -145,30 +138,30 @@ def budgets(
     Parameters
     ----------
     known : mapping, optional
-        What is known of errors, by the keys that ``[want]`` of a study has for it, in SI.
-    case, names, at, sharp, out, client, workers, progress
+        Errors that are known: ``modulus_error``, ``time_scale_error``, ``cutoff``, ``population``.
+    case, names, at, out, client, workers, progress
         As :func:`budget` has them.
     """
     source = case.encoding.get("source") if isinstance(case, xr.Dataset) else None
     case, folder = case_of(case, out)
     if not names:
-        raise InputError("quantity is empty: expected at least one")
+        raise InputError(key="quantity", found=names, expected="at least one")
     quantities = [known_quantity(name, case) for name in names]
-    errors = known_errors(case, known or {})
+    errors = known_errors(known or {})
     axis = AXES[case.experiment().axis]
     given = in_si(at, axis.variables[axis.name].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, places, [field for one in quantities for field in one.fields])
     finished = Path(source) if source else result_path(result_folder(case), case.key)
-    stated = stated_by(finished, quantities, axis.name, places)
-    asked = Asked(Variants(base, base.height()), sharp, **errors, stated=stated)
+    whole = finished_result(finished, quantities, axis.name, places)
+    asked = Asked(Variants(base, base.height()), **errors)
     solves = asked.solves()
-    if stated.result is not None:
+    if whole is not None:
         del solves["own"]
     watch = partial(watcher, progress)
     bench = Bench(quantities, folder, watch, client=client, workers=workers, retry_failed=False, what="budget")
     with bench.results(solves) as results:
-        one = results["own"] if stated.result is None else stated.result
+        one = results["own"] if whole is None else whole
         if places is not None:  # slides have theirs by the cell
             one = one.isel({axis.name: nearest_rows(one[axis.name], places)})
         own = read(one, base, quantities)
@@ -196,9 +189,8 @@ def _of_quantity(asked: Asked, quantity: Observable, readings: Mapping[str, Read
     values = {name: one.values[quantity.name] for name, one in readings.items()}
     judged = judge(asked, quantity, values, own.stated[quantity.name])
     seconds = {name: one.seconds for name, one in readings.items()}
-    value = values["fine" if asked.sharp else "own"]
     case = asked.variants.case
-    found = assembled(case, asked.population, quantity, judged, value, own.places, seconds)
+    found = assembled(case, asked.population, quantity, judged, values["own"], own.places, seconds)
     return _with_own_statistics(found, asked, values) if asked.draws else found
 
 

@@ -1,10 +1,11 @@
-"""The grids among which is chosen for a target, and the errors around one of them."""
+"""Grids among which one is chosen for a target, and the error of a number on one of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,13 +15,12 @@ from roughvisc.errors import InputError
 from roughvisc.settings import Settings
 from roughvisc.study.budget.budget import assembled
 from roughvisc.study.budget.solves import Array, Bench, Reading
-from roughvisc.study.budget.sources import SOURCES, Asked, Found, judge, known_errors, stated_errors, together
+from roughvisc.study.budget.sources import SOURCES, Asked, Found, judge, together
 from roughvisc.study.budget.variants import Variants, with_rows
 from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.trade.ladder import has_steps
 from roughvisc.topography.grid import spacing
-from roughvisc.units import unit_for
 from roughvisc.variables.axes import AXES
 
 #: The tolerance over the target: steps and solver then count for little beside all else.
@@ -34,7 +34,9 @@ FINEST = -2
 #: Fewest cells a side of the coarsest grid, where that is coarser than a quarter of the study's.
 _FEWEST = 12
 #: Cost of a grid over that of one with cells twice as long.
-DEARER = 4.0
+_DEARER = 4.0
+#: An error counts as met up to the rounding of what is printed of it.
+_ROUNDING = 1.005
 #: Sources that grid and tolerance rule; all others are the floor.
 RULED = ("time steps and solver", "grid")
 FLOOR = tuple(name for name in SOURCES if name not in RULED)
@@ -88,48 +90,29 @@ def cells_in_words(level: int) -> str:
 def grids_of(case: Case, quantities: Sequence[Observable], tolerance: float) -> Grids:
     """Grids of a case whose solves keep what the quantities need, beside what the study keeps."""
     fields = [*case.settings.keep.fields, *(field for one in quantities for field in one.fields)]
-    base = vary(with_rows(case, None, fields), {"solve.tolerance": tolerance, "want": stated_errors(case)})
+    base = vary(with_rows(case, None, fields), {"solve.tolerance": tolerance})
     return Grids(case, Variants(base, base.height()))
 
 
 def tolerance_for(case: Case, targets: Mapping[str, float]) -> float:
-    """A fifth of the smallest target; a study that is sharper than usual keeps its own, as where time is the target."""
+    """Return a fifth of the smallest target; a study that is sharper than usual keeps its own tolerance."""
     own = case.settings.solve.tolerance
-    if not targets:
-        return float(own)
     chosen = min(max(FIFTH * min(targets.values()), _SHARPEST), AMPLE)
     return float(f"{min(chosen, own) if own < Settings.tolerance else chosen:.2g}")
 
 
-def draws_others(case: Case) -> bool:
-    """Whether the number of a case is that of all surfaces of its recipe, of which as many are drawn as it takes."""
-    surface, want = case.settings.surface, case.settings.want
-    of_a_recipe = hasattr(surface, "seed") and surface.second is None and surface.realisation is None
-    return of_a_recipe and want is not None and want.population == "ensemble"
-
-
-def first_grids(case: Case, bench: Bench, targets: Mapping[str, float], limit: float) -> Around:
-    """The solves around the first level that may be chosen, with the tolerance that they take.
-
-    Raises
-    ------
-    InputError
-        If they and what else is judged by them take longer than the limit. [s]
-    """
+def first_grids(case: Case, known: Mapping[str, Any], bench: Bench, targets: Mapping[str, float]) -> Around:
+    """Return the solves around the first level that may be chosen, with the tolerance that they take."""
     tolerance = tolerance_for(case, targets)
     least = _LEAST * tolerance
     while True:
         grids = grids_of(case, bench.quantities, tolerance)
         held = grids.case(grids.held)
-        known = known_errors(case, {"population": "patch"} if draws_others(case) else {})  # not by the scatter of a few
         around = Around(bench, grids, Asked(Variants(held, held.height()), **known), grids.held + 3).finer()
         while around.level > grids.held:
-            wait = around.seconds_of_next(len(around.changed_cases()))
-            if around.spent + wait > limit:
-                raise refusal(case, [around.short_of_time(targets, limit, wait)])
             around = around.finer()
         stated = around.solves[around.level].stated
-        left = max((_largest(stated[name]) / math.log1p(part) for name, part in targets.items()), default=0.0)
+        left = max(_largest(stated[name]) / math.log1p(part) for name, part in targets.items())
         if left <= 0.5 or tolerance <= least:
             return around
         tolerance = float(f"{max(tolerance * FIFTH / left, least):.2g}")  # steps and solver take too much
@@ -183,7 +166,7 @@ class Around:
     def finer(self) -> Around:
         """The same around the next grid."""
         level = self.level - 1
-        wait = DEARER * self.solves[self.level].seconds if self.solves else 0.0
+        wait = _DEARER * self.solves[self.level].seconds if self.solves else 0.0
         found = self.bench.solve({level: self.grids.case(level)}, wait)
         return replace(self, level=level, solves={**self.solves, **found})
 
@@ -191,18 +174,6 @@ class Around:
         """What it would be around the next grid if that changed nothing: the least error that it may have."""
         finer = self.level - 1
         return replace(self, level=finer, solves={**self.solves, finer: self.solves[self.level]})
-
-    @property
-    def spent(self) -> float:
-        """Wall time of all solves. [s]"""
-        return sum(one.seconds for one in (*self.solves.values(), *self.parts.values()))
-
-    def seconds_of_next(self, parts: int = 0) -> float:
-        """Expected wall time of the next grid, and of so many changed cases where they are made on it. [s]"""
-        last = self.solves[self.level].seconds
-        before = self.solves.get(self.level + 1)
-        wait = last * (DEARER if before is None else max(DEARER, last / before.seconds))
-        return wait * (1 + parts) if self.level == self.grids.held + 1 else wait
 
     def places(self) -> Array:
         """Places of the rows that are judged: all where their times are stated, else the corners of the program.
@@ -227,9 +198,8 @@ class Around:
         """Values as the sources take them around the level; what a changed solve changed is carried over to it."""
         places = self.places()
         grids = {level: one.at(places).values[quantity.name] for level, one in self.solves.items()}
-        found = {"own": grids[self.level + 1], "coarse": grids[self.level + 2], "fine": grids[self.level]}
-        compared = self.asked.compared
-        origin = {"smooth": "fine", "stiffer": compared, "slower": compared}
+        found = {name: grids[self.level + more] for more, name in enumerate(("own", "coarse", "coarsest"))}
+        origin = {"smooth": "own", "stiffer": self.asked.compared, "slower": self.asked.compared}
         for name, one in self.parts.items():
             value = one.at(places).values[quantity.name]
             if name in origin:
@@ -242,10 +212,8 @@ class Around:
     def judged(self, quantity: Observable) -> dict[str, Found]:
         """Name -> what each source makes of a quantity on this level."""
         stated = self.solves[self.level].at(self.places()).stated[quantity.name]
-        values, asked = self.values(quantity), replace(self.asked, sharp=True)
-        found = judge(asked, quantity, values, stated)
-        grid = replace(found["grid"], method="cells twice and four times as long", solves=("coarser grids",))
-        return found | {"grid": grid}
+        found = judge(self.asked, quantity, self.values(quantity), stated)
+        return found | {"grid": replace(found["grid"], solves=("coarser grids",))}
 
     def error(self, quantity: Observable, names: Sequence[str] | None = None) -> float:
         """The largest error of the logarithm of a quantity that some sources give together; of all where None."""
@@ -260,63 +228,36 @@ class Around:
         return self.error(quantity, FLOOR)
 
     def missed(self, targets: Mapping[str, float], sources: Sequence[str] | None = None) -> Iterator[str]:
-        """What to tell of each target that is not met: the sources to blame, and what would help.
+        """What to tell of each target that is not met: the sources of its error.
 
         By some sources alone: what no grid can meet.
         """
         where = f"with cells {cells_in_words(self.level)}" if sources is None else "whatever the grid"
         for one in self.quantities:
-            error, wanted = self.error(one, sources), math.log1p(targets.get(one.name, math.inf))
-            if error <= wanted:
+            error, wanted = self.error(one, sources), math.log1p(targets[one.name])
+            if error <= _ROUNDING * wanted:
                 continue
             if math.isinf(error):
                 values = self.values(one)
-                bad = ~np.all([values[name] > 0 for name in ("fine", "own", "coarse")], axis=0) & self.touches
+                bad = ~np.all([values[name] > 0 for name in ("own", "coarse", "coarsest")], axis=0) & self.touches
                 place = AXES[self.grids.own.experiment().axis].place(float(self.places()[bad.argmax()]))
                 yield f"{one.name}: found zero, or less, at {place}: a part of it is no error: expected another number"
                 continue
-            lines = [f"{one.name}: found {percent(wanted)}: its error is {percent(error)} at least, {where}"]
+            lines = [f"{one.name}: found {percent(wanted)}: its error is {percent(error, 3)} at least, {where}"]
             for name, found in self.judged(one).items():
                 part = self.error(one, [name]) if sources is None or name in sources else 0.0
                 if found.half_width is None:
                     lines.append(f"  {name}: open, and not counted: {found.method}")
                 elif part > 0.1 * wanted:
-                    others = math.sqrt(max(error**2 - part**2, 0.0))
-                    room = math.sqrt(wanted**2 - others**2) if others < 0.9 * wanted else wanted * part / error
-                    lines.append(f"  {name}: {percent(part)}{self._help(name, part, room)}")
+                    lines.append(f"  {name}: {percent(part)}")
             yield "\n".join(lines)
-
-    def _help(self, name: str, part: float, room: float) -> str:
-        """What would make an error so small."""
-        if part <= room:
-            return ""
-        asked = self.asked
-        if name == "sample":
-            return f"; {math.ceil((part / room) ** 2)} scans would help"
-        if name == "next octave of waves" and asked.cutoff:
-            wave = asked.cutoff * 2 ** (asked.octaves * room / part)
-            return f"; a scan that holds waves of {unit_for(wave, 'm').text(wave, 2)} would help"
-        known = {"modulus": asked.modulus_error, "time scale": asked.time_scale_error}
-        if error := known.get(name):
-            better = math.expm1(math.log1p(error) * room / part)
-            what = "moduli" if name == "modulus" else "times of the material"
-            return f"; {what} known to {percent(better)} would help (a DMA table)"
-        return ""
-
-    def short_of_time(self, targets: Mapping[str, float], limit: float, wait: float) -> str:
-        """What to tell where the next grid takes longer than the limit. [s]"""
-        needed = f"time: found {limit:g} s: expected some {self.spent + wait:.2g} s at least"
-        if self.level > self.grids.held:
-            held = "the coarsest grid that holds the waves of the surface and what its error is judged by"
-            return f"{needed}, for {held}"
-        return f"{needed}, for the next grid; so far {errors_in_words(self.errors(), targets)}"
 
     def budget(self, quantity: Observable, chosen: Case) -> xr.Dataset:
         """The budget of a quantity on this level."""
         seconds = {name: one.seconds for name, one in self.parts.items()}
         seconds["own"] = self.solves[self.level].seconds
         seconds["coarser grids"] = sum(one.seconds for level, one in self.solves.items() if level != self.level)
-        value, population = self.values(quantity)["fine"], self.asked.population
+        value, population = self.values(quantity)["own"], self.asked.population
         return assembled(chosen, population, quantity, self.judged(quantity), value, self.places(), seconds)
 
 
@@ -332,21 +273,20 @@ def largest_error(judged: Mapping[str, Found], rows: NDArray[np.bool_], names: S
     return math.inf if np.isnan(both).any() else float(both.max())
 
 
-def refusal(case: Case, problems: Sequence[str]) -> InputError:
-    """What is raised where a target cannot be met."""
-    where = f"{case.origin}: " if case.origin else ""
-    return InputError("\n".join(f"{where}want.{one}" for one in problems))
+def refusal(case: Case, targets: Mapping[str, float], problems: Sequence[str]) -> InputError:
+    """Return the error of targets that cannot be met."""
+    where, first = f"{case.origin}: " if case.origin else "", problems[0].partition(":")[0]
+    return InputError("\n".join(f"{where}{one}" for one in problems), key=first, found=targets[first])
 
 
 def errors_in_words(errors: Mapping[str, float], targets: Mapping[str, float]) -> str:
     """Errors of quantities as far as they were found, and what is wanted."""
     told = []
     for name, error in errors.items():
-        wanted = f", wanted {percent(math.log1p(targets[name]))}" if name in targets else ""
-        told.append(f"{name} {percent(error)}{wanted}")
+        told.append(f"{name} {percent(error)}, wanted {percent(math.log1p(targets[name]))}")
     return "; ".join(told)
 
 
-def percent(half: float) -> str:
-    """A half-width of a logarithm in %, or as a factor where it is large."""
-    return f"a factor of {math.exp(half):.2g}" if half > 0.5 else f"±{100 * math.expm1(half):.2g} %"
+def percent(half: float, digits: int = 2) -> str:
+    """Return a half-width of a logarithm in %, or as a factor if it is large."""
+    return f"a factor of {math.exp(half):.2g}" if half > 0.5 else f"±{100 * math.expm1(half):.{digits}g} %"

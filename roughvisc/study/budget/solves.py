@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,7 +110,7 @@ class Bench:
     workers: int | None = 0
     threads: int | None = None
     retry_failed: bool = True
-    what: str = "want"
+    what: str = "run --for"
 
     def solve(self, solves: Mapping[Any, Case], each: float = 0.0) -> dict[Any, Reading]:
         """Name -> what is read off each of some cases; ``each`` is how long one is expected to take. [s]"""
@@ -155,48 +155,21 @@ class Bench:
             yield found
 
 
-@dataclass(frozen=True)
-class Stated:
-    """Errors that a result states, by the name of the quantity; what not all quantities asked for have is left out.
-
-    Attributes
-    ----------
-    result : xarray.Dataset or None
-        The whole result, with the rows that are asked for; None where there is none that would do.
-    grid : mapping
-        Half-width of the logarithm that the grid leaves, at each row. [-]
-    octave : mapping
-        Logarithm of the value over that without the shortest octave of waves, at each row. [-]
-    """
-
-    result: xr.Dataset | None = None
-    grid: Mapping[str, Array] = field(default_factory=dict)
-    octave: Mapping[str, Array] = field(default_factory=dict)
-
-
-def stated_by(path: Path, quantities: Sequence[Observable], axis: str, places: Any) -> Stated:
-    """What the file of a result states, if it is there and has these places of its axis; all rows where None."""
+def finished_result(path: Path, quantities: Sequence[Observable], axis: str, places: Any) -> xr.Dataset | None:
+    """Return the result in a file with these places of its axis, all rows if None; None if it is not there."""
     if not path.is_file():
-        return Stated()
+        return None
     try:
         with open_result(path) as opened:  # without the fields that no quantity is derived from
             needed = {one for quantity in quantities for one in quantity.fields}
             whole = opened.drop_vars([name for name in opened if opened[name].ndim > 2 and name not in needed]).load()
     except (InputError, OSError) as error:
         log.info("budget: %s: %s: the case is solved again", path, error)
-        return Stated()
-    rows = np.arange(whole.sizes[axis])
-    if places is not None:
-        rows = nearest_rows(whole[axis], places)
-        if not np.isclose(whole[axis].values[rows], places, rtol=_ALIKE, atol=0).all():
-            return Stated()
+        return None
     if any(one not in whole for quantity in quantities for one in quantity.fields) or unconverged(whole):
-        return Stated()
-    grid = {one.name: one.stated_grid(whole, axis) for one in quantities}
-    octave = {one.name: one.stated_octave(whole) for one in quantities}
-    known: list[dict[str, Array]] = [
-        {name: one[rows] for name, one in found.items() if one is not None and np.isfinite(one[rows]).all()}
-        for found in (grid, octave)
-    ]
-    grid_of, octave_of = (one if len(one) == len(quantities) else {} for one in known)
-    return Stated(whole.isel({axis: rows}), grid_of, octave_of)
+        return None
+    if places is None:
+        return whole
+    rows = nearest_rows(whole[axis], places)
+    same = np.isclose(whole[axis].values[rows], places, rtol=_ALIKE, atol=0).all()
+    return whole.isel({axis: rows}) if same else None

@@ -8,25 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.fit import AnyFit
-from roughvisc.mechanics.materials.frequency import complex_compliance
-from roughvisc.mechanics.materials.spectrum import lattice
-from roughvisc.study.budget.solves import Array, Stated
+from roughvisc.study.budget.solves import Array
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
 from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.schema.evaluation import KNOWN
 from roughvisc.units import stated_quantity, unit_for
 
 Population = Literal["patch", "ensemble"]
-#: Of two grids: the power with which the error of the grid is taken to vanish, and Roache's factor.
-_ORDER, _TWO_GRIDS = 1.5, 3.0
+#: Power with which the error of the grid is taken to vanish.
+_ORDER = 1.5
 #: Of six patches: of the standard deviation of the logarithm, what holds the mean of all in 95 of 100. Student has
 #: 2.57; the patches have the spectrum of the one that was measured, whose longest waves scatter too.
 _SAMPLE = 3.3
@@ -36,12 +32,6 @@ SURROGATES = tuple(f"patch {number}" for number in range(1, PATCHES + 1))
 _SAME = 1.15
 #: Of the contact area where it slides, what the next octave changes over what the last one did.
 _SLIDING_OCTAVE = 2.0
-#: Instants in a decade at which the error of a fit is looked at, and how far beyond the measured times it is taken.
-_INSTANTS, _BEYOND = 10, 3.0
-#: Of the whole time: what a place at its beginning asks for.
-_AT_ONCE = 1e-9
-#: Fewer waves than these: the number hangs on the few that the patch happens to hold.
-_FEW_WAVES = 30.0
 
 
 @dataclass(frozen=True)
@@ -52,53 +42,35 @@ class Asked:
     ----------
     variants : Variants
         The case and its relatives.
-    sharp : bool
-        Whether a grid twice as fine is computed, and gives the value.
     modulus_error, time_scale_error : float or None
         Relative errors of the material, at 95 %.
     cutoff : float or None
         Wavelength of the shortest waves that the real surface has. [m]
     population : {"patch", "ensemble"}
         Whether the number is of this patch, or of the roughness that it is a sample of.
-    stated : Stated
-        What a result of the case states already.
     """
 
     variants: Variants
-    sharp: bool = False
     modulus_error: float | None = None
     time_scale_error: float | None = None
     cutoff: float | None = None
     population: Population = "patch"
-    stated: Stated = field(default_factory=Stated)
 
     def solves(self) -> dict[str, Case]:
         """Name -> case of every solve that the sources need; ``own`` is the case itself."""
         variants, found = self.variants, {"own": self.variants.case, "coarse": self.variants.on_cells(2.0)}
         compared = found[self.compared]
-        stiffened = bool(self.modulus_error or self.fits)
-        if self.sharp:
-            found["fine"] = variants.on_cells(0.5)
-        elif self.stated.grid:
-            if not (variants.is_rough and (stiffened or self.time_scale_error or self.draws)):
-                del found["coarse"]
-        elif not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
+        if not variants.is_rough:  # two grids may agree by chance; a third one of a rough surface is another surface
             found["coarsest"] = variants.on_cells(4.0)
-        if stiffened:
+        if self.modulus_error:
             found["stiffer"] = stiffer(compared)
         if self.time_scale_error:
             found["slower"] = slower(compared)
-        if self.octaves > 0 and (self.sharp or not self.stated.octave):
-            found["smooth"] = variants.without_last_octave(found["fine" if self.sharp else "own"])
+        if self.octaves > 0:
+            found["smooth"] = variants.without_last_octave(variants.case)
         if self.draws:
             found |= {name: variants.other_patch(number) for number, name in enumerate(SURROGATES, 1)}
         return found
-
-    @property
-    def fits(self) -> list[AnyFit]:
-        """Of the materials that were fitted to a measurement, what that leaves unknown."""
-        found = (getattr(material, "fit", None) for material in self.variants.case.body().materials)
-        return [one for one in found if one is not None]
 
     @property
     def draws(self) -> bool:
@@ -118,14 +90,12 @@ class Asked:
         return math.log2(self.variants.shortest_wave / self.cutoff)
 
 
-def stated_errors(case: Case) -> dict[str, Any]:
-    """What the study of a case knows of errors."""
-    want = case.settings.want
-    return {} if want is None else want.model_dump(include=set(KNOWN), exclude_none=True)
+#: Names of the errors that a user knows.
+KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
 
 
-def known_errors(case: Case, given: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of the errors of a case's numbers: as given, else as its study states it.
+def known_errors(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the errors that a user states, checked and in SI.
 
     Raises
     ------
@@ -136,13 +106,13 @@ def known_errors(case: Case, given: Mapping[str, Any]) -> dict[str, Any]:
     for name in ("modulus_error", "time_scale_error"):
         value = known.get(name, 0.0)
         if not (isinstance(value, int | float) and 0 <= value < 1):
-            raise InputError(f"{name} is {value!r}: expected a relative error, at least 0 and below 1")
+            raise InputError(key=name, found=value, expected="a relative error, at least 0 and below 1")
     if "cutoff" in known:
         known["cutoff"] = stated_quantity(known["cutoff"], "m", "cutoff", above=0)
-    found: dict[str, Any] = {"population": "patch"} | stated_errors(case) | known
+    found: dict[str, Any] = {"population": "patch"} | known
     if found["population"] not in get_args(Population):
         expected = " or ".join(map(repr, get_args(Population)))
-        raise InputError(f"population is {found['population']!r}: expected {expected}")
+        raise InputError(key="population", found=found["population"], expected=expected)
     return found
 
 
@@ -211,18 +181,12 @@ def _time_and_solver(asked: Asked, quantity: Observable, values: Values, stated:
 
 
 def _grid(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
-    if asked.stated.grid and not asked.sharp:
-        return Found(asked.stated.grid[quantity.name], "cells twice and four times as long, as the result states")
     coarse = np.abs(_apart(values, "own", "coarse"))
-    if not asked.sharp:
-        solves, words = ("coarse",), "cells twice as long"
-        if "coarsest" in values:
-            coarse = np.maximum(coarse, np.abs(_apart(values, "coarse", "coarsest")) / 2**_ORDER)
-            solves, words = ("coarse", "coarsest"), "cells twice and four times as long"
-        return Found(_TWO_GRIDS * coarse / (2**_ORDER - 1), words, solves=solves)
-    fine = np.abs(_apart(values, "fine", "own"))
-    half = quantity.grid_factor * np.maximum(fine, coarse / 4)
-    return Found(half, "cells half and twice as long; the value is of the former", solves=("coarse", "fine"))
+    solves, words = ("coarse",), "cells twice as long"
+    if "coarsest" in values:
+        coarse = np.maximum(coarse, np.abs(_apart(values, "coarse", "coarsest")) / 2**_ORDER)
+        solves, words = ("coarse", "coarsest"), "cells twice and four times as long"
+    return Found(quantity.grid_factor * coarse, words, solves=solves)
 
 
 def _sample(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
@@ -246,29 +210,12 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array
         return Found(None, "state cutoff, the shortest wavelength that the real surface has")
     if not asked.octaves:
         return Found(0.0, f"the grid holds all waves down to {_length(asked.cutoff)}")
-    stated = asked.stated.octave and not asked.sharp
-    change = (
-        asked.stated.octave[quantity.name] if stated else _apart(values, "fine" if asked.sharp else "own", "smooth")
-    )
+    change = _apart(values, "own", "smooth")
     factor = quantity.octave_factor
     if asked.variants.case.experiment().largest_speed > 0 and quantity.name == "contact_area":
         factor = _SLIDING_OCTAVE
-    words = "what the shortest octave adds, as the result states" if stated else "without the shortest octave"
-    words += f"; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
-    solves = () if stated else ("smooth",)
-    return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), solves)
-
-
-def _longest_waves(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
-    if not asked.variants.is_rough:
-        return _no_source("the surface is no sample of a roughness")
-    count = asked.variants.number_of_waves
-    if not quantity.of_longest_waves or count >= _FEW_WAVES:
-        return _no_source(f"{count:.0f} waves carry the height")
-    words = f"{count:.2g} waves carry the height (below {_FEW_WAVES:.0f})"
-    if asked.population == "patch":
-        return _no_source(f"{words}: the number is of this patch alone")
-    return Found(None, f"{words}, so that it depends on the size of the scan: scan a larger patch")
+    words = f"without the shortest octave; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
+    return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), ("smooth",))
 
 
 def _modulus(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
@@ -283,58 +230,6 @@ def _time_scale(asked: Asked, quantity: Observable, values: Values, stated: Arra
     if asked.time_scale_error is None:
         return Found(None, "state time_scale_error, the relative error of the times of the material")
     return _of_material(asked, asked.time_scale_error, "slower", "times of the material", values)
-
-
-def _material_fit(asked: Asked, quantity: Observable, values: Values, stated: Array) -> Found:
-    """By the largest error of the modulus over the times that a place asks for, and the change by the modulus."""
-    fits = asked.fits
-    if not fits:
-        return _no_source("the material is given by its parameters")
-    intervals = _times(asked.variants, values["own"].size)
-    errors, outside = np.zeros(values["own"].shape), np.zeros(values["own"].shape, bool)
-    of_loss = np.zeros_like(errors)
-    over = [lattice(shortest, longest, _INSTANTS) for shortest, longest in intervals]
-    for fit in fits:  # of a layer and its base: as if each ruled
-        first, last = fit.span()
-        errors = np.maximum(errors, [float(np.max(fit.error(one))) for one in over])
-        if quantity.name == "friction_coefficient":  # in proportion to the loss
-            of_loss = np.maximum(of_loss, [float(np.max(fit.error(one, _loss))) for one in over])
-        outside |= (intervals[:, 0] < first / _BEYOND) | (intervals[:, 1] > last * _BEYOND)
-    if np.isnan(errors).any():
-        return Found(None, "too few rows of the measurement to leave some out: measure more")
-    reach = " to ".join(unit_for(one, "s").text(one, 2) for one in fits[0].span())
-    if outside.all():
-        return Found(None, f"the measurement covers {reach}, and not the times that matter here: extend it")
-    words = f"rows of the measurement left out in turn: {100 * errors.max():.2g} % of the modulus"
-    words += f", {100 * of_loss.max():.2g} % of the loss" if of_loss.any() else ""
-    if outside.any():
-        words += f"; {outside.sum()} of {outside.size} places need times beyond {reach}"
-    slope = np.abs(_apart(values, "stiffer", asked.compared)) / math.log(STEP)
-    return Found(np.hypot(np.log1p(errors) * slope, np.log1p(of_loss)), words, solves=("stiffer",))
-
-
-def _loss(material: Any, times: Array) -> Array:
-    """What a material loses in oscillations of such periods over 2 pi: the imaginary part of its compliance. [1/Pa]"""
-    return -complex_compliance(material, 1 / times).imag
-
-
-def _times(variants: Variants, places: int) -> Array:
-    """First and last of the times that each place of a case asks of its material. [s]
-
-    Nine tenths of what has crept at a time did so within its last decade. At a speed: those in which the waves pass.
-    """
-    case, experiment = variants.case, variants.case.experiment()
-    times, end = case.solving().times, experiment.creep_time(1.0)
-    if experiment.axis == "speed":
-        waves = np.array([variants.shortest_wave, max(float(np.ptp(variants.height[axis].values)) for axis in "xy")])
-        speeds = np.array(getattr(experiment, "asked", experiment.largest_speed), dtype=float)
-        found = waves / (2 * math.pi * np.atleast_1d(speeds)[:, None])
-    else:
-        known = np.maximum(times if isinstance(times, tuple) else [end], _AT_ONCE * end)
-        found = np.column_stack([known / 10, known])
-    if len(found) != places:  # as where all steps are kept
-        found = np.array([[found[:, 0].min(), found[:, 1].max()]])
-    return np.broadcast_to(found, (places, 2))
 
 
 def _of_material(asked: Asked, error: float, solve: str, what: str, values: Values) -> Found:
@@ -358,10 +253,8 @@ SOURCES: dict[str, Callable[[Asked, Observable, Values, Array], Found]] = {
     "grid": _grid,
     "sample": _sample,
     "next octave of waves": _next_octave,
-    "longest waves": _longest_waves,
     "modulus": _modulus,
     "time scale": _time_scale,
-    "material fit": _material_fit,
 }
 
 

@@ -1,4 +1,4 @@
-"""``choose``: the grid and the tolerance that give a number as accurately as it is wanted, or as time allows.
+"""``choose``: the grid and the tolerance that give a number as accurately as it is wanted.
 
 Grids are computed from coarse to fine, until the error of the grid fits into what the other sources leave of the
 target. Those sources, the floor, are judged first, on the coarsest grid that holds the waves of the surface.
@@ -10,8 +10,7 @@ import logging
 import math
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,27 +25,24 @@ from roughvisc.study.budget.grids import (
     FLOOR,
     RULED,
     Around,
-    draws_others,
     errors_in_words,
     first_grids,
     percent,
     refusal,
 )
-from roughvisc.study.budget.population import OfPopulation, mean_of_population
 from roughvisc.study.budget.solves import FOLDER, Bench
-from roughvisc.study.budget.sources import stated_errors
-from roughvisc.study.execution.cluster import default_client, local_client
+from roughvisc.study.budget.sources import KNOWN, known_errors
+from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.monitor import Monitor, watcher
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.single import run_stated
-from roughvisc.study.quantities import known_quantity
-from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.evaluation import BEST, WANTED
+from roughvisc.study.quantities import QUANTITIES, known_quantity
+from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.schema.section import nearest
 from roughvisc.study.storage.files import atomic_write, require_writable
 from roughvisc.study.storage.store import result_path, write_dataset
 from roughvisc.study.trade.ladder import format_tolerance
-from roughvisc.units import is_quantity
+from roughvisc.units import is_quantity, stated_quantity
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -73,14 +69,8 @@ class Choice:
     budgets: dict[str, xr.Dataset]
 
 
-def wanting(case: Case, want: Mapping[str, Any]) -> Case:
-    """A case of which other numbers are wanted; what its study knows of errors is kept unless it is given.
-
-    Parameters
-    ----------
-    case : Case
-    want : mapping
-        Keys and values as ``[want]`` of a study has them.
+def targets_of(want: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, Any]]:
+    """Return the wanted error of each number, and the errors that are known.
 
     Raises
     ------
@@ -88,13 +78,24 @@ def wanting(case: Case, want: Mapping[str, Any]) -> Case:
         If a key or a value is none of those expected.
     """
     if not isinstance(want, Mapping):
-        raise InputError(f"want is {want!r}: expected a dictionary such as {{'contact_area': '1 %'}}")
-    changed = vary(case, {"want": stated_errors(case) | dict(want)})
-    return replace(changed, varied=case.varied, written=case.written)
+        raise InputError(key="want", found=want, expected="a dictionary such as {'contact_area': '1 %'}")
+    targets = {}
+    for name, value in want.items():
+        if name not in (*QUANTITIES, *KNOWN):
+            raise InputError(key="want", found=name, expected=f"some of {', '.join((*QUANTITIES, *KNOWN))}")
+        if name in QUANTITIES:
+            targets[name] = stated_quantity(value, "1", f"want.{name}", above=0, below=1)
+    if not targets:
+        raise InputError(key="want", found=dict(want), expected="a target such as {'contact_area': '1 %'}")
+    known = {name: value for name, value in want.items() if name in KNOWN}
+    for name in ("modulus_error", "time_scale_error"):
+        if known.get(name) is not None:
+            known[name] = stated_quantity(known[name], "1", name)
+    return targets, known_errors(known)
 
 
 def parse_targets(texts: Sequence[str]) -> dict[str, str]:
-    """Keys and values of ``[want]`` from targets of ``--for`` such as ``1 % friction_coefficient`` and ``60 s``.
+    """Return number -> wanted error from targets of ``--for`` such as ``1 % friction_coefficient``.
 
     Raises
     ------
@@ -103,46 +104,35 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
 
     Examples
     --------
-    >>> parse_targets(["1 % mean_gap", "60 s"])
-    {'mean_gap': '1 %', 'time': '60 s'}
-    >>> parse_targets(["2 min contact_area"])
-    {'time': '2 min', 'contact_area': 'best'}
+    >>> parse_targets(["1 % mean_gap"])
+    {'mean_gap': '1 %'}
     """
     found: dict[str, str] = {}
     for text in texts:
-        amount, _, name = (text, "", "") if _is_time(text) else text.strip().rpartition(" ")
-        if not _is_time(amount) and not (name.isidentifier() and is_quantity(amount, "1")):
-            raise InputError(f"--for: found {text!r}: expected a target such as '1 % {WANTED[0]}', or '60 s'")
-        if name and name not in WANTED:
-            raise InputError(f"--for: found {text!r}: {name!r} is no number that a budget knows{nearest(name, WANTED)}")
-        keys = ["time", name] if _is_time(amount) else [name]
-        for key, value in zip(filter(None, keys), (amount, BEST), strict=False):
-            if value != BEST and found.get(key, BEST) != BEST:
-                raise InputError(f"--for: found {text!r} beside another target for {key}: expected one")
-            found[key] = found.get(key, value) if value == BEST else value
+        amount, _, name = text.strip().rpartition(" ")
+        if not (name.isidentifier() and is_quantity(amount, "1")):
+            raise InputError(key="--for", found=text, expected="a target such as '1 % contact_area'")
+        if name not in QUANTITIES:
+            raise InputError(key="--for", found=text, expected=f"a number of a budget{nearest(name, [*QUANTITIES])}")
+        if name in found:
+            raise InputError(key="--for", found=text, expected=f"one target for {name}")
+        found[name] = amount
     return found
-
-
-def _is_time(text: str) -> bool:
-    return is_quantity(text, "s") and not is_quantity(text, "1")
 
 
 def run(
     case: Case,
     out: str | Path | None = None,
     *,
-    want: Mapping[str, Any] | None = None,
+    want: Mapping[str, Any],
     progress: bool = True,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Result of the case that is chosen for what is wanted of another; see :func:`roughvisc.run`."""
-    if want is not None:
-        case = wanting(case, want)
-    if not case.is_to_be_chosen:
-        raise InputError(f"want is {want!r}: expected a target such as {{'contact_area': '1 %'}} or {{'time': '60 s'}}")
+    """Return the result of the case that is chosen for wanted errors; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
     choice = choose(
         case,
+        want,
         folder,
         watch=partial(watcher, progress, summary=False),
         tell=log.info,
@@ -157,6 +147,7 @@ def run(
 
 def choose(
     case: Case,
+    want: Mapping[str, Any],
     folder: Path,
     *,
     watch: Callable[[], Monitor],
@@ -165,12 +156,15 @@ def choose(
     workers: int | None = 0,
     threads: int | None = None,
 ) -> Choice:
-    """Choose grid and tolerance for what is wanted of a case, and bring the case so chosen to its file.
+    """Choose grid and tolerance for wanted errors, and write the result of the chosen case.
 
     Parameters
     ----------
     case : Case
-        One that states a target.
+        Case whose grid and tolerance are changed.
+    want : mapping
+        Number -> wanted relative error at 95 % [-]; also the errors that are known, as :func:`roughvisc.budget` takes
+        them.
     folder : Path
         Of its results. The solves go to its folder ``budget``, and are used again.
     watch : callable
@@ -183,77 +177,58 @@ def choose(
     Raises
     ------
     InputError
-        If the target cannot be met: the message says how accurate the number is at best, by which sources, and what
-        would help.
+        If a target is none, or cannot be met: the message says how accurate the number is at best, and by which
+        sources.
     """
-    want = case.settings.want
-    targets, limit = want.targets(), want.time or math.inf
-    main = "friction_coefficient" if case.experiment().largest_speed > 0 else "contact_area"
-    quantities = [known_quantity(name, case) for name in want.numbers() or [main]]
+    targets, known = targets_of(want)
+    quantities = [known_quantity(name, case) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
     bench = Bench(quantities, folder / FOLDER, watch, tell, client, workers, threads)
 
-    around = first_grids(case, bench, targets, limit).with_changed_cases()
+    around = first_grids(case, known, bench, targets).with_changed_cases()
     if told := list(around.missed(targets, FLOOR)):
-        raise refusal(case, told)
-    found: Around | OfPopulation
-    if draws_others(case):
-        workers = workers if client is None else None
-        with local_client(workers) if workers else nullcontext(client) as there:
-            found = mean_of_population(replace(around, bench=replace(bench, client=there)), targets, limit)
-    else:
-        found = _refined(around, targets, limit)
+        raise refusal(case, targets, told)
+    around = _refined(around, targets)
 
-    chosen = around.grids.case(found.level)
+    chosen = around.grids.case(around.level)
     bench.solve({"own": chosen})
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
             shutil.copyfile(result_path(bench.folder, chosen.key), temporary)
-    budgets = {one.name: found.budget(one, chosen) for one in quantities}
-    return Choice(chosen, tuple(_reasons(around, found, targets, limit)), budgets)
+    budgets = {one.name: around.budget(one, chosen) for one in quantities}
+    return Choice(chosen, tuple(_reasons(around, targets)), budgets)
 
 
-def _refined(around: Around, targets: Mapping[str, float], limit: float) -> Around:
-    """The solves around the first grid that meets the targets, or without one around the finest in the time.
+def _refined(around: Around, targets: Mapping[str, float]) -> Around:
+    """Return the solves around the first grid that meets the targets.
 
     Raises
     ------
     InputError
-        If no grid meets the targets, or none in the time. [s]
+        If no grid meets the targets.
     """
     while True:
         around.bench.tell(f"{around.grids.words(around.level)}: {errors_in_words(around.errors(), targets)}")
         missed = list(around.missed(targets))
-        if targets and not missed:
+        if not missed:
             return around
         if around.level == FINEST + 1:  # the next grid is the last one
             missed = list(around.if_next_were_the_same().missed(targets))
         if missed and around.level <= FINEST + 1:
-            raise refusal(around.grids.own, missed)
-        if around.level == FINEST:
-            return around
-        wait = around.seconds_of_next()
-        if around.spent + wait > limit:
-            if targets:
-                raise refusal(around.grids.own, [around.short_of_time(targets, limit, wait)])
-            return around
+            raise refusal(around.grids.own, targets, missed)
         around = around.finer()
 
 
-def _reasons(around: Around, found: Around | OfPopulation, targets: Mapping[str, float], limit: float) -> Iterator[str]:
-    """What was chosen, and why."""
+def _reasons(around: Around, targets: Mapping[str, float]) -> Iterator[str]:
+    """Yield what was chosen, and why."""
     grids = around.grids
-    yield f"grid: {grids.words(found.level)}"
-    if isinstance(found, OfPopulation):
-        yield found.draws()
-    for one in found.quantities:
-        parts = f"{percent(found.error(one, RULED))} by grid and solver, {percent(found.floor(one))} by all else"
-        if isinstance(found, OfPopulation):
-            parts += f", {percent(found.error(one, ['sample']))} by the draws"
-        yield f"{errors_in_words({one.name: found.error(one)}, targets)}: {parts}"
+    yield f"grid: {grids.words(around.level)}"
+    for one in around.quantities:
+        parts = f"{percent(around.error(one, RULED))} by grid and solver, {percent(around.floor(one))} by all else"
+        yield f"{errors_in_words({one.name: around.error(one)}, targets)}: {parts}"
     tolerance = grids.variants.case.settings.solve.tolerance
-    least = FIFTH * min(targets.values(), default=0.0)
+    least = FIFTH * min(targets.values())
     why = {
         tolerance > least: "that of the study",
         tolerance < least: "since steps and solver take more of some numbers",
@@ -262,9 +237,6 @@ def _reasons(around: Around, found: Around | OfPopulation, targets: Mapping[str,
         tolerance == AMPLE: "ample for what is wanted",
     }
     yield f"tolerance: {format_tolerance(tolerance)}, {why[True]}"
-    if math.isfinite(limit):
-        more = found.seconds_of_next()
-        yield f"time: {found.spent:.2g} s of {limit:g} s; the next grid would take some {more:.2g} s"
-    judged = found.judged(found.quantities[0])
+    judged = around.judged(around.quantities[0])
     if unknown := [name for name, one in judged.items() if one.half_width is None]:
         yield f"open, and not counted: {', '.join(unknown)}"

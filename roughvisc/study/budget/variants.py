@@ -50,30 +50,16 @@ class Variants:
         return stands_for_more and bool(np.isfinite(self.height.values).all())
 
     @cached_property
-    def _waves(self) -> tuple[Any, Any, Any]:
-        """Length of each stored wavevector [rad/m], its power [m2], and how many modes it stands for."""
-        level = self.height.values - float(self.height.mean())
-        q_x, q_y, power, count = modes(level, spacing(self.height), "forward")
-        return np.hypot(q_x, q_y), power, count
-
-    @cached_property
     def shortest_wave(self) -> float:
         """Wavelength above which 99 % of the mean square slope lie, at least two cells; zero without slopes. [m]
 
         Two cells: the grid holds shorter waves along its diagonals alone.
         """
-        q, power, count = self._waves
+        level = self.height.values - float(self.height.mean())
+        q_x, q_y, power, count = modes(level, spacing(self.height), "forward")
+        q = np.hypot(q_x, q_y)
         begins = last_octave(q, count * power * q**2)
         return max(math.pi / begins, 2 * max(spacing(self.height))) if begins else 0.0
-
-    @cached_property
-    def number_of_waves(self) -> float:
-        """How many waves carry the height, if their amplitudes are Gaussian; of mirror images one of four counts."""
-        q, power, count = self._waves
-        power = np.where(q > 0, power, 0.0)
-        squares = float(np.sum(count * power**2))
-        images = 4 if self.case.settings.surface.mirror else 1
-        return float(np.sum(count * power)) ** 2 / squares / images if squares > 0 else 0.0
 
     def on_cells(self, coarsening: float) -> Case:
         """The same waves on cells so many times longer; a half: on cells half as long."""

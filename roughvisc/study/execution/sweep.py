@@ -92,8 +92,6 @@ def sweep(
         cases = read_cases(cases)
     if not cases:
         raise InputError("cases is empty: expected at least one case")
-    if any(case.is_to_be_chosen for case in cases):
-        raise InputError("want: found a target in a sweep: expected one case, as of rv.run(case, want=...)")
     folder = result_folder(cases[0], out, to_write=False).absolute()
     if client is None and workers is None:
         client = default_client()

@@ -61,9 +61,6 @@ def report(path: Path | None, lines: Sequence[str]) -> str:
     return "\n".join([f"{name}: {len(lines)} problems", *(indent(one, "  ") for one in lines)])
 
 
-#: Tables that no result depends on, and what their values are.
-_NO_RESULT = {"observe": "observed", "want": "wanted"}
-
 __all__ = ["Case", "read_cases", "read_study", "study_schema", "vary"]
 
 
@@ -186,11 +183,6 @@ class Case:
         """How it is computed and what is kept, as the solver takes it."""
         return self.settings.solving()
 
-    @property
-    def is_to_be_chosen(self) -> bool:
-        """Whether its study states how accurate a number is wanted, so that grid and tolerance are to be chosen."""
-        return self.settings.want is not None and self.settings.want.chooses
-
     def _repr_html_(self) -> str:
         stated = _dump(self.settings)
         surface = stated["surface"]
@@ -288,9 +280,8 @@ def read_cases(path: str | Path) -> list[Case]:
     try:
         changes = with_realisations(expand(with_files(data.pop("sweep", {}), path.parent)), data, path.parent)
         for key in dict.fromkeys(key for change, _ in changes for key in change):
-            table = key.partition(".")[0]
-            if table in _NO_RESULT:
-                found = f"what is {_NO_RESULT[table]} changes no result: expected one value, in [{table}]"
+            if key.startswith("observe"):
+                found = "what is observed changes no result: expected one value, in [observe]"
                 raise InputError(f"sweep: {key}: cannot be varied: {found}")
     except InputError as error:
         raise error.prefixed(str(path)) from error

@@ -48,7 +48,7 @@ def identity(settings: Study) -> tuple[str, str]:
     """
     stated = settings.model_dump(
         mode="json",
-        exclude={"title", "audit", "observe", "want", "program", "surface", "material", *EXPERIMENTS},
+        exclude={"title", "audit", "observe", "program", "surface", "material", *EXPERIMENTS},
         serialize_as_any=True,
     )
     for table, section in (("solve", settings.solve), ("keep", settings.keep)):

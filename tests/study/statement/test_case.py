@@ -471,7 +471,7 @@ hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
 title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
 | 2 problems
 | - solve.boundary: found 'periodc': expected 'auto' or 'free' or 'periodic'; did you mean 'periodic'?
-| - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit, want
+| - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit
 
 [surface]  =>  [keep]\nfields = ['presure']\n[surface]
 | keep.fields: found 'presure', which is not a field; did you mean 'pressure'?

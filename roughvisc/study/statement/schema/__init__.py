@@ -12,7 +12,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection, WantSection
+from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection
 from roughvisc.study.statement.schema.experiments import ExperimentSection, FrictionSection
 from roughvisc.study.statement.schema.material import AnyMaterial
 from roughvisc.study.statement.schema.program import AnySegment
@@ -70,7 +70,6 @@ class Study(Section):
     keep: KeepSection = KeepSection()
     observe: nullable(ObserveSection) = Field(None, description="a table")
     audit: nullable(AuditSection) = None
-    want: nullable(WantSection) = None
 
     def loading(self) -> Program:
         """The program as the solver takes it.

@@ -1,18 +1,17 @@
-"""``[observe]``, ``[audit]``, ``[want]``: what is made of results. They change no result, and no case's key."""
+"""``[observe]``, ``[audit]``: what is made of results. They change no result, and no case's key."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import Field, WithJsonSchema, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.observables.resistivity import WANTED as RESISTIVITIES
 from roughvisc.observables.resistivity import Kind, resistivities
-from roughvisc.study.statement.schema.section import Section, choice, literal_or, measured, nullable, refuse
-from roughvisc.study.statement.schema.surface import LENGTH
+from roughvisc.study.statement.schema.section import Section, choice, measured, nullable, refuse
 
 
 class Observable(Section):
@@ -121,59 +120,3 @@ AuditSection: type[Section] = create_model(
     __doc__=_Stated.__doc__,
     **{key: (nullable(kind), None) for key, kind in _KINDS.items()},
 )
-
-
-#: What is known of the errors of numbers.
-KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
-#: In place of an error: the smallest that the time allows.
-BEST = "best"
-_ERROR = literal_or(
-    BEST, measured("1", above=0, below=1), "'best', or a part of one above 0 and below 1, such as '1 %'"
-)
-_SHARE = Annotated[
-    measured("1", least=0, below=1),
-    WithJsonSchema({"type": ["number", "string"]}),
-    Field(description="a part of one, at least 0 and below 1, such as '10 %'"),
-]
-
-
-class WantSection(Section):
-    """How accurate numbers are wanted, and what is known of their errors."""
-
-    contact_area: nullable(_ERROR) = None
-    mean_gap: nullable(_ERROR) = None
-    approach: nullable(_ERROR) = None
-    force: nullable(_ERROR) = None
-    friction_coefficient: nullable(_ERROR) = None
-    leak_rate: nullable(_ERROR) = None
-    thermal_conductance: nullable(_ERROR) = None
-    incremental_stiffness: nullable(_ERROR) = None
-    time: nullable(measured("s", above=0)) = None
-    modulus_error: nullable(_SHARE) = None
-    time_scale_error: nullable(_SHARE) = None
-    cutoff: nullable(LENGTH) = None
-    population: nullable(choice("patch", "ensemble")) = None
-
-    def numbers(self) -> list[str]:
-        """Those that are wanted."""
-        return [name for name in WANTED if getattr(self, name) is not None]
-
-    def targets(self) -> dict[str, float]:
-        """Number -> relative error that is wanted of it, at 95 %, where one is stated."""
-        return {name: found for name in self.numbers() if (found := getattr(self, name)) != BEST}
-
-    @property
-    def chooses(self) -> bool:
-        """Whether grid and tolerance are to be chosen."""
-        return bool(self.numbers() or self.time)
-
-    @model_validator(mode="after")
-    def _best_in_a_time(self) -> WantSection:
-        for name in self.numbers():
-            if getattr(self, name) == BEST and self.time is None:
-                raise refuse(name, f"found {BEST!r} without a time: expected time = '60 s' or the like beside it")
-        return self
-
-
-#: Numbers whose whole error is known, as the budget knows them.
-WANTED = tuple(name for name in WantSection.model_fields if name not in (*KNOWN, "time"))

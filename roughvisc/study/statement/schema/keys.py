@@ -36,7 +36,6 @@ _TABLES = {
     "LeakageTable": ("observe.leakage",),
     "ConductanceTable": ("observe.conductance",),
     "AuditSection": ("audit",),
-    "WantSection": ("want",),
 }
 
 
@@ -151,7 +150,7 @@ def study_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(study_schema()["properties"])
-    ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title', 'want']
+    ['audit', 'friction', 'keep', 'material', 'observe', 'program', 'solve', 'surface', 'sweep', 'title']
     >>> study_schema()["$defs"]["SolveSection"]["properties"]["edge"]["description"].partition(";")[0]
     'whether contact may reach the border in free space: the scan outline is then treated as a punch'
     """
