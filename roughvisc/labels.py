@@ -14,7 +14,7 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
 from roughvisc.variables import FLAGS, VARIABLES, Variable
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.axes import AXES, ROW, ROWS, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,7 +81,7 @@ def _flags(name: str) -> dict[str, Any]:
 
 
 def describe(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset of derived variables alone, with the declared attributes and no others.
+    """Dataset of derived variables alone, with the declared attributes and no others; missing after a case's last row.
 
     Parameters
     ----------
@@ -96,6 +96,8 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
         If a variable's dimensions do not end in the declared ones.
     """
     described = dataset.copy()
+    if ROW in described.dims and (axis := axis_of(described.variables)) in described.coords:
+        described = described.where(described[axis].notnull())
     for name, variable in described.variables.items():
         if name in described.coords and (name not in VARIABLES or name not in described.dims):
             continue
@@ -121,6 +123,13 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
 def warnings_text(warnings: Mapping[str, str]) -> str:
     """Return the attribute that states some warnings, one per line; empty ones are left out."""
     return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
+
+
+def own_rows(case: xr.Dataset) -> xr.Dataset:
+    """Return one case of a sweep over its own times or speeds, without rows after its last."""
+    if ROW not in case.dims:
+        return case
+    return case.isel({ROW: slice(int(case[ROWS]))}).swap_dims({ROW: axis_of(case.variables)})
 
 
 def expect_history(dataset: xr.Dataset) -> None:
@@ -156,7 +165,11 @@ def _same_unit(found: str, declared: str) -> bool:
 
 def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
     """What is declared of a variable over its axis, if its dimensions are those."""
-    known = AXES[axis_of(dims)].variables
+    axis = axis_of(dims)
+    if ROW in dims:  # of cases over one axis, which the dimension does not name
+        axis = next((one.name for one in AXES.values() if name in one.variables), axis)
+        dims = tuple(axis if dim == ROW else dim for dim in dims)
+    known = AXES[axis].variables
     if name not in known:
         raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
     declared = known[name]

@@ -94,6 +94,8 @@ def leakage(
     turned = cells if along == "x" else cells[::-1]
 
     def measure(field):
+        if np.isnan(field).all():  # after the last row of a case of a sweep
+            return (np.array([np.nan, np.nan, np.nan, 0]), field, field) if flow else np.array([np.nan] * 3 + [0])
         found = _flow(field, turned, wrap)
         numbers = np.array([found.conductance, found.lower, found.upper, _status(found)])
         return (numbers, *fluxes(field, turned, found.pressure, wrap=wrap)) if flow else numbers

@@ -69,6 +69,8 @@ class Axis:
         return [name for name, one in self.variables.items() if one.in_table == which]
 
 
+#: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
+ROW, ROWS = "row", "rows"
 #: Name of an axis -> what is said of it.
 AXES: dict[str, Axis] = {}
 

@@ -145,7 +145,7 @@ class Plan(xr.Dataset):
             values = (_text(float(one[name]), unit) for name, unit in _COLUMNS.values())
             given = (_varied(one[name]) for name in varied)
             rows.append(
-                (str(number + 1), *given, f"{int(one.cells_x)} x {int(one.cells_y)}", *values, str(one.refusal.values))
+                (str(number), *given, f"{int(one.cells_x)} x {int(one.cells_y)}", *values, str(one.refusal.values))
             )
         if (more := self.sizes["case"] - _SHOWN) > 0:
             rows.append(("...", f"{more} more"))

@@ -22,10 +22,8 @@ from roughvisc.study.storage.store import no_results, read_variable
 from roughvisc.study.storage.sweep_cases import SweepCase, read_sweep, sweep_cases
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import AXES
+from roughvisc.variables.axes import AXES, ROW, ROWS
 
-#: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
-ROW, ROWS = "row", "rows"
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
 #: Attributes that all results of a sweep share.

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
+from roughvisc.labels import own_rows
 from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
 from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
@@ -191,7 +192,8 @@ def _as_cases(results) -> dict[str, xr.Dataset]:
     """Results by the label each has in the legend."""
     if isinstance(results, xr.Dataset):
         if "case" in results.dims:
-            return {_case_name(results, number): results.isel(case=number) for number in range(results.sizes["case"])}
+            numbers = range(results.sizes["case"])
+            return {_case_name(results, number): own_rows(results.isel(case=number)) for number in numbers}
         results = [results]
     if isinstance(results, Mapping):
         return {str(label): dataset for label, dataset in results.items()}

@@ -16,7 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units, expect_history
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import OTHER_DIMS
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.axes import AXES, ROW, axis_of
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:
@@ -30,7 +30,8 @@ def require(dataset: xr.Dataset, *names: str) -> None:
         names = (axis, *names)
     extra = [dim for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]
     if extra:
-        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
+        how = "rv.open_result(path)" if extra[0] == ROW else f"ds.isel({extra[0]}=0)"
+        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in {how}")
     for name in names:
         if name not in dataset.variables:
             stored = ", ".join(str(known) for known in dataset.data_vars)

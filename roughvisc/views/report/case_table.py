@@ -18,7 +18,7 @@ from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
     """One case in the table, and what reproduces it."""
     case = json.loads(dataset.attrs.get("case", "{}"))
-    title = str(case.get("title") or dataset.attrs.get("title") or f"case {number + 1}")
+    title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
     words = case_words(case)
     axis = AXES[axis_of(dataset)]
     last = dataset.isel({axis.name: axis.telling_row(dataset)})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib import metadata
@@ -26,7 +26,7 @@ from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write, verify_checksum
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import no_results, open_result, result_files
-from roughvisc.study.storage.sweep_cases import read_sweep
+from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
@@ -94,6 +94,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     failures: list[dict[str, str]] = []
     swept: list[dict[str, str]] = []
     drawn: Rows = ([], [], [])
+    numbers: dict[str, int] = {}
     if isinstance(results, str | Path):
         source = Path(results)
         in_folder = source.is_dir()
@@ -101,10 +102,11 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         for one in sources:
             verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
         if in_folder:
-            failures, drawn = (
-                _failures(source),
-                realisation_rows(realisations_table(index_of(source), read_sweep(source))),
-            )
+            swept_cases = read_sweep(source)
+            numbers = number_by_key(swept_cases)
+            sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
+            failures = _failures(source)
+            drawn = realisation_rows(realisations_table(index_of(source), swept_cases))
             swept = _swept(source) if len(sources) > 1 else []
         path = path or (source / "report.html" if in_folder else source.with_name(f"{source.stem}-report.html"))
     else:
@@ -113,7 +115,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         raise InputError("path is None: expected the name of the page, where Datasets are given")
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
-    page = _page(sources, failures, swept, drawn)
+    page = _page(sources, numbers, failures, swept, drawn)
     with atomic_write(Path(path)) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return Path(path)
@@ -157,8 +159,13 @@ def _swept(folder: Path) -> list[dict[str, str]]:
     return [{"title": title, "src": _uri(figure)} for _, title, figure in found]
 
 
-def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[str, str]], drawn: Rows) -> str:
-    sources = sorted(sources, key=_order) if sources and isinstance(sources[0], Path) else sources
+def _page(
+    sources: list[Any],
+    numbers: Mapping[str, int],
+    failures: list[dict[str, str]],
+    swept: list[dict[str, str]],
+    drawn: Rows,
+) -> str:
     pictured, stated = (_evenly(len(sources), most) for most in (_PICTURED, _STATED))
     rows: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
@@ -168,17 +175,20 @@ def _page(sources: list[Any], failures: list[dict[str, str]], swept: list[dict[s
     for number, source in enumerate(sources):
         with _opened(source) as dataset:
             row = table_row(dataset, source, number)
+            row["number"] = numbers.get(row["key"], "") if numbers else number
             rows.append(row)
             if row["name"] in histories:
-                row["name"] += f" ({row['key'] or number + 1})"
+                row["name"] += f" ({row['key'] or number})"
             if "time" in dataset.dims:
                 over = [name for name, one in dataset.data_vars.items() if one.dims == ("time",)]
                 histories[row["name"]] = dataset[over].load()
             if number in stated:
-                studies.append({"number": number + 1, "name": row["name"], **_study(dataset)})
+                studies.append({"number": row["number"], "name": row["name"], **_study(dataset)})
             if number in pictured:
                 figures = _figures(dataset, every=len(sources) <= _DRAWN)
-                cases.append({"number": number + 1, "name": row["name"], "figures": figures, "audit": _audit(dataset)})
+                cases.append(
+                    {"number": row["number"], "name": row["name"], "figures": figures, "audit": _audit(dataset)}
+                )
             what = row["surface"]
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
@@ -216,15 +226,6 @@ def _uri(figure: Figure) -> str:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI)
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
-
-
-def _order(source: Path) -> tuple[Any, ...]:
-    """Cases by what was varied in them, numbers by size."""
-    with open_result(source) as dataset:
-        case = json.loads(dataset.attrs.get("case", "{}"))
-    values = (case.get("varied") or {}).values()
-    numbers = ((0, value, "") if isinstance(value, int | float) else (1, 0.0, str(value)) for value in values)
-    return (str(case.get("title", "")), *numbers)
 
 
 def _common_title(rows: list[dict[str, Any]]) -> str:

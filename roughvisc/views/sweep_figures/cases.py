@@ -13,13 +13,13 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import own_rows
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
-from roughvisc.study.storage.results import ROW, ROWS
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables.axes import AXES, ROW, ROWS, axis_of
 from roughvisc.variables.spots import CONDUCTANCES
 from roughvisc.views.figures import style
 from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
@@ -213,7 +213,7 @@ def cases_of(results: Any) -> Cases:
     held = [name for name in results.data_vars if set(results[name].dims) <= {*over, ROW, *AXES}]
     table = results[held].load()
     keys = results["case_key"].values if "case_key" in results.coords else np.full(results.sizes["case"], "one")
-    members = [_own_rows(table.isel(dict(zip(over, place, strict=True)))) for place in np.argwhere(keys != "")]
+    members = [own_rows(table.isel(dict(zip(over, place, strict=True)))) for place in np.argwhere(keys != "")]
     if len(members) < 2:
         raise InputError("found one case: expected several, as a sweep leaves them")
     scalars = [one for name, one in members[0].coords.items() if not one.dims and name not in _NO_PARAMETERS]
@@ -247,13 +247,6 @@ def cases_of(results: Any) -> Cases:
         for key, (values, source) in settings.items()
     ]
     return Cases(together, _independent(varied), bands)
-
-
-def _own_rows(member: xr.Dataset) -> xr.Dataset:
-    """Histories of one case over its own times or speeds, without rows after its last."""
-    if ROW not in member.dims:
-        return member
-    return member.isel({ROW: slice(int(member[ROWS]))}).swap_dims({ROW: axis_of(member.variables)})
 
 
 def _key(coordinate: xr.DataArray) -> str:

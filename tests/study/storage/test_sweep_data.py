@@ -18,7 +18,9 @@ from roughvisc.study.storage.sweep_cases import SWEEP
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 OWN_TIMES = (
-    SMALL.replace("over = 0", 'over = "10 ms"').replace('[0, "0.1 s", "200 ms"]', '"all"')
+    SMALL.replace("over = 0", 'over = "10 ms"')
+    .replace('[0, "0.1 s", "200 ms"]', '"all"')
+    .replace('"displacement"', '"gap"')
     + """
 [sweep]
 "program.0.load" = ["4 mN", "5 mN"]
@@ -93,6 +95,24 @@ def test_own_times__are_drawn_by_xarray_and_by_the_sweep_figure(own_times):
     at_end = [float(ds.approach[case, rows - 1]) for case, rows in enumerate(ds.rows.values)]
     for value in at_end:
         assert np.isclose(drawn, 1e6 * value, rtol=1e-9).any()
+
+
+def test_own_times__have_observables_as_each_result(own_times):
+    folder, ds = own_times
+    case = int(ds.rows.values.argmin())
+    count = int(ds.rows[case])
+    derive = {
+        "clusters": rv.observables.clusters,
+        "gaps": rv.observables.gap_distribution,
+        "leakage": lambda one: rv.observables.leakage(one, viscosity=1e-3, pressure_drop=1e5),
+    }
+    with open_result(folder / f"{ds.case_key[case].item()}.nc") as alone:
+        for name, function in derive.items():
+            found, wanted = function(ds.isel(case=[case])).isel(case=0), function(alone)
+            for variable in wanted.data_vars:
+                if "time" in wanted[variable].dims:
+                    np.testing.assert_allclose(found[variable][:count], wanted[variable], 1e-12, err_msg=name)
+                    assert found[variable][count:].isnull().all(), variable
 
 
 def test_own_times__are_opened_by_xarray_alone(own_times):

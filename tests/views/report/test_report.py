@@ -14,6 +14,8 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
+from roughvisc.study.storage.table import to_table
 from roughvisc.views.report.page import report
 from roughvisc.views.sweep_figures.case_text import study_text
 
@@ -53,8 +55,10 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
     study = folder / "bumps.toml"
     study.write_text(SWEEP)
-    for case in read_cases(study):
+    cases = read_cases(study)
+    for case in cases:
         run_case(case, folder)
+    write_sweep(folder, sweep_cases(cases))
     failed = {"title": "<i>Too far</i>", "varied": {"program.0.load": 9.0}}
     record = {"message": "contact reached the <u>border</u>", "case": failed}
     (folder / "0123456789abcdef.failed.json").write_text(json.dumps(record))
@@ -66,9 +70,12 @@ def page(folder):
     return report(folder, folder / "page" / "report.html").read_text()
 
 
-def test_page__lists_the_cases_in_the_order_of_what_was_varied(page):
+def test_page__numbers_the_cases_as_their_table(folder, page):
     table = re.search(r'<table id="table">.*?</table>', page, re.S)[0]
-    assert re.findall(r"<tr><td>\d</td><td>(.*?)</td>", table) == ["1 mN", "2 mN", "10 mN"]
+    loads = to_table(folder)["program.0.load [mN]"]
+    assert loads.index.tolist() == [0, 1, 2]
+    shown = re.findall(r"<tr><td>(\d)</td><td>(.*?) mN</td>", table)
+    assert [(int(number), float(load)) for number, load in shown] == list(loads.items())
     assert "3 cases, 1 failed" in page
 
 
