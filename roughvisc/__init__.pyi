@@ -46,7 +46,6 @@ from roughvisc.study.storage.results import open_results as open_results
 from roughvisc.study.storage.store import open_result as open_result
 from roughvisc.study.storage.table import to_table as to_table
 from roughvisc.study.trade.trade import trade as trade
-from roughvisc.topography.conditioning import band_limit as band_limit
 from roughvisc.topography.conditioning import combine as combine
 from roughvisc.topography.conditioning import crop as crop
 from roughvisc.topography.conditioning import fill as fill

@@ -4,7 +4,6 @@ import hashlib
 import random
 import resource
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -78,12 +77,11 @@ def damaged(content, rng):
 
 
 def survive(path, content, **options):
-    """Open every damaged version: a grid or one of our errors, soon and within memory."""
+    """Open every damaged version: a grid or one of our errors, within memory."""
     rng, outcomes = random.Random(1), set()
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for version in damaged(content, rng):
         path.write_bytes(version)
-        start = time.perf_counter()
         try:
             h = open_scan(path, **options)
             assert h.ndim == 2
@@ -93,7 +91,6 @@ def survive(path, content, **options):
             outcomes.add("refused" if path.name in str(error) else str(error))
         except UserWarning as warning:  # as an error here
             outcomes.add("read" if "checksum" in str(warning) else str(warning))
-        assert time.perf_counter() - start < 10
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - resident
     assert grown * (1 if sys.platform == "darwin" else 1024) < 1e9
     assert {"refused"} <= outcomes <= {"refused", "read"}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import remade
-from roughvisc.topography.resampling import band_limit, resample
+from roughvisc.topography.resampling import resample
 
 Array = NDArray[np.float64]
 
@@ -53,10 +53,8 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
 
 
 def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Boundary) -> xr.DataArray:
-    """A surface with the waves that a coarser grid can hold; by means over its cells where points are missing. [m]"""
-    if not np.isfinite(height.values).all():
-        return resample(height, shape)
-    return band_limit(height, shape, periodic=True if boundary == "periodic" else None)
+    """A surface with the waves that a coarser grid can hold. [m]"""
+    return resample(height, shape, periodic=True if boundary == "periodic" else None)
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:

@@ -10,10 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.topography.borders import JUMP, border_mismatch
+from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import grown
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.topography.synthesis import is_analytic
 from roughvisc.units import said
 
 Array = NDArray[np.float64]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage, sparse
 
-from roughvisc.topography.blocks import row_blocks
-
 
 def label_clusters(mask: np.ndarray, periodic: bool = False) -> tuple[np.ndarray, int]:
     """Number the connected clusters of one map. Cells that share only a corner are not connected.
@@ -46,7 +44,4 @@ def label_clusters(mask: np.ndarray, periodic: bool = False) -> tuple[np.ndarray
 def cluster_sizes(mask: np.ndarray, periodic: bool = False) -> np.ndarray:
     """Number of cells of each cluster of one map, largest first; parameters as for :func:`label_clusters`."""
     labels, count = label_clusters(mask, periodic)
-    sizes = np.zeros(count + 1, int)
-    for rows in row_blocks(labels.shape):  # counting takes a copy
-        sizes += np.bincount(labels[rows].ravel(), minlength=count + 1)
-    return np.sort(sizes[1:])[::-1]
+    return np.sort(np.bincount(labels.ravel(), minlength=count + 1)[1:])[::-1]

@@ -8,7 +8,6 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import describe
 from roughvisc.observables.derived import frame_by_frame, need
-from roughvisc.topography.blocks import row_blocks
 from roughvisc.units import quantities
 
 
@@ -27,12 +26,9 @@ def _density(field: xr.DataArray, bins, name: str) -> xr.Dataset:
     limits = _bin_edges(field, bins)
 
     def measure(frame):
-        inside, count = np.zeros(len(limits) - 1, int), 0
-        for rows in row_blocks(frame.shape):
-            values = frame[rows]
-            values = values[values > 0]
-            inside, count = inside + np.histogram(values, limits)[0], count + len(values)
-        return inside / (count * np.diff(limits)) if count else np.full(len(limits) - 1, np.nan)
+        values = frame[frame > 0]
+        inside = np.histogram(values, limits)[0]
+        return inside / (values.size * np.diff(limits)) if values.size else np.full(len(limits) - 1, np.nan)
 
     dim = f"{name}_bin"
     density = frame_by_frame(measure, field, over=(dim, len(limits) - 1))

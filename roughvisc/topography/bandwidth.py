@@ -12,7 +12,6 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import KEEP, ORDER
-from roughvisc.topography.blocks import column_blocks, mean_of, row_blocks
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
 from roughvisc.units import Quantity, quantities
 
@@ -55,13 +54,10 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     InputError
         If the points present do not determine the polynomial.
     """
-    total = sum(np.nansum(heights[rows]) for rows in row_blocks(heights.shape))
-    count = sum(np.count_nonzero(~np.isnan(heights[rows])) for rows in row_blocks(heights.shape))
-    heights = heights - total / count  # absolute heights of instruments would cost digits
+    heights = heights - np.nanmean(heights)  # absolute heights of instruments would cost digits
     for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
         left, coefficients, right = _polynomial(heights, order)
-        for rows in row_blocks(heights.shape):
-            heights[rows] -= left[rows] @ coefficients @ right.T
+        heights -= left @ coefficients @ right.T
     return heights
 
 
@@ -135,16 +131,12 @@ def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray
     degrees = [order if n > 1 else 0 for n in heights.shape]  # heights do not vary across a strip
     terms = [(i, j) for i in range(degrees[0] + 1) for j in range(min(degrees[1], order - i) + 1)]
     products = [(b[:, :, None] * b[:, None, :]).reshape(len(b), -1) for b in bases]
-    found, moments, right = 0, 0.0, 0.0
-    for rows in row_blocks(heights.shape):
-        present = np.isfinite(heights[rows])
-        found += int(present.sum())
-        moments = moments + products[0][rows].T @ present.astype(float) @ products[1]
-        right = right + bases[0][rows].T @ np.where(present, heights[rows], 0.0) @ bases[1]
-    moments = np.reshape(moments, [order + 1] * 4)
+    present = np.isfinite(heights)
+    moments = np.reshape(products[0].T @ present.astype(float) @ products[1], [order + 1] * 4)
+    right = bases[0].T @ np.where(present, heights, 0.0) @ bases[1]
     normal = np.array([[moments[i, k, j, m] for k, m in terms] for i, j in terms])
     if np.linalg.cond(normal) > 1e12:
-        raise InputError(f"level: the {found} points present do not determine a polynomial of order {order}")
+        raise InputError(f"level: the {present.sum()} points present do not determine a polynomial of order {order}")
     coefficients = np.zeros((order + 1, order + 1))
     for (i, j), c in zip(terms, np.linalg.solve(normal, [right[i, j] for i, j in terms]), strict=True):
         coefficients[i, j] = c
@@ -153,28 +145,19 @@ def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray
 
 def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np.ndarray:
     """Waves longer than cut-offs in cells along each axis, missing where the heights are. [m]"""
-    mean = mean_of(heights)
-    long = np.empty_like(heights)
-    complete = True
-    for rows in row_blocks(heights.shape):
-        present = np.isfinite(heights[rows])
-        long[rows] = np.where(present, heights[rows] - mean, 0.0)
-        complete &= bool(present.all())
-    if complete:  # the shares of all points are products of those along each axis
+    mean, present = np.nanmean(heights), np.isfinite(heights)
+    long = np.where(present, heights - mean, 0.0)
+    for axis, cutoff in enumerate(cutoffs):
+        long = _smoothed(long, axis, cutoff, periodic)
+    if present.all():  # the shares of all points are products of those along each axis
         shares = [_smoothed(np.ones((n, 1)), 0, c, periodic) for n, c in zip(heights.shape, cutoffs, strict=True)]
-        share = None
+        share = shares[0] * shares[1].T
     else:
-        share = np.isfinite(heights).astype(float)
-    for field in (long,) if share is None else (long, share):
-        for columns in column_blocks(heights.shape):
-            field[columns] = _smoothed(field[columns], 0, cutoffs[0], periodic)
-        for rows in row_blocks(heights.shape):
-            field[rows] = _smoothed(field[rows], 1, cutoffs[1], periodic)
-    for rows in row_blocks(heights.shape):
-        part = shares[0][rows] * shares[1].T if share is None else share[rows]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            long[rows] = np.where(np.isfinite(heights[rows]), long[rows] / part + mean, np.nan)
-    return long
+        share = present.astype(float)
+        for axis, cutoff in enumerate(cutoffs):
+            share = _smoothed(share, axis, cutoff, periodic)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(present, long / share + mean, np.nan)
 
 
 def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,10 +10,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.topography.blocks import deviation_of, row_blocks
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import grown
-from roughvisc.topography.synthesis import is_made_by, self_affine, wavy
+from roughvisc.topography.synthesis import BOUNDARIES
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
 JUMP = 2.0
@@ -58,11 +57,12 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
         Zero along an axis of one cell, and for a flat surface.
     """
     values = h.transpose("x", "y").values
-    rms = deviation_of(values)
+    known = values[np.isfinite(values)]
+    rms = known.std() if known.size else 0.0
     of_rms, of_neighbours = [], []
     for axis in (0, 1):
-        across = _rms([np.take(values, 0, axis) - np.take(values, -1, axis)])
-        beside = _rms(_differences(values, axis))
+        across = _rms(np.take(values, 0, axis) - np.take(values, -1, axis))
+        beside = _rms(np.diff(values, axis=axis))
         of_rms.append(across / rms if rms > 0 else 0.0)
         of_neighbours.append(across / beside if beside > 0 else 0.0)
     return BorderMismatch((of_rms[0], of_rms[1]), (of_neighbours[0], of_neighbours[1]))
@@ -93,9 +93,9 @@ def is_periodic(h: xr.DataArray) -> bool:
 def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     """Boundary that a surface was made for; None where it has to be said: of scans, plain arrays, and all others.
 
-    Attributes stay through selection and arithmetic. Therefore a recipe is believed only where it gives the heights
-    again, and :func:`mirror <roughvisc.mirror>` only where the heights still are their own mirror images. Anything
-    else that was done to a surface leaves open what lies beyond its border.
+    The recipe of an indenter is believed if it gives the heights again, because the grid may have to grow. The recipe
+    of waves and roughness, and mirror images, are believed if the attribute ``period`` gives the sides of the grid and
+    the borders meet (:func:`is_periodic`).
 
     Parameters
     ----------
@@ -110,6 +110,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     Examples
     --------
     >>> from roughvisc.topography.indenters import sphere
+    >>> from roughvisc.topography.synthesis import wavy
     >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
     >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
     ('free', 'periodic', None)
@@ -117,9 +118,32 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     if grown(h, 1.0) is not None:
         return "free"
     mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
-    if is_made_by(h, wavy, self_affine) or (mirrored and is_periodic(h) and is_mirrored(h.values)):
-        return "periodic"
-    return None
+    made = BOUNDARIES.get(_recipe_name(h)) == "periodic" or (mirrored and is_mirrored(h.values))
+    return "periodic" if made and is_periodic(h) else None
+
+
+def is_analytic(h: xr.DataArray) -> bool:
+    """Whether heights are those of an indenter or a regular wave.
+
+    Examples
+    --------
+    >>> from roughvisc.topography.indenters import sphere
+    >>> from roughvisc.topography.synthesis import wavy
+    >>> ball = sphere(1e-2, 1e-3, 8)
+    >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
+    (True, False, True)
+    """
+    return grown(h, 1.0) is not None or _recipe_name(h) == "wavy"
+
+
+def _recipe_name(h: xr.DataArray) -> str:
+    """Name of the recipe of a surface whose grid still is the one that it was made on; empty otherwise."""
+    try:
+        recipe = json.loads(h.attrs["recipe"])
+        fits = list(h.shape) == recipe["shape"] and np.allclose(period_of(h), recipe["size"], rtol=1e-6, atol=0)
+        return str(recipe["name"]) if fits else ""
+    except (KeyError, TypeError, ValueError):
+        return ""
 
 
 def is_mirrored(height: NDArray[np.float64]) -> bool:
@@ -140,16 +164,7 @@ def _alike(a: NDArray[np.float64], b: NDArray[np.float64], allowed: float) -> bo
     return bool(near.all() or (near | (np.isnan(a) & np.isnan(b))).all())
 
 
-def _differences(values: np.ndarray, axis: int) -> Iterator[np.ndarray]:
-    """Of neighbouring rows or columns, in blocks of rows."""
-    for rows in row_blocks(values.shape):
-        yield np.diff(values[rows.start : rows.stop + (axis == 0)], axis=axis)
-
-
-def _rms(parts: Iterable[np.ndarray]) -> float:
-    """Root mean square of what is finite in some arrays; zero if nothing is."""
-    total, count = 0.0, 0
-    for part in parts:
-        known = part[np.isfinite(part)]
-        total, count = total + (known**2).sum(), count + known.size
-    return float(np.sqrt(total / count)) if count else 0.0
+def _rms(values: np.ndarray) -> float:
+    """Root mean square of the finite values; zero if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt((known**2).mean())) if known.size else 0.0

@@ -2,8 +2,8 @@
 
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
 Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
-their order in the file: crop, rotate90, invert, level, outliers, fill, filter, shortest_wave, realisation, band_limit,
-resample, mirror.
+their order in the file: crop, rotate90, invert, level, outliers, fill, filter, shortest_wave, realisation, resample,
+mirror.
 """
 
 from __future__ import annotations
@@ -151,8 +151,8 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
         cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate, or a table of ``number`` and ``seed``), ``band_limit`` and ``resample`` (cells),
-        and ``mirror``. They act in this order; false leaves a step out.
+        a surrogate, or a table of ``number`` and ``seed``), ``resample`` (cells) and ``mirror``. They act in this
+        order; false leaves a step out.
 
     Returns
     -------
@@ -305,9 +305,8 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "filter": _filter,
     "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
     "realisation": _realisation,
-    "band_limit": conditioning.band_limit,
     "resample": conditioning.resample,
     "mirror": _switch("mirror", conditioning.mirror),
 }
 #: Steps that leave a surface that repeats one that does.
-_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "band_limit", "resample")
+_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")

@@ -7,14 +7,13 @@ NaN, and stay so until :func:`fill`.
 from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.missing_points import fill, mask_outliers
-from roughvisc.topography.resampling import band_limit, resample, without_short_waves
+from roughvisc.topography.resampling import resample, without_short_waves
 
 __all__ = [
     "level",
     "mask_outliers",
     "fill",
     "resample",
-    "band_limit",
     "gaussian_filter",
     "crop",
     "rotate90",

@@ -20,7 +20,8 @@ from roughvisc.topography.grid import (
     with_coordinates,
     with_filled_points,
 )
-from roughvisc.topography.resampling import Cells, lay_on_cells, marked
+from roughvisc.topography.missing_points import harmonic
+from roughvisc.topography.resampling import resample
 from roughvisc.units import Quantity, quantities
 
 #: Part of a cell by which rounding may move a border of two faces.
@@ -133,8 +134,8 @@ def combine(
     align : {"grid", "centre"}, default "grid"
         "grid": both faces are on the same grid. "centre": the centre of the second face, turned over, is aligned with
         that of the first; the sum is on the cells of the first that the second covers completely. If the cells of the
-        second are smaller, it is averaged by area. If they are larger, it is interpolated between its cell centres by a
-        cubic spline, or linearly if points of it are missing.
+        second are smaller, it is resampled to cells as large first (:func:`resample`). A cubic spline
+        between its cell centres gives its heights at those of the first.
     offset : pair of float or str
         Position of the second centre relative to the first, along x and y; with `align` "centre". [m]
 
@@ -171,10 +172,9 @@ def combine(
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
         line += f", reversed along {flip}"
     if align == "centre":
-        h1, h2, way = _laid_on(h1, h2, offset)
+        h1, h2 = _laid_on(h1, h2, offset)
         apart = ", ".join(f"{float(d):.6g}" for d in offset)
         line += f", its centre ({apart}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
-        line += f", {way}"
     elif tuple(offset) != (0.0, 0.0):
         raise InputError(f"combine: offset is {offset!r} with align='grid': expected align='centre'")
     _refuse_another_grid(h1, h2)
@@ -193,7 +193,7 @@ def combine(
     )
 
 
-def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataArray, xr.DataArray, str]:
+def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataArray, xr.DataArray]:
     """Both faces on those cells of the first that the second covers wholly, laid centre on centre.
 
     Parameters
@@ -206,20 +206,23 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataAr
     Returns
     -------
     first, second : xarray.DataArray
-        On the coordinates of the first. The second is averaged by area where its cells are not larger than those of the
-        first, and by cubic spline between its cell centres where they are (linear, if points of it are missing). [m]
-    way : str
-        Which of these it was.
+        On the coordinates of the first. [m]
 
     Raises
     ------
     InputError
         If the offset is no pair of numbers, or fewer than two cells are covered along an axis.
     """
+    from scipy.interpolate import RectBivariateSpline  # slow to import
+
     if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
         raise InputError(f"combine: offset is {offset!r}: expected a pair of lengths, along x and along y [m]")
     apart = [number("offset", d, "m", low=-np.inf) for d in offset]
-    kept, cells = {}, []
+    lengths = [n * d for n, d in zip(h2.shape, spacing(h2), strict=True)]
+    shape = [min(n, max(2, round(length / d))) for n, length, d in zip(h2.shape, lengths, spacing(h1), strict=True)]
+    if tuple(shape) != h2.shape:
+        h2 = resample(h2, (shape[0], shape[1]))
+    kept, at = {}, []
     for axis, d1, d2, by in zip(("x", "y"), spacing(h1), spacing(h2), apart, strict=True):
         n1, n2 = h1.sizes[axis], h2.sizes[axis]
         lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
@@ -231,11 +234,21 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataAr
                 f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected two cells at least"
             )
         kept[axis] = covered
-        cells.append(Cells(lower[covered], side, n2))
+        at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, counted in old ones
     first = h1.isel(kept)
-    heights, way = lay_on_cells(h2, *cells)
+
+    def laid(values: np.ndarray, order: int) -> np.ndarray:
+        degrees = [min(order, n - 1) for n in values.shape]
+        return RectBivariateSpline(*map(np.arange, values.shape), values, kx=degrees[0], ky=degrees[1])(*at)
+
+    values, missing, filled = h2.values.copy(), np.isnan(h2.values), filled_points(h2)
+    if missing.any():
+        values[missing] = harmonic(h2.values, missing)
+    heights = laid(values, 3)
+    heights[laid(missing.astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
+    marked = None if filled is None else laid(filled.astype(float), 1) > _ON_BORDER
     x, y = (first[axis].values for axis in ("x", "y"))
-    return first, with_coordinates(heights, x, y, h2.attrs, filled=marked(h2, *cells)), way
+    return first, with_coordinates(heights, x, y, h2.attrs, filled=marked)
 
 
 def _absent_only(h: xr.DataArray) -> bool:

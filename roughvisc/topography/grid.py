@@ -15,7 +15,6 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.blocks import count_of
 from roughvisc.units import quantity, shown
 from roughvisc.variables import VARIABLES
 
@@ -283,13 +282,13 @@ def like(h: xr.DataArray, values: np.ndarray) -> xr.DataArray:
 
 def require_heights(h: xr.DataArray, step: str) -> None:
     """Refuse a grid of which all points are missing."""
-    if not any(np.isfinite(row).any() for row in h.values):
+    if not np.isfinite(h.values).any():
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
 
 
 def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)") -> None:
     """Refuse a grid of which points are missing."""
-    if missing := h.size - count_of(h.values):
+    if missing := int(h.size - np.isfinite(h.values).sum()):
         raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
 
 

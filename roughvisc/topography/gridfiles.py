@@ -15,7 +15,6 @@ import xarray as xr
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
-from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import metres_in, unit_of, with_coordinates
 from roughvisc.topography.instruments import EXPANSION, Channel, affordable
 from roughvisc.units import quantity
@@ -49,20 +48,17 @@ def open_grid(
     unit: float | None,
     height_unit: float | None,
     spacing: tuple[float, float] | None,
-    heights: bool = True,
 ) -> xr.DataArray:
     """One variable as a labelled grid in metres, with the attributes and coordinates that it has.
 
     ``unit`` is the metres in one unit of what states none, ``height_unit`` that of the heights where it is another.
 
-    Coordinates keep their origin; where they descend, the grid is turned round with them. Without `heights`, those
-    are NaN that take no memory.
+    Coordinates keep their origin; where they descend, the grid is turned round with them.
     """
     with _open(path) as dataset:
         affordable(path, int(np.prod(channel.shape, dtype=object)), EXPANSION)
         h = dataset[channel.name]
-        values = _read(h) if heights else np.broadcast_to(np.nan, h.shape)
-        h = h.copy(data=values).compute()
+        h = h.astype(float).compute()
     extra = {name: h.coords[name] for name in h.coords if name not in ("x", "y") and set(h[name].dims) == {"x", "y"}}
     h = h.transpose("x", "y")
     metres = _metres(unit_of(h), unit if height_unit is None else height_unit, channel.name)
@@ -77,23 +73,12 @@ def open_grid(
         else:
             axes.append(h[axis].values.astype(float) * _metres(unit_of(h[axis]), unit, axis))
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
-    if heights and metres != 1.0:
-        values *= metres  # of which the grid is a view
-    grid = with_coordinates(h.values, *axes, attrs)
+    grid = with_coordinates(h.values if metres == 1.0 else h.values * metres, *axes, attrs)
     grid = grid.assign_coords({name: (("x", "y"), c.transpose("x", "y").values) for name, c in extra.items()})
     for axis in ("x", "y"):
         if grid.sizes[axis] > 1 and grid[axis][0] > grid[axis][-1]:
             grid = grid.isel({axis: slice(None, None, -1)})
     return grid
-
-
-def _read(stored: xr.DataArray) -> np.ndarray:
-    """The numbers of a variable, read by blocks that hold whole chunks of the file: decoding makes copies."""
-    together = (stored.encoding.get("chunksizes") or (1,))[0]
-    values = np.empty(stored.shape)
-    for rows in row_blocks(stored.shape, multiple=together):
-        values[rows] = stored[rows].values
-    return values
 
 
 @contextmanager

@@ -13,9 +13,8 @@ import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,6 +61,24 @@ class Channel:
     unit: str | None
 
 
+class Raw(NamedTuple):
+    """What a file holds of one channel, in its own units.
+
+    Parameters
+    ----------
+    heights : ndarray, shape (nx, ny)
+        NaN where missing; in the unit of the channel.
+    sides : tuple of float or None
+        Cell sides, None if the file states no size.
+    units : tuple of str or None
+        Units of x and y, None if the file states none.
+    """
+
+    heights: np.ndarray
+    sides: tuple[float, float] | None
+    units: tuple[str, str] | None
+
+
 @dataclass(frozen=True)
 class Opened:
     """A file whose header is read: its channels, and how to load one.
@@ -73,11 +90,7 @@ class Opened:
     channels : tuple of Channel
         All channels of the file.
     load : callable
-        ``load(channel, unit)`` with the metres in one unit of the file where it states none, gives heights over
-        (x, y) and the cell sides, or None for these. [m] It is called twice where x and y have another unit.
-    sides : callable
-        ``sides(channel, unit)``: the cell sides as the header has them, None where it does not tell. [m] They do not
-        depend on ``unit`` where the file states the unit of x and y.
+        ``load(channel)`` gives a :class:`Raw`; of a grid file, which is read elsewhere, none.
     default : int or None
         Index of the channel that the library takes.
     instrument : str
@@ -90,8 +103,7 @@ class Opened:
 
     format: str
     channels: tuple[Channel, ...]
-    load: Callable[[Channel, float | None], tuple[np.ndarray, tuple[float, float] | None]]
-    sides: Callable[[Channel, float | None], tuple[float, float] | None] = lambda *_: None
+    load: Callable[[Channel], Raw] | None = None
     default: int | None = None
     instrument: str = ""
     complaints: list[str] = field(default_factory=list)
@@ -221,7 +233,7 @@ def _x3p(path: Path) -> Opened:
     )
     complaints: list[str] = []
 
-    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
+    def load(channel: Channel) -> Raw:
         try:
             content = x3pio.read(path)
         except x3pio.X3pChecksumError as error:
@@ -230,14 +242,11 @@ def _x3p(path: Path) -> Opened:
         layer = content.layers[channel.index]
         if not layer.is_regular_grid:
             raise InputError("its points lie on no regular grid (absolute axes): expected equal steps in x and y")
-        return layer.z.T, (layer.header.x.increment, layer.header.y.increment)
+        return Raw(layer.z.T, (layer.header.x.increment, layer.header.y.increment), ("m", "m"))
 
-    axes = [info.header.x, info.header.y]
-    regular = all(axis.axis_type == x3pio.AxisType.INCREMENTAL for axis in axes)
-    sides = (axes[0].increment, axes[1].increment) if regular else None
     maker = info.metadata.instrument if info.metadata else None
     instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
-    return Opened("x3p", channels, load, lambda *_: sides, 0, instrument, complaints)
+    return Opened("x3p", channels, load, 0, instrument, complaints)
 
 
 def _sdf(path: Path) -> Opened:
@@ -246,9 +255,9 @@ def _sdf(path: Path) -> Opened:
     content = sdfio.read(path)
     rows, columns = content.data.shape
     channel = Channel(0, "height", rows > 1, (columns, rows), "m")
-    cell = (content.header.x_scale, content.header.y_scale)
+    raw = Raw(content.data.T, (content.header.x_scale, content.header.y_scale), ("m", "m"))
     maker = content.header.manufacturer_id.strip()
-    return Opened("sdf", (channel,), lambda *_: (content.data.T, cell), lambda *_: cell, 0, maker)
+    return Opened("sdf", (channel,), lambda _: raw, 0, maker)
 
 
 def _csv(path: Path) -> Opened:
@@ -272,8 +281,8 @@ def _npy(path: Path) -> Opened:
     heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
     areal = heights.ndim == 2 and heights.dtype.kind in "fiu"
 
-    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
-        return np.multiply(heights.T, unit, dtype=float, order="C"), None
+    def load(channel: Channel) -> Raw:
+        return Raw(np.array(heights.T, dtype=float, order="C"), None, None)
 
     return Opened("npy", (Channel(0, "array", areal, heights.shape[::-1], None),), load)
 
@@ -291,7 +300,6 @@ def _tried(path: Path, format: str) -> Opened | Exception:
 
 def _surface_topography(path: Path, format: str) -> Opened:
     from SurfaceTopography.IO import lookup_reader_by_format
-    from SurfaceTopography.Support.UnitConversion import get_unit_conversion_factor
 
     if format not in lookup_reader_by_format:
         known = sorted({*lookup_reader_by_format, *own_suffixes()})
@@ -299,48 +307,28 @@ def _surface_topography(path: Path, format: str) -> Opened:
     reader = lookup_reader_by_format[format](separated_by_blanks(path) if format in _TEXT else str(path))
     theirs = list(reader.channels)
 
-    def load(channel: Channel, unit: float | None) -> tuple[np.ndarray, tuple[float, float] | None]:
+    def load(channel: Channel) -> Raw:
         found = theirs[channel.index]
         affordable(path, int(np.prod(channel.shape, dtype=object)), 1 if format in _PLAIN else EXPANSION)
         if found.is_uniform is False:
             raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
         sized = found.physical_sizes is not None
         topography = found.topography() if sized else found.topography(physical_sizes=channel.shape)
-        read = np.ma.asarray(topography.heights(), dtype=float)
-        heights = np.ma.filled(read, np.nan)
-        # a copy is scaled where it is; what the library may still hold is not
-        heights = np.multiply(
-            heights, metres(channel, unit), out=None if np.may_share_memory(heights, read.data) else heights
-        )
-        del read
+        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
         if top_line_first(format):
             heights = heights[:, ::-1]
-        return heights, cells(topography.physical_sizes, heights.shape, channel, unit) if sized else None
-
-    def sides(channel: Channel, unit: float | None) -> tuple[float, float] | None:
-        sizes = theirs[channel.index].physical_sizes
-        known = sizes is not None and all(isinstance(size, Real) for size in sizes)
-        return cells(sizes, channel.shape, channel, unit) if known else None
-
-    def metres(channel: Channel, unit: float | None) -> float:
-        return unit if channel.unit is None else float(get_unit_conversion_factor(channel.unit, "m"))
-
-    def cells(sizes: Any, shape: tuple[int, ...], channel: Channel, unit: float | None) -> tuple[float, ...]:
-        lateral = (metres(channel, unit),) * len(shape)
+        x, y = channel.unit, channel.unit
         if channel.unit is None:  # a header may state the units of x and y alone, which the library then leaves as read
-            header = theirs[channel.index].info.get("raw_metadata", {})
-            named = header.get("xunit") or header.get("yunit"), header.get("yunit") or header.get("xunit")
-            lateral = (
-                lateral if named[0] is None else tuple(float(get_unit_conversion_factor(one, "m")) for one in named)
-            )
-        scaled = zip(sizes, lateral, shape, strict=True)
-        return tuple(float(f"{float(size) * scale:.15g}") / n for size, scale, n in scaled)
+            header = found.info.get("raw_metadata", {})
+            x, y = header.get("xunit") or header.get("yunit"), header.get("yunit") or header.get("xunit")
+        sides = tuple(float(size) / n for size, n in zip(topography.physical_sizes, heights.shape, strict=True))
+        return Raw(heights, sides if sized else None, None if x is None else (x, y))
 
     default = getattr(reader, "_default_channel_index", None)
     described = theirs[0].info.get("instrument", {}) if theirs else {}
     instrument = described.get("name", "") if isinstance(described, dict) else ""
     channels = tuple(_channel(found) for found in theirs)
-    return Opened(format, channels, load, sides, default, str(instrument or ""), close=reader.close)
+    return Opened(format, channels, load, default, str(instrument or ""), close=reader.close)
 
 
 def _channel(found: Any) -> Channel:

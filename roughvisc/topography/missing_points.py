@@ -7,12 +7,11 @@ from typing import Literal
 
 import numpy as np
 import scipy.ndimage
+import scipy.sparse.linalg
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.arguments import FILL, WINDOW
-from roughvisc.topography.blocks import extremes_of, median_of, row_blocks
-from roughvisc.topography.bridging import harmonic
 from roughvisc.topography.grid import (
     checked,
     filled_points,
@@ -67,17 +66,14 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     off = np.empty_like(h.values)
     for rows, median in _local_median(h.values, window):
         off[rows] = np.abs(h.values[rows] - median)
-    typical, faintest = median_of(off), 1e-12 * max(map(abs, extremes_of(h.values)))
+    typical, faintest = np.nanmedian(off), 1e-12 * np.nanmax(np.abs(h.values))
     outlier = np.empty(h.shape, dtype=bool)
     for rows, median in _local_median(off, window):
         scale = np.fmax(median, typical) * _MAD
         outlier[rows] = off[rows] > np.maximum(threshold * scale, faintest)
     count = int(outlier.sum())
-    heights = off  # its memory
-    heights[...] = h.values
-    heights[outlier] = np.nan
     line = f"outliers masked: {count} points beyond {threshold:g} deviations from the median of {window} x {window}"
-    return noted(like(h, heights), line, outliers=count + h.attrs.get("outliers", 0))
+    return noted(like(h, np.where(outlier, np.nan, h.values)), line, outliers=count + h.attrs.get("outliers", 0))
 
 
 def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "harmonic") -> xr.DataArray:
@@ -127,12 +123,7 @@ def in_large_holes(missing: np.ndarray) -> np.ndarray:
     missing : ndarray of bool, shape (nx, ny)
         Where no height is.
     """
-    inside, reach = np.empty(missing.shape, dtype=bool), _HOLE // 2
-    for rows in row_blocks(missing.shape):  # each with the rows that its windows reach
-        first = max(rows.start - reach, 0)
-        share = scipy.ndimage.uniform_filter(missing[first : rows.stop + reach].astype(float), _HOLE, mode="nearest")
-        inside[rows] = share[rows.start - first : rows.stop - first] > 0.5
-    return inside
+    return scipy.ndimage.uniform_filter(missing.astype(float), _HOLE, mode="nearest") > 0.5
 
 
 def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.ndarray]]:
@@ -156,6 +147,29 @@ def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.n
         low = np.take_along_axis(ordered, np.maximum((count - 1) // 2, 0), axis=-1)
         high = np.take_along_axis(ordered, np.minimum(count // 2, window**2 - 1), axis=-1)
         yield slice(start, stop), np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
+
+
+def harmonic(heights: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    r"""Heights of the membrane that is spanned over each hole, row by row. [m]
+
+    :math:`\sum_n (h_n - h_p) = 0` over the neighbours of every missing point: four, fewer at the border of the scan,
+    across which nothing flows.
+    """
+    number = np.cumsum(missing).reshape(missing.shape) - 1  # of the missing points
+    count, mean = int(number[-1, -1]) + 1, np.nanmean(heights)
+    diagonal, right = np.zeros(count), np.zeros(count)
+    rows, columns = [np.arange(count)], [np.arange(count)]
+    low, high, every = slice(None, -1), slice(1, None), slice(None)
+    for here, there in (((low, every), (high, every)), ((every, low), (every, high))):
+        for one, other in ((here, there), (there, here)):
+            diagonal[number[one][missing[one]]] += 1.0
+            both, rim = missing[one] & missing[other], missing[one] & ~missing[other]
+            rows.append(number[one][both])
+            columns.append(number[other][both])
+            right[number[one][rim]] += heights[other][rim] - mean
+    entries = np.concatenate([diagonal, np.full(sum(map(len, rows)) - count, -1.0)])
+    laplace = scipy.sparse.csc_array((entries, (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
+    return np.asarray(mean + scipy.sparse.linalg.spsolve(laplace, right, permc_spec="MMD_AT_PLUS_A"))
 
 
 def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.topography.bandwidth import off_plane
-from roughvisc.topography.blocks import count_of, extremes_of, known_values, mean_of, row_blocks
 from roughvisc.topography.grid import checked, require_heights, spacing
 
 #: name -> (units, long name)
@@ -63,24 +60,24 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     """
     h = checked(h, "parameters", least=1)
     require_heights(h, "parameters")
-    mean, (low, high) = mean_of(h.values), extremes_of(h.values)
-    centred = (known - mean for known in known_values(h.values))
-    absolute, square, cube, fourth = _means((np.abs(z), z**2, z**3, z**4) for z in centred)
-    gradient, excess, along_x, along_y = _means(_gradients(h, periodic))
-    (curvature,) = _means(((part / 2) ** 2,) for part in _laplacian(h, periodic))
+    known = h.values[np.isfinite(h.values)]
+    z = known - known.mean()
+    square = _mean(z**2)
+    slope_x, slope_y = _slopes(h, periodic)
+    gradient = slope_x**2 + slope_y**2
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
-            "Sa": absolute,
+            "Sa": _mean(np.abs(z)),
             "Sq": np.sqrt(square),
-            "Ssk": cube / square**1.5,
-            "Sku": fourth / square**2,
-            "Sz": (high - mean) - (low - mean),
-            "Sdq": np.sqrt(gradient),
-            "Sdr": excess,
-            "rms_slope_x": np.sqrt(along_x),
-            "rms_slope_y": np.sqrt(along_y),
-            "rms_curvature": np.sqrt(curvature),
-            "missing_fraction": (h.size - count_of(h.values)) / h.size,
+            "Ssk": _mean(z**3) / square**1.5,
+            "Sku": _mean(z**4) / square**2,
+            "Sz": z.max() - z.min(),
+            "Sdq": np.sqrt(_mean(gradient)),
+            "Sdr": _mean(gradient / (1 + np.sqrt(1 + gradient))),
+            "rms_slope_x": np.sqrt(_mean(slope_x**2)),
+            "rms_slope_y": np.sqrt(_mean(slope_y**2)),
+            "rms_curvature": np.sqrt(_mean((_laplacian(h, periodic) / 2) ** 2)),
+            "missing_fraction": (h.size - known.size) / h.size,
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}
     return xr.Dataset({name: ((), float(value), declared[name]) for name, value in values.items()})
@@ -108,64 +105,36 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
     float
         NaN where no point is left for it. [-]
     """
-    slopes = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
-    return float(np.sqrt(_means((slope_x**2 + slope_y**2,) for slope_x, slope_y in slopes)[0]))
+    slope_x, slope_y = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
+    return float(np.sqrt(_mean(slope_x**2 + slope_y**2)))
 
 
-def _gradients(h: xr.DataArray, periodic: bool) -> Iterator[tuple[np.ndarray, ...]]:
-    """Squared gradients, excesses of the area over the projection, and squared slopes along x and y, in blocks."""
-    for slope_x, slope_y in _slopes(h, periodic):
-        gradient = slope_x**2 + slope_y**2
-        yield gradient, gradient / (1 + np.sqrt(1 + gradient)), slope_x**2, slope_y**2
-
-
-def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1).
-
-    In blocks of rows.
-    """
+def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
+    """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1)."""
     dx, dy = spacing(h)
-    lowest = extremes_of(h.values)[1] - depth if depth < math.inf else -math.inf
-    for z in _with_neighbours(h.values, periodic, before=0):
-        slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
-        counts = np.isfinite(slope_x) & np.isfinite(slope_y)
-        if depth < math.inf:
-            counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
-        yield slope_x[counts], slope_y[counts]
+    z = np.pad(h.values, [(0, n) for n in _beyond(h, periodic)], mode="wrap")
+    slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
+    counts = np.isfinite(slope_x) & np.isfinite(slope_y)
+    if depth < math.inf:
+        lowest = np.nanmax(h.values) - depth
+        counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
+    return slope_x[counts], slope_y[counts]
 
 
-def _laplacian(h: xr.DataArray, periodic: bool) -> Iterator[np.ndarray]:
-    """Sum of the second differences along x and y where all five points are there, in blocks of rows."""
+def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:
+    """Sum of the second differences along x and y where all five points are there."""
     dx, dy = spacing(h)
-    for z in _with_neighbours(h.values, periodic, before=1):
-        middle = z[1:-1, 1:-1]
-        laplacian = (z[2:, 1:-1] - 2 * middle + z[:-2, 1:-1]) / dx**2
-        laplacian += (z[1:-1, 2:] - 2 * middle + z[1:-1, :-2]) / dy**2
-        yield laplacian[np.isfinite(laplacian)]
+    z = np.pad(h.values, [(n, n) for n in _beyond(h, periodic)], mode="wrap")
+    middle = z[1:-1, 1:-1]
+    laplacian = (z[2:, 1:-1] - 2 * middle + z[:-2, 1:-1]) / dx**2
+    laplacian += (z[1:-1, 2:] - 2 * middle + z[1:-1, :-2]) / dy**2
+    return laplacian[np.isfinite(laplacian)]
 
 
-def _with_neighbours(values: np.ndarray, periodic: bool, before: int) -> Iterator[np.ndarray]:
-    """Blocks of rows with the row after them, and `before` of the ones before.
-
-    Across the border of a map that repeats, or of a strip one cell wide, rows and columns come round; of others there
-    are none beyond.
-    """
-    nx = len(values)
-    round_x, round_y = (periodic or n == 1 for n in values.shape)
-    for rows in row_blocks(values.shape):
-        at = np.arange(rows.start - before, rows.stop + 1)
-        block = values[at % nx if round_x else at[(at >= 0) & (at < nx)]]
-        yield np.pad(block, [(0, 0), (before * round_y, int(round_y))], mode="wrap")
+def _beyond(h: xr.DataArray, periodic: bool) -> tuple[int, int]:
+    """Rows and columns that come round beyond the border: of a map that repeats, and of a strip one cell wide."""
+    return int(periodic or h.shape[0] == 1), int(periodic or h.shape[1] == 1)
 
 
-def _means(parts: Iterable[tuple[np.ndarray, ...]]) -> list[Any]:
-    """Mean of each of several quantities that come in parts; NaN where there are no values."""
-    totals, counts = [], []
-    for part in parts:
-        totals.append([one.sum() for one in part])
-        counts.append([one.size for one in part])
-    with np.errstate(invalid="ignore"):
-        return [
-            np.float64(total) / count
-            for total, count in zip(np.sum(totals, axis=0), np.sum(counts, axis=0), strict=True)
-        ]
+def _mean(values: np.ndarray) -> np.float64:
+    return values.mean() if values.size else np.float64(np.nan)

@@ -13,7 +13,6 @@ import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +22,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography import gridfiles, instruments
-from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.topography.instruments import Channel, Opened, brief, forget
+from roughvisc.topography.instruments import Channel, Opened, Raw, brief, forget
 from roughvisc.topography.orientation import orientation
 from roughvisc.units import Quantity, quantities, quantity
 
@@ -47,35 +45,27 @@ _GRID = "nc"
 def read_file(
     path: Path,
     *,
-    heights: bool = True,
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
     height_unit: str | None = None,
     spacing: float | tuple[float, float] | None = None,
 ) -> xr.DataArray:
-    """Grid of an instrument or grid file; without `heights` they are NaN that take no memory, where a header tells all.
-
-    The options are those of :func:`roughvisc.open_scan`.
-    """
+    """Grid of an instrument or grid file; the options are those of :func:`roughvisc.open_scan`."""
     given = {"unit": unit, "height_unit": height_unit}
-    units = _Units(*(None if one is None else quantity(f"1 {one}", "m", key) for key, one in given.items()))
+    lateral, vertical = (None if one is None else quantity(f"1 {one}", "m", key) for key, one in given.items())
     sides = None if spacing is None else pair("spacing", spacing)
-    before = path.stat()
     with _reading(path), closing(_opened(path, format)) as opened:
         chosen = _chosen(opened, channel)
-        _check_units(opened, chosen, units, sides)
+        _refuse_another_unit(chosen, lateral, vertical)
         if opened.format == _GRID:
-            h = checked(gridfiles.open_grid(path, chosen, units.lateral, units.heights, sides, heights), "grid")
+            h = checked(gridfiles.open_grid(path, chosen, lateral, vertical, sides), "grid")
         else:
-            h = _labelled(opened, chosen, units, sides, heights)
+            h = _labelled(opened.load(chosen), chosen.unit, lateral, vertical, sides)
     for complaint in opened.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     _plausible(h, path)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
-    now = path.stat()
-    if (before.st_ino, before.st_size, before.st_mtime_ns) != (now.st_ino, now.st_size, now.st_mtime_ns):
-        raise InputError(f"{path}: was changed while it was read: expected a file that stays as it is")
     others = [other.name for other in opened.channels if other.index != chosen.index]
     attrs["orientation"] = orientation(opened.format)
     attrs |= {"instrument": opened.instrument} if opened.instrument else {}
@@ -83,9 +73,8 @@ def read_file(
     how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
     how += "".join(f", {key} {one} as given" for key, one in given.items() if one)
     h = noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
-    if heights:
-        finite(h, str(path))
-        _low_enough(h, path)
+    finite(h, str(path))
+    _low_enough(h, path)
     return h
 
 
@@ -171,24 +160,48 @@ def sha256(path: Path) -> str:
 def _opened(path: Path, format: str | None) -> Opened:
     """Header of an instrument file or of a grid file, which is not left open."""
     if _is_grid(path, format):
-        return Opened(_GRID, gridfiles.grid_channels(path), load=lambda *_: (np.empty(0), (1.0, 1.0)))
+        return Opened(_GRID, gridfiles.grid_channels(path))
     return instruments.open_instrument(path, format)
 
 
 def _labelled(
-    opened: Opened, chosen: Channel, units: _Units, sides: tuple[float, float] | None, heights: bool
+    raw: Raw, stated: str | None, lateral: float | None, vertical: float | None, sides: tuple[float, float] | None
 ) -> xr.DataArray:
-    """Grid of one channel of an instrument file. [m]"""
-    lateral, vertical = units.lateral, units.vertical
-    found = None if heights else sides or opened.sides(chosen, lateral)
-    values = np.broadcast_to(np.nan, chosen.shape)
-    if found is None:  # a few headers do not tell: their files are read for it
-        values, found = opened.load(chosen, vertical)
-        if sides is None and found is not None and lateral != vertical:
-            found = opened.sides(chosen, lateral) or opened.load(chosen, lateral)[1]
-    if sides is None and (found is None or not all(d and math.isfinite(d) and d > 0 for d in found)):
+    """Grid of one channel of an instrument file. [m]
+
+    Parameters
+    ----------
+    raw : Raw
+        What is in the file.
+    stated : str or None
+        Unit of the channel.
+    lateral, vertical : float or None
+        Metres in the unit that a user gives for x and y, and in another one for heights.
+    sides : tuple of float or None
+        Cell sides that a user gives. [m]
+    """
+    no_size, known = raw.sides is None and sides is None, raw.units is not None
+    if stated is not None:
+        unit = quantity(f"1 {stated}", "m", "the unit in the file")
+    elif lateral is None and vertical is None:
+        if no_size:
+            raise InputError(f"it states no unit of its heights and no size: {_PASS_UNIT}, and {_PASS_SPACING}")
+        if sides is None and not known:
+            raise InputError(f"it states no unit of x, y and its heights: {_PASS_UNITS}")
+        raise InputError(f"it states no unit of its heights: {_PASS_UNIT}")
+    else:
+        unit = lateral if vertical is None else vertical
+        if vertical is not None and sides is None and known and lateral is not None:
+            raise InputError("it states the unit of x and y: pass the unit of its heights alone, as unit=")
+        if sides is None and not known and raw.sides is not None and lateral is None:
+            raise InputError("it states no unit of x and y: pass unit= (such as unit='mm')")
+    values = raw.heights if unit == 1.0 else raw.heights * unit
+    if sides is None and raw.sides is not None:
+        metres = [quantity(f"1 {one}", "m", "the unit in the file") for one in raw.units or ()] or [lateral or unit] * 2
+        sides = tuple(float(f"{d * metre:.15g}") for d, metre in zip(raw.sides, metres, strict=True))
+    if sides is None or not all(math.isfinite(d) and d > 0 for d in sides):
         raise InputError(f"it states no size: {_PASS_SPACING}")
-    return labelled(values, sides or found)
+    return labelled(values, sides)
 
 
 def _chosen(opened: Opened, channel: int | str | None) -> Channel:
@@ -209,47 +222,15 @@ def _chosen(opened: Opened, channel: int | str | None) -> Channel:
     raise InputError(f"channel is {channel!r}: expected one of {listed}")
 
 
-@dataclass(frozen=True)
-class _Units:
-    """Metres in the unit that a user gives for x and y, and in the one for heights; None where none is given."""
-
-    lateral: float | None
-    heights: float | None
-
-    @property
-    def vertical(self) -> float | None:
-        """Metres in the unit of heights, which is that of x and y unless another is given."""
-        return self.lateral if self.heights is None else self.heights
-
-
-def _check_units(opened: Opened, chosen: Channel, units: _Units, sides: tuple[float, float] | None) -> None:
-    """Refuse units that contradict those in the file, and a file that states none where none are given."""
+def _refuse_another_unit(chosen: Channel, lateral: float | None, vertical: float | None) -> None:
+    """Refuse units that contradict the one in the file."""
     if chosen.unit is not None:
         stated = quantity(f"1 {chosen.unit}", "m", "the unit in the file")
-        for key, unit in (("unit", units.lateral), ("height_unit", units.heights)):
+        for key, unit in (("unit", lateral), ("height_unit", vertical)):
             if unit is not None and not math.isclose(stated, unit):
                 raise InputError(
                     f"it states its unit as {chosen.unit!r}: leave {key}= out, or scale the heights afterwards"
                 )
-    elif units.vertical is None:
-        found = opened.load(chosen, 1.0)[1] if sides is None else None
-        if sides is None and found is None:
-            raise InputError(f"it states no unit of its heights and no size: {_PASS_UNIT}, and {_PASS_SPACING}")
-        if found is not None and not _states_lateral_unit(opened, chosen):
-            raise InputError(f"it states no unit of x, y and its heights: {_PASS_UNITS}")
-        raise InputError(f"it states no unit of its heights: {_PASS_UNIT}")
-    elif units.heights is not None and sides is None:
-        if _states_lateral_unit(opened, chosen):
-            if units.lateral is not None:
-                raise InputError("it states the unit of x and y: pass the unit of its heights alone, as unit=")
-        elif units.lateral is None and opened.load(chosen, 1.0)[1] is not None:
-            raise InputError("it states no unit of x and y: pass unit= (such as unit='mm')")
-
-
-def _states_lateral_unit(opened: Opened, chosen: Channel) -> bool:
-    """Whether the cell sides in the header have a unit, so that they do not change with the one that is given."""
-    found = opened.sides(chosen, 1.0)
-    return found is not None and found == opened.sides(chosen, 2.0)
 
 
 def existing(path: Any) -> Path:
@@ -317,13 +298,8 @@ def _low_enough(h: xr.DataArray, path: Path) -> None:
 
 def _beyond(values: np.ndarray, most: float) -> tuple[int, float]:
     """How many heights are further from zero, and the first of them. [m]"""
-    count, example = 0, math.nan
-    for rows in row_blocks(values.shape):
-        beyond = np.abs(values[rows]) > most
-        if beyond.any():
-            example = example if count else float(values[rows][beyond][0])
-            count += int(beyond.sum())
-    return count, example
+    beyond = values[np.abs(values) > most]
+    return beyond.size, float(beyond[0]) if beyond.size else math.nan
 
 
 def finite(h: xr.DataArray, source: str) -> None:

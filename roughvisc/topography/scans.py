@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 import xarray as xr
 
@@ -62,20 +61,9 @@ def open_scan(
         If the checksum in an X3P file is wrong.
     """
     options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
-    return outline(path, heights=True, format=format, **options)
-
-
-def outline(
-    path: str | os.PathLike[str], *, heights: bool = False, format: str | None = None, **options: Any
-) -> xr.DataArray:
-    """What :func:`open_scan` gives, as far as the header of the file tells: all but the heights, unless asked for.
-
-    The heights are NaN that take no memory. A surface card is conditioned, which needs its heights: they are there.
-    """
     path = existing(path)
     if not is_card(path, format):
-        return read_file(path, heights=heights, format=format, **options)
+        return read_file(path, format=format, **options)
     h = open_card(path, **options)
-    if heights:
-        finite(h, str(path))
+    finite(h, str(path))
     return h

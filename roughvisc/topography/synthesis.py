@@ -5,7 +5,6 @@ Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the reci
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
-from roughvisc.topography.indenters import cell_of, cone, flat_punch, grown, recipe_of, sphere
+from roughvisc.topography.indenters import cell_of, cone, flat_punch, recipe_of, sphere
 from roughvisc.units import Quantity, quantities
 
 
@@ -286,34 +285,3 @@ def make(name: str, arguments: Mapping[str, Any]) -> xr.DataArray:
         If an argument has a wrong value.
     """
     return _MAKERS[name](**arguments)
-
-
-def is_analytic(h: xr.DataArray) -> bool:
-    """Whether heights are those of an indenter or a regular wave, by a recipe that still gives them.
-
-    Examples
-    --------
-    >>> ball = sphere(1e-2, 1e-3, 8)
-    >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
-    (True, False, True)
-    """
-    return grown(h, 1.0) is not None or is_made_by(h, wavy)
-
-
-def is_made_by(h: xr.DataArray, *makers: Callable[..., xr.DataArray]) -> bool:
-    """Whether heights are those that their recipe gives, and that is one of some. It is made again to know.
-
-    Parameters
-    ----------
-    h : xarray.DataArray, dims (x, y)
-        Heights. [m]
-    *makers : callable
-        Of :func:`wavy` and :func:`self_affine`; indenters are known beyond their grid (:func:`.indenters.grown`).
-    """
-    try:
-        recipe = json.loads(h.attrs["recipe"])
-        make = {maker.__name__: maker for maker in makers}[recipe["name"]]
-        again = make(size=recipe["size"], shape=recipe["shape"], **recipe["parameters"]).values
-    except (KeyError, TypeError, ValueError):
-        return False
-    return again.shape == h.shape and bool(np.abs(h.values - again).max() <= 1e-9 * np.abs(again).max())

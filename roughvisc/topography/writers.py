@@ -16,14 +16,11 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.blocks import BLOCK
 from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.readers import sha256
 
 #: Suffixes that :func:`save_scan` knows.
 WRITABLE = (".nc", ".x3p", ".sdf")
-#: Sides of a chunk of a big grid in netCDF.
-_CHUNK = 256
 
 
 def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
@@ -64,8 +61,6 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
 def _save_netcdf(h: xr.DataArray, path: Path) -> None:
     """Write a grid with all that it holds."""
     compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
-    if h.nbytes > BLOCK:
-        compressed["chunksizes"] = tuple(min(n, _CHUNK) for n in h.shape)  # to be read by blocks of rows
     h.to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
 
 

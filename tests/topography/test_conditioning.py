@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 from strategies import examples, shapes
 
 from roughvisc.errors import InputError
-from roughvisc.topography import blocks
 from roughvisc.topography.bandwidth import less_polynomial
 from roughvisc.topography.conditioning import (
-    band_limit,
     combine,
     crop,
     fill,
@@ -52,7 +50,6 @@ ALL_STEPS = {
     "mask_outliers": mask_outliers,
     "fill": fill,
     "resample": lambda h: resample(h, (21, 40)),
-    "band_limit": lambda h: band_limit(h, (21, 40)),
     "gaussian_filter": lambda h: gaussian_filter(h, 2e-5),
     "crop": lambda h: crop(h, x=(1e-5, 5e-5)),
     "rotate90": rotate90,
@@ -63,17 +60,13 @@ ALL_STEPS = {
 
 
 @pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
-def test_step__adds_a_line_to_history_and_leaves_its_input_alone(step):
+def test_step__notes_what_it_did_and_leaves_its_input_alone(step):
     h = fill(rough(missing=0.02))
     before = h.copy(deep=True)
     done = step(h)
     xr.testing.assert_identical(h, before)
     assert done.attrs["history"].startswith(before.attrs["history"] + "\n")
-    assert done.attrs["history"].count("\n") == before.attrs["history"].count("\n") + 1
-    assert (done.dims, done.name, done.attrs["units"]) == (("x", "y"), "height", "m")
-    assert done.x.attrs["units"] == "m"
-    assert done["filled"].dtype == bool
-    assert done["filled"].dims == ("x", "y")
+    assert (done.dims, done.name, done.attrs["units"], done["filled"].dtype) == (("x", "y"), "height", "m", bool)
     done.to_netcdf()  # attributes that can be written
 
 
@@ -84,20 +77,41 @@ def test_step__does_not_care_for_the_order_of_dimensions_or_the_unit(step):
 
 
 @pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
+def test_step__refuses_what_is_no_grid(step):
+    for wrong in (
+        np.zeros((5, 5)),
+        xr.DataArray(np.zeros((5, 5)), dims=("a", "b")),
+        xr.DataArray(np.zeros((5, 5)), dims=("x", "y")),
+        rough().assign_coords(x=np.arange(45.0) ** 2),
+        rough().isel(x=[3]),
+    ):
+        with pytest.raises(InputError):
+            step(wrong)
+
+
 @pytest.mark.parametrize(
-    ("wrong", "fragment"),
+    ("step", "named"),
     [
-        (np.zeros((5, 5)), "ndarray"),
-        (xr.DataArray(np.zeros((5, 5)), dims=("a", "b")), "('a', 'b')"),
-        (xr.DataArray(np.zeros((5, 5)), dims=("x", "y")), "no coordinate"),
-        (rough().assign_coords(x=np.arange(45.0) ** 2), "uniform"),
-        (rough().isel(x=[3]), "1 point"),
+        (lambda: level(rough(), 4), "order"),
+        (lambda: level(rough().isel(y=[3, 4]).where(rough().x == rough().x[3])), "determine"),
+        (lambda: level(rough() * np.nan), "missing"),
+        (lambda: mask_outliers(rough(), window=4), "window"),
+        (lambda: mask_outliers(rough(), threshold=0), "threshold"),
+        (lambda: fill(flat_punch(2e-5, 1e-4, 21)), "absent"),
+        (lambda: fill(rough(), "magic"), "method"),
+        (lambda: fill(rough() * np.nan), "missing"),
+        (lambda: gaussian_filter(rough(), 8e-6), "cutoff"),
+        (lambda: gaussian_filter(rough(), 2e-5, keep="both"), "keep"),
+        (lambda: crop(rough(), x=(1.0, 2.0)), "x"),
+        (lambda: crop(rough(), y=3e-5), "y"),
+        (lambda: rotate90(rough(), 0.5), "turns"),
+        (lambda: resample(rough(), 1), "shape"),
+        (lambda: resample(rough(), 5, periodic="x"), "periodic"),
     ],
 )
-def test_step__refuses_what_is_no_grid(step, wrong, fragment):
-    with pytest.raises(InputError, match="expected") as refused:
-        step(wrong)
-    assert fragment in str(refused.value)
+def test_step__refuses_a_wrong_argument_by_name(step, named):
+    with pytest.raises(InputError, match=named):
+        step()
 
 
 @examples(25)
@@ -126,16 +140,6 @@ def test_level__is_the_least_squares_solution(order):
     np.testing.assert_allclose(level(h, order).values[present], h.values[present] - design @ solution, atol=1e-17)
 
 
-def test_level__refuses_order_and_undetermined_polynomials():
-    with pytest.raises(InputError, match="order is 4"):
-        level(rough(), 4)
-    line = rough()
-    with pytest.raises(InputError, match="do not determine"):
-        level(line.where(line.x == line.x[3]))
-    with pytest.raises(InputError, match="all 1710 points are missing"):
-        level(line * np.nan)
-
-
 def test_mask_outliers__finds_spikes_and_nothing_else():
     h = rough((61, 54), missing=0.05)
     rng = np.random.default_rng(1)
@@ -150,33 +154,11 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
     assert mask_outliers(h).attrs["outliers"] == 0
 
 
-def test_mask_outliers__median_is_that_of_the_finite_points():
-    from roughvisc.topography.missing_points import _local_median
-
-    values = rough((13, 11), missing=0.4).values
-    values[:6, :6] = np.nan
-    expected = np.full(values.shape, np.nan)
-    for i, j in np.ndindex(values.shape):
-        part = values[max(i - 2, 0) : i + 3, max(j - 2, 0) : j + 3]
-        if np.isfinite(part).any():
-            expected[i, j] = np.nanmedian(part)
-    found = np.concatenate([median for _, median in _local_median(values, 5)])
-    np.testing.assert_array_equal(found, expected)
-
-
 def test_mask_outliers__keeps_a_flat_surface_and_a_step():
     flat = from_array(np.full((21, 18), 0.1), CELL)
     assert mask_outliers(flat).attrs["outliers"] == 0
     step = flat + xr.where(flat.x > 2e-5, 1e-5, 0.0) + 1e-8 * rough((21, 18)).values / 1e-6
     assert int(np.isnan(mask_outliers(step)).sum()) == 0
-
-
-@pytest.mark.parametrize(
-    ("options", "fragment"), [({"window": 4}, "window is 4"), ({"threshold": 0}, "threshold is 0")]
-)
-def test_mask_outliers__refuses(options, fragment):
-    with pytest.raises(InputError, match=fragment):
-        mask_outliers(rough(), **options)
 
 
 @pytest.mark.skipif(not SCANS.exists(), reason="the real scans are not here")
@@ -223,41 +205,9 @@ def test_fill__nearest_measures_in_metres():
     assert float(fill(h, "nearest")[1, 1]) in (4.0, 6.0)
 
 
-def test_fill__refuses():
-    with pytest.raises(InputError, match="absent"):
-        fill(flat_punch(2e-5, 1e-4, 21))
-    with pytest.raises(InputError, match=r"method is 'magic'.*'harmonic'"):
-        fill(rough(), "magic")
-    with pytest.raises(InputError, match="all 1710 points are missing"):
-        fill(rough() * np.nan)
-
-
-@examples(40)
-@given(old=shapes(2, 30), share=st.tuples(st.floats(0.1, 1), st.floats(0.1, 1)))
-def test_resample__coarsening_conserves_the_volume(old, share):
-    new = tuple(max(2, int(n * s)) for n, s in zip(old, share, strict=True))
-    h = from_array(np.random.default_rng(0).random(old), CELL)
-    coarse = resample(h, new)
-    assert coarse.shape == new
-    assert float(coarse.mean()) == pytest.approx(float(h.mean()), rel=1e-12)
-    for axis, d, n, m in zip(("x", "y"), CELL, old, new, strict=True):
-        np.testing.assert_allclose(coarse[axis], (np.arange(m) + 0.5) * n * d / m, rtol=1e-12)
-    assert coarse.min() >= h.min() - 1e-12
-
-
-def test_resample__averages_whole_cells_and_leaves_out_missing_ones():
-    values = np.arange(24.0).reshape(6, 4)
-    values[0, 0] = values[2, 2] = values[3, 2] = values[2, 3] = np.nan
-    coarse = resample(from_array(values, CELL), (3, 2))
-    assert float(coarse[0, 0]) == pytest.approx((1 + 4 + 5) / 3)
-    assert np.isnan(coarse[1, 1])  # three of four are missing
-    assert float(coarse[2, 1]) == pytest.approx((18 + 19 + 22 + 23) / 4)
-    assert float(resample(from_array(values, CELL), (4, 2))[3, 0]) == pytest.approx((0.5 * 16.5 + 20.5) / 1.5)
-
-
 @examples(40)
 @given(old=shapes(3, 24), new=shapes(2, 30), wave=st.tuples(st.integers(0, 23), st.integers(0, 23)))
-def test_band_limit__keeps_the_cosines_that_both_grids_hold_and_no_others(old, new, wave):
+def test_resample__keeps_the_cosines_that_both_grids_hold_and_no_others(old, new, wave):
     """Closed form: a cosine with so many half waves along each side, at the centres of the cells."""
 
     def cosine(shape):
@@ -265,44 +215,39 @@ def test_band_limit__keeps_the_cosines_that_both_grids_hold_and_no_others(old, n
         return np.outer(np.cos(np.pi * wave[0] * x), np.cos(np.pi * wave[1] * y))
 
     assume(all(k < n for k, n in zip(wave, old, strict=True)))
-    found = band_limit(from_array(3.0 + cosine(old), CELL), new)
+    found = resample(from_array(3.0 + cosine(old), CELL), new)
     held = all(k < m for k, m in zip(wave, new, strict=True))
     np.testing.assert_allclose(found, 3.0 + held * cosine(new), atol=1e-12)
     for axis, d, n, m in zip(("x", "y"), CELL, old, new, strict=True):
         np.testing.assert_allclose(found[axis], (np.arange(m) + 0.5) * n * d / m, rtol=1e-12)
 
 
-def test_band_limit__keeps_the_mean_and_more_of_the_slope_than_means_do():
-    h = crop(rough((91, 77)), x=(CELL[0], 1.0))  # no whole period
-    fine, few, means = h, band_limit(h, (45, 39)), resample(h, (45, 39))
-    assert float(few.mean()) == pytest.approx(float(fine.mean()), abs=1e-15)
-    assert float(means.std()) < float(few.std()) < float(fine.std())
-    assert "band-limited: 90 x 77 to 45 x 39 cells, by cosines" in few.attrs["history"]
-
-
-def test_band_limit__bridges_missing_points_and_keeps_them_missing():
+@pytest.mark.parametrize("missing", [False, True])
+def test_resample__keeps_missing_points_missing_and_marks_filled_ones(missing):
+    """A cell is missing if more than half of it is, and marked if any point in it was filled."""
     h = rough((30, 21))
-    holed = h.where((h.x > 8 * CELL[0]) | (h.y > 6 * CELL[1]))
-    found = band_limit(holed, (15, 7))
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(resample(holed, (15, 7))))
-    whole = band_limit(fill(holed), (15, 7))
-    np.testing.assert_allclose(found, whole.where(found.notnull()), rtol=1e-12)
-    assert "filled" not in found.coords
-    np.testing.assert_array_equal(whole["filled"], resample(fill(holed), (15, 7))["filled"])
+    values = h.values.copy()
+    values[:7, :9] = np.nan  # three cells and a half, by three
+    holed = from_array(values, CELL)
+    coarse = resample(holed if missing else fill(holed), (15, 7))
+    share = np.isnan(values).reshape(15, 2, 7, 3).mean((1, 3))
+    np.testing.assert_array_equal(np.isnan(coarse), missing & (share > 0.5))
+    if missing:
+        assert "filled" not in coarse.coords
+        np.testing.assert_allclose(coarse, resample(fill(holed), (15, 7)).where(share <= 0.5), rtol=1e-12)
+    else:
+        np.testing.assert_array_equal(coarse["filled"], share > 0)
+    fine = resample(holed, (45, 42))
+    np.testing.assert_array_equal(np.isnan(fine[:10, :18]), True)
+    np.testing.assert_array_equal(np.isnan(fine[11:, 18:]), False)
 
 
-def test_band_limit__by_blocks_of_rows_is_the_same(monkeypatch):
-    h = rough((40, 33))
-    expected = band_limit(h, (13, 50))
-    monkeypatch.setattr(blocks, "BLOCK", 2000)
-    np.testing.assert_array_equal(band_limit(h, (13, 50)), expected)
-
-
-def test_band_limit__refuses_absent_cells():
-    with pytest.raises(InputError, match=r"band_limit: cells are absent.*take resample"):
-        band_limit(flat_punch(2e-5, 1e-4, 21), 11)
-    with pytest.raises(InputError, match="shape"):
-        band_limit(rough(), 1)
+def test_resample__keeps_absent_material_absent():
+    punch = flat_punch(2e-5, 1e-4, 20)
+    few = resample(punch, 10)
+    assert few.attrs["missing"] == "absent"
+    np.testing.assert_allclose(few.values[few.notnull()], 0, atol=1e-20)
+    assert int(few.notnull().sum()) == pytest.approx(int(punch.notnull().sum()) / 4, abs=6)
 
 
 @pytest.mark.parametrize("periodic", [True, False])
@@ -341,22 +286,11 @@ def test_gaussian_filter__equals_the_sum_that_the_standard_writes():
     assert float(gaussian_filter(h, cutoff)[i, j]) == pytest.approx(expected, rel=1e-9)
 
 
-def test_gaussian_filter__refuses():
-    with pytest.raises(InputError, match=r"cutoff is 8e-06.*three cells, 9e-06"):
-        gaussian_filter(rough(), 8e-6)
-    with pytest.raises(InputError, match="keep is 'both'"):
-        gaussian_filter(rough(), 2e-5, keep="both")
-
-
-def test_crop__keeps_the_coordinates_and_refuses_to_keep_nothing():
+def test_crop__keeps_the_coordinates():
     h = rough()
     part = crop(h, x=(1e-5, 2e-5), y=(0, 4e-5))
     xr.testing.assert_equal(part, h.sel(x=slice(1e-5, 2e-5), y=slice(0, 4e-5)))
     assert part.shape == (5, 13)
-    with pytest.raises(InputError, match="two cells"):
-        crop(h, x=(1.0, 2.0))
-    with pytest.raises(InputError, match="pair"):
-        crop(h, y=3e-5)
 
 
 def test_rotate90__turns_counter_clockwise():
@@ -372,8 +306,6 @@ def test_rotate90__turns_counter_clockwise():
     assert float(was) == float(now)
     np.testing.assert_array_equal(rotate90(rotate90(h, 3)), h)
     np.testing.assert_array_equal(rotate90(h, -1), rotate90(h, 3))
-    with pytest.raises(InputError, match=r"turns is 0\.5"):
-        rotate90(h, 0.5)
 
 
 def test_combine__adds_the_faces_and_refuses_unequal_grids():
@@ -385,8 +317,6 @@ def test_combine__adds_the_faces_and_refuses_unequal_grids():
     for other in (b.isel(x=slice(1, None)), b.assign_coords(x=b.x * 1.001), b.assign_coords(y=b.y + 1e-6)):
         with pytest.raises(InputError, match="one grid"):
             combine(a, other)
-    with pytest.raises(InputError, match="flip is 'z'"):
-        combine(a, b, flip="z")
 
 
 def test_mirror__repeats_without_a_step():
@@ -438,19 +368,3 @@ def test_less_polynomial__of_a_strip_is_that_of_a_line(order):
     rest = values - np.polynomial.Polynomial.fit(np.arange(41), values, order)(np.arange(41))
     np.testing.assert_allclose(less_polynomial(values[:, None], order)[:, 0], rest, rtol=0, atol=1e-12)
     np.testing.assert_allclose(less_polynomial(values[None, :], order)[0], rest, rtol=0, atol=1e-12)
-
-
-def test_level__cubic_takes_off_what_quadratic_leaves():
-    h = rough((60, 50))
-    bent = h + 1e-5 * (h.x / 1e-4) ** 3 - 3e-5 * (h.x / 1e-4) * (h.y / 1e-4) ** 2
-    np.testing.assert_allclose(level(bent, 3), level(h, 3), atol=1e-13)
-    assert float((level(bent, 2) - level(h, 2)).std()) > 2e-7
-
-
-@pytest.mark.parametrize("keep", ["long", "short"])
-def test_gaussian_filter__both_filters_pass_half_at_the_cutoff(keep):
-    """S- and L-filter of one nesting index are complements: both let half of the amplitude pass there."""
-    flat = from_array(np.zeros((240, 7)), CELL)
-    wave = flat + 1e-6 * np.cos(2 * np.pi * flat.x / 2.4e-5)
-    passed = gaussian_filter(wave, 2.4e-5, keep, periodic=True)
-    np.testing.assert_allclose(passed, 0.5 * wave, atol=1e-16)

@@ -1,7 +1,5 @@
 """What is seen in a scan: planted spikes, holes, noise, tilt, form and borders are found by their numbers."""
 
-import itertools
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,7 +8,7 @@ from scan_files import CELL
 import roughvisc as rv
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.cards import condition
-from roughvisc.topography.inspection import _largest_rectangle, inspect_scan
+from roughvisc.topography.inspection import inspect_scan
 from roughvisc.topography.readers import from_array
 
 SMOOTH = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3)
@@ -111,19 +109,15 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
     assert treated.sizes["x"] == 70 * (2 if "mirror" in found.steps else 1)
 
 
-def test_largest_rectangle__is_that_of_brute_force():
-    rng = np.random.default_rng(2)
-    for _ in range(20):
-        present = rng.random((7, 9)) < 0.8
-        (a, b), (c, d) = _largest_rectangle(present)
-        assert present[a:b, c:d].all()
-        best = max(
-            (i1 - i0) * (j1 - j0)
-            for i0, i1 in itertools.combinations(range(8), 2)
-            for j0, j1 in itertools.combinations(range(10), 2)
-            if present[i0:i1, j0:j1].all()
-        )
-        assert (b - a) * (d - c) == best
+@pytest.mark.parametrize(("share", "off"), [(0.004, 0.1), (0.1, 0.35)])
+def test_noise__between_missing_points_is_found_and_overestimated_a_little(share, off):
+    noisy = SMOOTH.values + np.random.default_rng(5).normal(0, 2e-9, SMOOTH.shape)
+    gaps = np.random.default_rng(3).random(SMOOTH.shape) < share
+    found = inspect_scan(with_values(np.where(gaps, np.nan, noisy))).noise
+    assert found.floor
+    assert 0.95 * 2e-9 < found.rms < (1 + off) * 2e-9
+    none = inspect_scan(with_values(np.where(gaps, np.nan, SMOOTH.values))).noise
+    assert not none.floor, "with as many gaps again the floor of filled points grows"
 
 
 def test_small_or_flat__has_no_spectrum():

@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import cell_side, labelled, spacing
+from roughvisc.topography.grid import labelled, spacing
 from roughvisc.topography.parameters import PARAMETERS, parameters, rms_slope
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.spectrum import psd
@@ -20,14 +20,6 @@ def theirs(h, periodic):
     topography = pytest.importorskip("SurfaceTopography").Topography
     size = tuple(n * d for n, d in zip(h.shape, spacing(h), strict=True))
     return topography(np.ma.masked_invalid(h.values), size, periodic=periodic)
-
-
-def test_parameters__are_declared_with_units():
-    found = parameters(ROUGH)
-    assert set(found) == set(PARAMETERS)
-    assert all(found[name].dims == () and found[name].attrs["long_name"] for name in found)
-    assert (found["Sq"].attrs["units"], found["rms_curvature"].attrs["units"]) == ("m", "1/m")
-    found.to_netcdf()
 
 
 @pytest.mark.parametrize("waves", [1, 2])
@@ -183,16 +175,3 @@ def test_lone_cell__has_no_wave_and_no_slope():
     assert spacing(alone) == (2e-6, 3e-6)
     assert float(parameters(alone, periodic=True)["Sq"]) == 0
     assert psd(alone).sizes["wavevector"] == 0
-
-
-@pytest.mark.parametrize("centre", [0.0, -1e-6, np.nan])
-def test_cell_side__of_a_lone_cell_begins_at_zero(centre):
-    with pytest.raises(InputError, match="finite numbers" if np.isnan(centre) else "expected half its side"):
-        cell_side([centre])
-
-
-def test_psd__refuses():
-    with pytest.raises(InputError, match="points are missing"):
-        psd(ROUGH.where(ROUGH.x > 1e-5))
-    with pytest.raises(InputError, match="window is 'box'"):
-        psd(ROUGH, window="box")

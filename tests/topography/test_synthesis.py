@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from strategies import examples, shapes
 
 from roughvisc.errors import InputError
-from roughvisc.topography.synthesis import cone, flat_punch, grown, self_affine, sphere, wavy
+from roughvisc.topography.indenters import grown
+from roughvisc.topography.synthesis import cone, flat_punch, self_affine, sphere, wavy
 
 SIZE, SHAPE = (3e-3, 2e-3), (31, 24)
 
@@ -60,11 +61,6 @@ def test_sphere__exact_cap_satisfies_the_equation_of_the_sphere_and_ends_at_the_
     np.testing.assert_allclose((r2 + (h + 8e-4) ** 2).values[~np.isnan(h)], 8e-4**2, rtol=1e-12)
     assert h.attrs["missing"] == "absent"
     assert "missing" not in sphere(1.0, SIZE, SHAPE, exact=True).attrs
-
-
-def test_sphere__cap_keeps_its_digits_where_it_is_shallow():
-    cap, paraboloid = (sphere(1e3, 1e-6, 5, exact=e).values for e in (True, False))
-    np.testing.assert_allclose(cap, paraboloid, rtol=1e-13)
 
 
 def test_cone__has_the_slope_given():
@@ -177,15 +173,6 @@ def test_self_affine__without_a_cut_off_a_finer_grid_adds_waves_and_keeps_the_ot
     assert sum(abs(many[k]) > 1e-12 for k in many) > 2 * len(ratios)
 
 
-def test_self_affine__takes_as_much_of_a_generator_on_every_grid():
-    drawn = []
-    for shape in ((9, 8), (24, 31)):
-        generator = np.random.default_rng(3)
-        self_affine(1.0, shape, hurst=0.8, rms_slope=0.1, amplitudes="gaussian", seed=generator)
-        drawn.append(generator.random())
-    assert drawn[0] == drawn[1]
-
-
 def test_self_affine__gaussian_amplitudes_scatter_as_those_of_a_random_field():
     """Moments of an exponential distribution for the power of each wave; the variance of the mean square follows."""
     made = {"hurst": 0.8, "rms_height": 2e-6, "rolloff": 8e-4, "shortcut": 4e-4}
@@ -206,21 +193,6 @@ def test_self_affine__gaussian_amplitudes_scatter_as_those_of_a_random_field():
     assert squares.std() == pytest.approx(np.sqrt((shares**2).sum()), rel=0.2)
     phases = [np.angle(np.fft.rfft2(h.values)[here]) for h in (fixed[7], random[7])]
     np.testing.assert_allclose(np.exp(1j * phases[0]), np.exp(1j * phases[1]), atol=1e-9)
-
-
-def test_self_affine__a_recipe_that_no_longer_gives_the_heights_makes_no_other_surface():
-    """A file written when seeds meant other surfaces holds a surface like any other."""
-    import roughvisc as rv
-    from roughvisc.experiment.coarser import coarser
-    from roughvisc.topography.indenters import remade
-    from roughvisc.topography.synthesis import is_analytic
-
-    made = self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=1)
-    former = made.copy(data=self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2).values)
-    assert remade(former, (15, 12)) is None
-    assert grown(former) is None
-    assert not is_analytic(former)
-    xr.testing.assert_equal(coarser(former, 2, "periodic"), rv.resample(former, (15, 12), periodic=True))
 
 
 def test_self_affine__anisotropy_stretches_the_texture_along_x():
@@ -294,35 +266,30 @@ def test_grown__accepts_what_leaves_the_profile_alone():
 
 
 @pytest.mark.parametrize(
-    ("call", "fragments"),
+    ("call", "named"),
     [
-        (lambda: sphere(0.0, 1.0, 5), ("radius is 0.0", "[m]")),
-        (lambda: sphere("1 s", 1.0, 5), ("radius is '1 s'", "second")),
-        (lambda: sphere(1.0, (1.0, math.nan), 5), ("size is nan",)),
-        (lambda: sphere(1.0, (1.0, 1.0, 1.0), 5), ("size is (1.0, 1.0, 1.0)", "pair")),
-        (lambda: sphere(1.0, 1.0, 5.0), ("shape is 5.0", "whole")),
-        (lambda: sphere(1.0, 1.0, (5, 0)), ("shape is (5, 0)",)),
-        (lambda: sphere(1.0, 1.0, True), ("shape is True",)),
-        (lambda: cone(-0.1, 1.0, 5), ("slope is -0.1",)),
-        (lambda: flat_punch(0.01, 1.0, 4), ("radius is 0.01", "cell")),
-        (lambda: wavy(1.0, 0.3, 1.0, 9), ("3.33333 wavelengths", "whole")),
-        (lambda: wavy(1.0, 3.0, 1.0, 9), ("wavelengths",)),
-        (lambda: wavy(1.0, 0.5, 1.0, 9, waves=3), ("waves is 3",)),
-        (lambda: self_affine(1.0, 9, hurst=0.5, seed=0), ("exactly one",)),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rms_height=1.0, seed=0), ("exactly one",)),
-        (lambda: self_affine(1.0, 9, hurst=1.5, rms_slope=1.0, seed=0), ("hurst is 1.5", "at most 1")),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=0.1, seed=0), ("shortcut is 0.1", "two cells")),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rolloff=0.1, seed=0), ("rolloff is 0.1",)),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=2.0, seed=0), ("no wave",)),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, seed="x"), ("seed is 'x'",)),
-        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, amplitudes="x", seed=0), ("amplitudes is 'x'", "gauss")),
+        (lambda: sphere(0.0, 1.0, 5), "radius"),
+        (lambda: sphere("1 s", 1.0, 5), "radius"),
+        (lambda: sphere(1.0, (1.0, math.nan), 5), "size"),
+        (lambda: sphere(1.0, (1.0, 1.0, 1.0), 5), "size"),
+        (lambda: sphere(1.0, 1.0, 5.0), "shape"),
+        (lambda: sphere(1.0, 1.0, (5, 0)), "shape"),
+        (lambda: cone(-0.1, 1.0, 5), "slope"),
+        (lambda: flat_punch(0.01, 1.0, 4), "radius"),
+        (lambda: wavy(1.0, 0.3, 1.0, 9), "size"),
+        (lambda: wavy(1.0, 0.5, 1.0, 9, waves=3), "waves"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, seed=0), "rms_slope"),
+        (lambda: self_affine(1.0, 9, hurst=1.5, rms_slope=1.0, seed=0), "hurst"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=0.1, seed=0), "shortcut"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, rolloff=0.1, seed=0), "rolloff"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, shortcut=2.0, seed=0), "shortcut"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, seed="x"), "seed"),
+        (lambda: self_affine(1.0, 9, hurst=0.5, rms_slope=1.0, amplitudes="x", seed=0), "amplitudes"),
     ],
 )
-def test_recipe__refuses_with_parameter_found_and_expected(call, fragments):
-    with pytest.raises(InputError) as refused:
+def test_recipe__refuses_and_names_the_parameter(call, named):
+    with pytest.raises(InputError, match=named):
         call()
-    assert all(fragment in str(refused.value) for fragment in fragments), refused.value
-    assert "expected" in str(refused.value)
 
 
 def test_strip__of_one_cell_begins_at_zero():
@@ -339,18 +306,6 @@ def test_strip__of_one_cell_begins_at_zero():
         self_affine(1e-3, (33, 1), hurst=0.8, rms_slope=0.1, seed=0)
 
 
-def test_strip__presses_like_the_wave_that_it_stands_for():
-    import roughvisc as rv
-
-    pressed = []
-    for cells in (1, 5):
-        h = wavy(1e-6, 1e-3, (1e-3, cells * 1e-4), (65, cells), waves=1)
-        program = rv.Program().load(1e-4 * cells, over=0)
-        pressed.append(rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", times=1, progress=False))
-    np.testing.assert_allclose(pressed[0].pressure[-1, :, 0], pressed[1].pressure[-1, :, 2], rtol=0.02, atol=30)
-    assert 0.02 < float(pressed[0].contact_fraction[-1]) < 0.9
-
-
 def test_self_affine__takes_little_more_memory_than_its_result():
     """The peak in a process of its own, at 2048 squared: below 1.6 of the result. At 4096 squared: 1.08 times."""
     code = (
@@ -362,14 +317,3 @@ def test_self_affine__takes_little_more_memory_than_its_result():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     if sys.platform == "linux":
         assert float(done.stdout) < 1.6
-
-
-def test_self_affine__transform_in_place_is_the_inverse_of_the_whole_one():
-    from roughvisc.topography.synthesis import synthesised
-
-    rng = np.random.default_rng(0)
-    for nx, ny in [(2, 2), (3, 2), (2, 5), (65, 64), (130, 129), (64, 193)]:
-        heights = rng.normal(size=(nx, ny))
-        found = synthesised(np.fft.rfft2(heights, norm="forward"), ny)
-        np.testing.assert_allclose(found, heights, atol=1e-13)
-        assert found.flags.c_contiguous

@@ -30,12 +30,6 @@ def test_save_scan__netcdf_keeps_mask_history_and_origin(tmp_path):
     assert again.attrs["history"].startswith(h.attrs["history"])
 
 
-def test_save_scan__x3p_keeps_the_history_as_its_comment(tmp_path):
-    x3pio = pytest.importorskip("x3pio")
-    save_scan(rv.level(rv.from_array(tilted(), CELL)), tmp_path / "scan.x3p")
-    assert "levelled" in x3pio.info(tmp_path / "scan.x3p").metadata.comment
-
-
 def test_save_scan__refuses(tmp_path):
     h = rv.from_array(tilted(), CELL)
     with pytest.raises(InputError, match=r"\.stl'.*\.nc, \.x3p, \.sdf"):

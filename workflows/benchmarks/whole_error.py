@@ -78,7 +78,7 @@ def study(family, load, material, seed, cells, friction, scanned):
         "seed": seed,
     }
     if cells != 4 * scanned:
-        surface["band_limit"] = [cells, cells]
+        surface["resample"] = [cells, cells]
     done = (
         f"[friction]\nspeeds = {SPEEDS}\npressure = {load}\n"
         if friction

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.topography.borders import border_mismatch
+from roughvisc.topography.borders import border_mismatch, is_analytic
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import parameters, rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
-from roughvisc.topography.synthesis import is_analytic
 
 #: Part of the mean square slope beyond the shortest wave of a recipe, up to which it is the recipe's surface.
 _SHORTER = 1e-6

@@ -64,13 +64,11 @@ class Variants:
     def on_cells(self, coarsening: float) -> Case:
         """The same waves on cells so many times longer; a half: on cells half as long."""
         surface = self.case.settings.surface
-        key, cells = grid_change(self.case, self.shape, coarsening, self.height.attrs.get("missing") == "absent")
-        if not is_data(self.case) or not (surface.resample or surface.band_limit):
+        key, cells = grid_change(self.case, self.shape, coarsening)
+        if not is_data(self.case) or coarsening > 1 or not surface.resample:
             return vary(self.case, {key: cells})
-        if coarsening > 1:  # the way in which the study itself made the grid
-            return vary(self.case, {"surface.resample" if surface.resample else key: cells})
         held = max(surface.shortest_wave or 0.0, 2 * max(spacing(self.height)))  # a finer grid would hold more waves
-        return vary(self.case, {"surface.shortest_wave": held, "surface.resample": None, "surface.band_limit": cells})
+        return vary(self.case, {"surface.shortest_wave": held, "surface.resample": cells})
 
     def without_last_octave(self, case: Case) -> Case:
         """The case, or one of it on other cells, without the shortest octave of the waves."""
@@ -83,8 +81,7 @@ class Variants:
         """
         mirrored = 2 if self.case.settings.surface.mirror else 1
         cells = [max(2, round(n / mirrored / 2)) for n in self.shape]
-        changes = {"surface.resample": None, "surface.band_limit": cells}
-        return vary(self.case, changes | {"surface.realisation": number})
+        return vary(self.case, {"surface.resample": cells, "surface.realisation": number})
 
 
 def stiffer(case: Case) -> Case:

@@ -301,7 +301,7 @@ def _sizes(cases: Sequence[Case]) -> Iterable[float]:
 def _cells_and_area(case: Case) -> tuple[int, float]:
     """Cells of a case's surface, and its area [m2]; no cells where it is small, or cannot be had."""
     surface = case.settings.surface
-    shape = surface.resample or surface.band_limit or case.made_shape
+    shape = surface.resample or case.made_shape
     if shape is not None:
         return math.prod(shape) * (4 if surface.mirror else 1), 1.0
     file = getattr(surface, "file", None)

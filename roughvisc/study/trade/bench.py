@@ -94,7 +94,6 @@ class TimedRuns:
         self.case, self.shape = case, (height.sizes["x"], height.sizes["y"])
         self.quantities = (*quantities_of(case), *(one.name for one in derived))
         self._derived, self._report = derived, report
-        self._absent = height.attrs.get("missing") == "absent"
         self._until = time.perf_counter() + budget
         self._largest: tuple[Setting, float] | None = None
 
@@ -148,7 +147,7 @@ class TimedRuns:
 
         began = time.perf_counter()
         try:
-            case = changed(self.case, self.shape, setting, self._absent)
+            case = changed(self.case, self.shape, setting)
             dataset = compute(case, progress=passed)
         except _OutOfTime:
             raise NotRun("stopped when the budget was spent") from None

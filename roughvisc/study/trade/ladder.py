@@ -81,8 +81,8 @@ def shape_of(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[int
     return shape if coarsening == 1 else coarser_shape(shape, coarsening, not is_data(case))
 
 
-def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool = False) -> Case:
-    """The case under a setting; ``absent``: the surface says that there is no material where heights are missing.
+def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
+    """The case under a setting.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting, absent: bool =
         expected = "at least 1, since the scan has no finer grid"
         raise InputError(key="coarsening", found=setting.coarsening, expected=expected)
     if setting.coarsening != 1:
-        key, value = grid_change(case, shape, setting.coarsening, absent)
+        key, value = grid_change(case, shape, setting.coarsening)
         changes[key] = value
     return vary(case, changes)
 
@@ -111,18 +111,17 @@ def changed_keys(before: Settings, after: Settings) -> dict[str, Any]:
     }
 
 
-def grid_change(case: Case, shape: tuple[int, int], coarsening: float, absent: bool = False) -> tuple[str, list[int]]:
+def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[str, list[int]]:
     """Key of a study and its value that make the surface's cells so many times longer.
 
-    An analytic profile is made anew; anything else keeps the waves that the cells can hold, or means over them where
-    the material ends within the grid: ``absent``, the surface itself says so. Finer cells hold no more waves.
+    An analytic profile is made anew; anything else keeps the waves that the cells can hold.
+    Finer cells hold no more waves.
     """
     cells = shape_of(case, shape, coarsening)
     if not is_data(case):
         return "surface.shape", list(cells)
     mirrored = 2 if case.settings.surface.mirror else 1
-    ends = absent or case.settings.surface.missing == "absent"
-    return f"surface.{'resample' if ends else 'band_limit'}", [max(2, n // mirrored) for n in cells]
+    return "surface.resample", [max(2, n // mirrored) for n in cells]
 
 
 def has_steps(case: Case) -> bool:

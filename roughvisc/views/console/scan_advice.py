@@ -112,7 +112,7 @@ def _borders(found: Inspection) -> tuple[str, str]:
     if not found.borders.jumps:
         return seen, 'boundary = "periodic" needs no mirror'
     return seen, (
-        'for boundary = "periodic" set mirror = true, at no extra cost; otherwise the step at the seam carries '
+        'for boundary = "periodic" set mirror = true, at no extra cost; otherwise the step at the seam carries load'
     )
 
 

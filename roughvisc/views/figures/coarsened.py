@@ -1,4 +1,4 @@
-"""Maps as they are drawn: of a big one, blocks of cells with their extremes kept, read some rows at a time.
+"""Maps as they are drawn: of a big one, blocks of cells with their extremes kept.
 
 A map of up to 1024 cells a side is drawn as it is. Of a larger one a cell drawn stands for a block of cells: for their
 largest pressure, their smallest gap, contact if any of them touches, and the mean of heights and displacements. So a
@@ -7,13 +7,9 @@ spot of one cell is seen, which a picture of fewer points than cells would lose.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-
 import numpy as np
 import xarray as xr
 
-from roughvisc.topography.blocks import row_blocks
 from roughvisc.topography.grid import axis_step
 from roughvisc.variables.axes import axis_of
 
@@ -68,12 +64,8 @@ def drawn(field: xr.DataArray, height: xr.DataArray | None = None) -> xr.DataArr
         field = field.load()
         return field if height is None else field.where(height.notnull())
     shape = (-(-field.sizes["x"] // every), -(-field.sizes["y"] // every))
-    values, together = np.empty(shape), math.lcm(every, rows_of_chunk(field))
-    heights = None if height is None else row_parts(height, together)
-    for rows, part in row_parts(field, together):
-        if heights is not None:
-            part = np.where(np.isnan(next(heights)[1]), np.nan, part)
-        values[rows.start // every : -(-rows.stop // every)] = in_blocks(part, every, str(field.name))
+    field = field.transpose("x", "y")
+    values = in_blocks((field if height is None else field.where(height.notnull())).values, every, str(field.name))
     axes = {}
     for axis, count in zip(("x", "y"), shape, strict=True):
         side = axis_step(field, axis, "figure")
@@ -97,31 +89,11 @@ def in_blocks(values: np.ndarray, every: int, name: str = "") -> np.ndarray:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-def rows_of_chunk(field: xr.DataArray) -> int:
-    """Rows of a map that its file holds together; 1 where it is of no file."""
-    return int((field.encoding.get("chunksizes") or (1, 1))[-2])
-
-
-def row_parts(field: xr.DataArray, multiple: int = 0) -> Iterator[tuple[slice, np.ndarray]]:
-    """Rows of a map and their values, some MB at a time: whole chunks of its file, or whole multiples of so many rows.
-
-    Of a map on Dask, whose blocks are whole frames, the frame is read at once.
-    """
-    field = field.transpose("x", "y").compute() if field.chunks else field.transpose("x", "y")
-    for rows in row_blocks(field.shape, multiple=multiple or rows_of_chunk(field)):
-        yield rows, field.isel(x=rows).values
-
-
 def summed(field: xr.DataArray, along: str) -> np.ndarray:
     """Sums of the known cells of a map along one axis."""
-    if along == "y":
-        return np.concatenate([np.nansum(values, axis=1) for _, values in row_parts(field)])
-    return np.sum([np.nansum(values, axis=0) for _, values in row_parts(field)], axis=0)
+    return np.asarray(field.sum(along).values)
 
 
 def largest(field: xr.DataArray, along: str | None = None) -> np.ndarray:
     """The largest of the known cells of a map along one axis, or of all; NaN where there is none."""
-    if along == "y":
-        return np.concatenate([np.fmax.reduce(values, axis=1) for _, values in row_parts(field)])
-    columns = np.fmax.reduce([np.fmax.reduce(values, axis=0) for _, values in row_parts(field)])
-    return columns if along else np.fmax.reduce(columns)
+    return np.asarray(field.max(along).values)

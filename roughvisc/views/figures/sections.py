@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -17,7 +15,7 @@ from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
-from roughvisc.views.figures.coarsened import largest, row_parts, rows_of_chunk, summed
+from roughvisc.views.figures.coarsened import largest, summed
 from roughvisc.views.figures.fields import measured_part, plane_unit
 from roughvisc.views.figures.rows import RowAxis, at_rows, frame_at, require, rows_of
 
@@ -63,16 +61,8 @@ def deformed_surface(dataset: xr.Dataset, frame: int, **line: int) -> xr.DataArr
 
 def _offset(frame_of: xr.Dataset) -> float:
     """What the displacement of one frame is less than the height of the surface, everywhere. [m]"""
-    fields = [_parts(frame_of, name) for name in ("height", "gap", "displacement") if name in frame_of]
-    if "gap" not in frame_of:
-        return float(np.nanmax([np.fmax.reduce(h - u, axis=None) for h, u in zip(*fields, strict=True)]))
-    offsets = (h + g - u for h, g, u in zip(*fields, strict=True))
-    return next((float(np.nanmedian(one)) for one in offsets if np.isfinite(one).any()), np.nan)
-
-
-def _parts(frame_of: xr.Dataset, name: str) -> Iterator[np.ndarray]:
-    """Values of a map, the same rows at a time of every map of a result."""
-    return (values for _, values in row_parts(frame_of[name], rows_of_chunk(frame_of["displacement"])))
+    beyond = (frame_of["height"] - frame_of["displacement"]).values
+    return float(np.nanmax(beyond) if "gap" not in frame_of else np.nanmedian(beyond + frame_of["gap"].values))
 
 
 @style.apply

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.topography import blocks
 from roughvisc.topography.bandwidth import off_plane
 from roughvisc.topography.grid import cell_edges, checked, spacing
-from roughvisc.topography.spectrum import MOST_MISSING, psd, unmeasured
+from roughvisc.topography.missing_points import fill
+from roughvisc.topography.spectrum import psd
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
@@ -57,9 +57,9 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
     tuple of float
         The lowest and the highest height where no point is beyond. [m]
     """
-    lower, median, upper = blocks.percentiles_of(values, (25, 50, 75))
+    lower, median, upper = np.nanpercentile(values, (25, 50, 75))
     reach = _REACH * (upper - lower) / 1.349  # the quartiles of the normal distribution are 1.349 deviations apart
-    lowest, highest = blocks.extremes_of(values)
+    lowest, highest = float(np.nanmin(values)), float(np.nanmax(values))
     if not reach > 0:
         return lowest, highest
     return max(lowest, float(median - reach)), min(highest, float(median + reach))
@@ -67,8 +67,7 @@ def robust_limits(values: np.ndarray) -> tuple[float, float]:
 
 def _beyond(values: np.ndarray, low: float, high: float) -> float:
     """Share of the points below and above limits."""
-    parts = (values[rows] for rows in blocks.row_blocks(values.shape))
-    return sum(np.count_nonzero((part < low) | (part > high)) for part in parts) / values.size
+    return np.count_nonzero((values < low) | (values > high)) / values.size
 
 
 @style.apply
@@ -91,32 +90,32 @@ def surface(height: xr.DataArray) -> Figure:
     -----
     Map and profile show the heights as they are; distribution and spectrum those less their mean plane. The
     distribution is shown with the normal one of the same Sq. The spectrum is that of :func:`roughvisc.psd` under a
-    Hann window, by measured points alone: those that are missing or were filled in are bridged.
+    Hann window; missing points are filled for it.
     """
     whole = _checked(height)
     height = measured_part(whole)
     low, high = robust_limits(height.values)
-    mean = blocks.mean_of(height.values)
+    mean, ends = float(height.mean()), (float(height.min()), float(height.max()))
     unit, plane = unit_for([high - mean, low - mean], "m"), plane_unit(height)
     figure, panels = _panels(plane_ratio(height))
     on_map = panels["map"]
     image = draw_map(on_map, drawn(height), unit, plane, vmin=float(unit(low)), vmax=float(unit(high)))
     beyond = _beyond(height.values, low, high)
-    scale = Scale("height", low, high, *blocks.extremes_of(height.values), marked=False)
+    scale = Scale("height", low, high, *ends, marked=False)
     levelled = ", levelled" if "levelled: polynomial" in str(height.attrs.get("history", "")) else ""
     colour_bar(figure, [image], scale, unit, VARIABLES["height"].label + levelled, bar_side(height))
     label_plane(on_map, height, plane)
-    missing = (height.size - blocks.count_of(height.values)) / height.size
+    missing = float(height.isnull().mean())
     notes = ["measured area only; mirror images are not shown"] if height.size < whole.size else []
     notes += [f"{100 * missing:.2g} % of the points are missing (grey)"] if missing else []
     notes += [f"{100 * beyond:.2g} % lie beyond the scale of heights"] if beyond else []
     if (every := stride(height)) > 1:
-        ends = " to ".join(unit.text(one) for one in blocks.extremes_of(height.values))
+        ends = " to ".join(unit.text(one) for one in ends)
         notes += [f"the map is of means of {every} × {every} points; heights are {ends}"]
     said = "; ".join(notes)
     style.note_below(figure, f"{said[:1].upper()}{said[1:]}." if said else "")
     _draw_profile(panels["profile"], on_map, height, unit, plane)
-    height = off_plane(height)  # of a big one that was read for this, no more is held than is needed
+    height = off_plane(height)
     _draw_heights(panels["heights"], height, unit)
     _draw_spectrum(panels["spectrum"], height)
     style.letter_panels(list(panels.values()))
@@ -153,21 +152,21 @@ def _draw_profile(ax: Axes, on_map: Axes, height: xr.DataArray, unit: Unit, plan
 
 
 def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
-    count = blocks.count_of(levelled.values)
+    known = levelled.values[np.isfinite(levelled.values)]
     low, high = (float(unit(limit)) for limit in robust_limits(levelled.values))
-    mean, deviation = float(unit(blocks.mean_of(levelled.values))), float(unit(blocks.deviation_of(levelled.values)))
-    bins = int(np.clip(math.sqrt(count) / 1.5, 8, 100))
+    mean, deviation = float(unit(known.mean())), float(unit(known.std()))
+    bins = int(np.clip(math.sqrt(known.size) / 1.5, 8, 100))
     if deviation == 0:
         style.say_inside(ax, "flat: one height")
         ax.set_xlabel(unit.label("Height, levelled"))
         ax.set_yticks([])
         return
     edges = np.linspace(low, high, bins + 1)
-    found = sum(np.histogram(unit(known), bins, (low, high))[0] for known in blocks.known_values(levelled.values))
+    found = np.histogram(unit(known), bins, (low, high))[0]
     ax.hist(
         edges[:-1],
         bins=edges,
-        weights=found * bins / ((high - low) * count),
+        weights=found * bins / ((high - low) * known.size),
         color=style.BLUE,
         alpha=0.45,
         histtype="stepfilled",
@@ -184,10 +183,10 @@ def _draw_heights(ax: Axes, levelled: xr.DataArray, unit: Unit) -> None:
 
 
 def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
-    gaps = np.count_nonzero(unmeasured(levelled))
-    bridged, wavevector, density = gaps <= MOST_MISSING * levelled.size, np.zeros(0), np.zeros(0)
-    if bridged and min(levelled.shape) >= 8:
-        spectrum = psd(levelled, window="hann", bridge=True)
+    wavevector, density = np.zeros(0), np.zeros(0)
+    gaps = bool(levelled.isnull().any())
+    if min(levelled.shape) >= 8:
+        spectrum = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
         spectrum = spectrum.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings that are seen whole
         wavevector, density = spectrum["wavevector"].values, spectrum["psd"].values
     symbol, scale = "m", 1.0
@@ -199,10 +198,10 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
         style.spread_axis(ax.xaxis, x, always=True)
         style.spread_axis(ax.yaxis, y, always=True)
         ax.set_ylim(bottom=max(ax.get_ylim()[0], _NOTHING * float(y.max())))
-        ax.set_title("gaps bridged" if gaps else "", loc="right")
+        ax.set_title("gaps filled" if gaps else "", loc="right")
         ax.grid(color="0.9", lw=0.5)
     else:
-        style.say_inside(ax, "too small or too flat" if bridged else "too few measured points")
+        style.say_inside(ax, "too small or too flat")
         ax.set_xticks([])
         ax.set_yticks([])
     ax.set_xlabel(f"Wavevector [rad/{symbol}]")

@@ -28,7 +28,6 @@ from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import no_results, open_result, result_files
 from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
 from roughvisc.study.storage.table import realisations_table
-from roughvisc.topography.blocks import count_of, mean_of, percentiles_of, row_blocks
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables.axes import axis_of
@@ -302,9 +301,7 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
 
 def _alike(before: xr.DataArray, after: xr.DataArray) -> bool:
     one, other = before.values, after.values
-    return one.shape == other.shape and all(
-        np.allclose(one[rows], other[rows], rtol=1e-12, atol=0, equal_nan=True) for rows in row_blocks(one.shape)
-    )
+    return one.shape == other.shape and np.allclose(one, other, rtol=1e-12, atol=0, equal_nan=True)
 
 
 def _parameter(value: xr.DataArray) -> str:
@@ -323,8 +320,8 @@ def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Fig
     axes = figure.subplots(1, 2)
     heights = (found.before, found.after)
     for ax, height, title in zip(axes, heights, ("before", "after conditioning"), strict=True):
-        missing = height.size - count_of(height.values)
-        ends = np.array(percentiles_of(height.values, (0.5, 99.5))) - (mean := mean_of(height.values))
+        missing = int(height.isnull().sum())
+        ends = np.nanpercentile(height.values, (0.5, 99.5)) - (mean := float(height.mean()))
         height = (drawn(height.rename("height")) - mean).rename("height")
         unit, plane = unit_for(ends, "m"), plane_unit(height)
         low, high = unit(ends)

@@ -120,7 +120,7 @@ def test_time_scale__of_friction_is_its_slope_over_speed(tmp_path):
     found = stated(study, tmp_path, "friction_coefficient", time_scale_error=0.05)
     faster = []
     for speed in (1e-3, 1.1e-3):
-        coarse = rv.vary(study, {"surface.band_limit": [27, 25], "friction.speeds": [speed]})
+        coarse = rv.vary(study, {"surface.resample": [27, 25], "friction.speeds": [speed]})
         faster.append(float(rv.run(coarse, out=tmp_path / "curve", progress=False)["friction_coefficient"][0]))
     slope = abs(np.log(faster[1] / faster[0])) / np.log(1.1)
     assert width(found, "time scale") == pytest.approx(slope * np.log(1.05), rel=1e-3)
@@ -129,7 +129,7 @@ def test_time_scale__of_friction_is_its_slope_over_speed(tmp_path):
 
 def test_grid__holds_the_change_to_cells_half_as_long(tmp_path):
     study = case(ROUGH, tmp_path)
-    fine = rv.run(rv.vary(study, {"surface.band_limit": [108, 100]}), out=tmp_path / "fine", progress=False)
+    fine = rv.run(rv.vary(study, {"surface.resample": [108, 100]}), out=tmp_path / "fine", progress=False)
     for name in ("contact_area", "mean_gap"):
         found = stated(study, tmp_path, name)
         assert (np.abs(np.log(fine[name] / found["value"])) < found["half_width"].sel(source="grid")).all()
@@ -160,7 +160,7 @@ def test_missing_waves__count_on_one_side(tmp_path):
 def test_interval__holds_the_waves_that_a_finer_grid_shows(tmp_path):
     """The same surface with its waves down to the cut-off, on a grid that holds them."""
     fine = case(ROUGH, tmp_path, **{"surface.shape": [216, 200], "surface.shortcut": "18.6 um"})
-    scan = rv.vary(fine, {"surface.band_limit": [54, 50]})
+    scan = rv.vary(fine, {"surface.resample": [54, 50]})
     true = rv.run(fine, out=tmp_path / "true", progress=False)
     for name in ("contact_area", "mean_gap"):
         found = stated(scan, tmp_path, name, cutoff="18.6 um", modulus_error=0.0, time_scale_error=0.0)
@@ -176,7 +176,7 @@ def test_sample__is_the_scatter_of_other_patches(tmp_path):
     assert width(patch, "sample") == 0
     gaps = []
     for seed in range(20, 32):
-        other = rv.vary(study, {"surface.seed": seed, "surface.band_limit": [27, 25]})
+        other = rv.vary(study, {"surface.seed": seed, "surface.resample": [27, 25]})
         gaps.append(rv.run(other, out=tmp_path / "others", progress=False)["mean_gap"].values[-1])
     scatter = np.std(np.log(gaps), ddof=1)
     assert 0.3 < width(ensemble, "sample") / (3.3 * scatter) < 3  # 6 and 12 draws
@@ -375,7 +375,7 @@ def test_choice__is_where_the_rule_of_three_grids_first_fits(tmp_path):
     found = got(study, tmp_path, {"mean_gap": "0.5 %"})
     gaps = []
     for shape in cells:
-        one = rv.vary(study, {"surface.band_limit": shape, "solve.tolerance": 1e-3})
+        one = rv.vary(study, {"surface.resample": shape, "solve.tolerance": 1e-3})
         gaps.append(np.log(rv.run(one, tmp_path / "check", progress=False)["mean_gap"].values))
     last, before = np.abs(np.diff(gaps, axis=0))[1:], np.abs(np.diff(gaps, axis=0))[:-1]
     errors = (3 / (2**1.5 - 1) * np.maximum(last, before / 2**1.5)).max(axis=1)

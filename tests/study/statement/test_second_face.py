@@ -80,9 +80,7 @@ def test_second__runs_and_says_so(two, tmp_path):
 
 def test_second__is_data_of_which_a_trade_keeps_the_waves_that_a_coarser_grid_holds(two):
     assert is_data(two)
-    assert grid_change(two, (30, 40), 2.0) == ("surface.band_limit", [15, 20])
-    ends = vary(two, {"surface.missing": "absent"})
-    assert grid_change(ends, (30, 40), 2.0) == ("surface.resample", [15, 20])
+    assert grid_change(two, (30, 40), 2.0) == ("surface.resample", [15, 20])
     assert unit_of("surface.second.offset") == unit_of("surface.second.radius") == "m"
 
 

@@ -105,7 +105,7 @@ def test_friction__errors_are_those_against_its_finest_run(tmp_path):
         )
 
     fine = curve(case.height(), 2e-4)
-    few = rv.band_limit(case.height(), (13, 10), periodic=True)
+    few = rv.resample(case.height(), (13, 10), periodic=True)
     runs = [curve(case.height(), 0.1), curve(case.height(), 0.01), curve(few, 1e-3)]
     for name in (FRICTION, AREA, "approach", "mean_gap"):
         expected = [float(abs(run[name] - fine[name]).max() / fine[name].max()) for run in runs]

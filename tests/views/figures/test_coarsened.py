@@ -7,7 +7,6 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc import recorder as chunks
 from roughvisc.study.storage import store
-from roughvisc.topography import blocks
 from roughvisc.topography.grid import cell_edges
 from roughvisc.views.figures import coarsened, sections
 
@@ -37,9 +36,8 @@ def result(displacement=False):
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Maps of at most 16 cells a side, read a few rows at a time: a cell drawn for 4 x 4."""
+    """Maps of at most 16 cells a side: a cell drawn for 4 x 4."""
     monkeypatch.setattr(coarsened, "MOST_DRAWN", 16)
-    monkeypatch.setattr(blocks, "BLOCK", 8 * 37 * 4)
 
 
 @pytest.fixture
@@ -110,17 +108,6 @@ def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(s
     assert contact.chunks
     assert max(int(np.prod(shape)) for shape in shapes) == SHAPE[0] * SHAPE[1], "a frame"
     xr.testing.assert_equal(contact.compute(), rv.observables.contact(loaded))
-
-
-def test_figures__of_a_big_file_read_some_rows_at_a_time(stored, coarse):
-    opened, shapes = stored
-    shapes.clear()
-    rv.plot.maps(opened)
-    rv.plot.section(opened)
-    film = rv.plot.animation(opened, frames=2)
-    film._draw_was_started = True
-    assert max(int(np.prod(shape)) for shape in shapes) <= 8 * SHAPE[1], "rows of one chunk"
-    assert not any(opened[name].variable._in_memory for name in ("height", "pressure", "gap", "displacement"))
 
 
 def test_deformed_line__is_that_of_the_whole_surface(coarse):

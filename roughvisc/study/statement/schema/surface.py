@@ -130,7 +130,6 @@ class Conditioned(Prepared):
 
     shortest_wave: nullable(LENGTH) = None
     realisation: nullable(whole(1)) = None
-    band_limit: nullable(SHAPE) = None
     resample: nullable(SHAPE) = None
     mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
