@@ -80,6 +80,14 @@ class DiskFullError(TransientError):
     """No space is left for what a case has to write."""
 
 
+class UnusableFileError(InputError, TransientError):
+    """A file under the name of a result cannot be read, or is none that this version reads: it is left as it is."""
+
+
+class DamagedError(InputError, TransientError):
+    """A file was read, and its content is broken."""
+
+
 class TooLargeError(InputError, TransientError):
     """A case takes more memory than there is here: the message says how much, and what would fit."""
 

@@ -112,28 +112,24 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
 def verify(results: Path) -> None:
     """Check results for damage.
 
-    Compares every file with its checksum and changes nothing. The exit status is 1 if a file is damaged. Run the study
-    again to replace damaged results. Files that another program has changed have no checksum; they are listed, and
-    cannot be checked.
+    Reads every file to its end, compares each block with its checksum, and changes nothing. The exit status is 1 if a
+    file is damaged or cannot be read. Remove a damaged file and run its study again to replace it.
 
     \b
     Example:
       roughvisc verify results/focus_variation-study
     """
-    from roughvisc.study.storage.files import UNSEALED
     from roughvisc.study.storage.upkeep import verify as verified
 
     found = verified(results)
     bad = [one for one in found if one.flaw]
-    bare = [one for one in found if not one.flaw and not one.sealed]
+    bare = [one for one in found if not one.flaw and not one.has_checksums]
     for one in bad:
-        complain(f"{one.path}: is damaged: {one.flaw}")
-    for one in bare:
-        complain(f"{one.path}: {UNSEALED}")
+        complain(one.flaw)
     whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} intact"
-    click.echo(whole + (f", {len(bare)} of them without a checksum" if bare else ""))
+    click.echo(whole + (f", {len(bare)} of them without checksums, written by another program" if bare else ""))
     if bad:
-        raise Failure(f"{counted(len(bad), 'damaged file')}: run the study again to replace the results", 1)
+        raise Failure(f"{counted(len(bad), 'file')} damaged or not readable", 1)
 
 
 @click.command()

@@ -16,7 +16,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, InputError, InUseError, RoughviscError, TooLargeError, TransientError
+from roughvisc.errors import (
+    ConvergenceError,
+    DamagedError,
+    InputError,
+    InUseError,
+    RoughviscError,
+    TooLargeError,
+    TransientError,
+    UnusableFileError,
+)
 from roughvisc.experiment.resources import require_surface
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
@@ -28,7 +37,7 @@ from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import open_result, quarantine, result_path, write_result
+from roughvisc.study.storage.store import open_result, result_path, set_aside, write_result
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, axis_of
 
@@ -211,8 +220,8 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path):
-                    if path.exists() and (problem := _problem(case, path)):
-                        quarantine(path, problem)
+                    if told := _set_aside_if_damaged(path):
+                        log.warning("%s", told)
                     keeper.resume()
                     _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
@@ -233,12 +242,27 @@ def run_case(
 
 
 def set_aside_damaged(case: Case, folder: Path) -> str:
-    """Set the file of a case aside if it is not its result, unless a run is at work on it; why, empty if it was not."""
+    """Rename the file of a case if it is damaged, unless a run is at work on it; return the line that says so.
+
+    Raises
+    ------
+    InputError
+        If a file of that name cannot be read or is something else.
+    """
     path = result_path(folder, case.key)
-    with suppress(InUseError, OSError), lock_case(lock_path(folder, case.key), patience=0.0):
-        if path.exists() and (problem := _problem(case, path)):
-            quarantine(path, problem)
-            return f"{problem}; it is renamed to {path.name}.damaged"
+    if not is_result_of(case, path):
+        with suppress(InUseError, OSError), lock_case(lock_path(folder, case.key), patience=0.0):
+            return _set_aside_if_damaged(path)
+    return ""
+
+
+def _set_aside_if_damaged(path: Path) -> str:
+    try:
+        open_result(path).close()
+    except DamagedError as error:
+        return set_aside(path, error)
+    except InputError:  # there is none
+        pass
     return ""
 
 
@@ -258,18 +282,26 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Checkpo
 
 
 def is_result_of(case: Case, path: Path) -> bool:
-    """Return whether a file is the whole result of a case."""
-    return path.exists() and not _problem(case, path)
+    """Return whether a file is the result of a case; an absent or damaged one is not.
 
-
-def _problem(case: Case, path: Path) -> str:
-    """Why a file is not the whole result of a case; empty if it is."""
+    Raises
+    ------
+    InputError
+        If a file of that name cannot be read, or is something else.
+    """
+    if not path.exists():
+        return False
     try:
         with open_result(path) as dataset:
             found = dataset.attrs.get("case_key")
-    except InputError as error:
-        return str(error)
-    return "" if found == case.key else f"{path}: holds the result of case {found}: expected that of its name"
+    except DamagedError:
+        return False
+    if found != case.key:
+        expected = f"the result of case {case.key}, which its name says"
+        raise UnusableFileError(
+            f"{path}: holds the result of case {found}: expected {expected}", key=str(path), found=found
+        )
+    return True
 
 
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:

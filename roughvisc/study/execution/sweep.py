@@ -25,7 +25,7 @@ from roughvisc.study.execution.run import result_folder, set_aside_damaged
 from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, log_file, recorded_failure
-from roughvisc.study.storage.files import UNSEALED, is_writable, require_writable
+from roughvisc.study.storage.files import is_writable, require_writable
 from roughvisc.study.storage.index import Index, index_of, warn_of
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.upkeep import clean_folder
@@ -135,7 +135,7 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong.
+        If a setting is wrong, or a file under the name of a result cannot be read.
     DiskFullError
         If the disk is full; the cases that are left are not begun.
     RoughviscError
@@ -175,10 +175,6 @@ def run_cases(
         try:
             _tell_beforehand(book, index, todo, writable)
             _compute(todo, folder, book, client, processes, threads)
-            unsealed = [one.entry.file for one in outcomes.values() if one.entry and not one.entry.sealed]
-            if unsealed:
-                more = f" and {len(unsealed) - 1} more" if len(unsealed) > 1 else ""
-                book.tell(f"{folder / unsealed[0]}{more}: {UNSEALED}")
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise
@@ -202,7 +198,7 @@ def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], wri
     problems = dict(index.problems)
     for key in index.problems.keys() & todo.keys():
         if told := set_aside_damaged(todo[key], book.folder):
-            book.watch.message(f"{told} and computed again")
+            book.watch.message(told)
             del problems[key]
     warn_of(book.folder, problems)
 

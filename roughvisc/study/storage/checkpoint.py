@@ -32,9 +32,7 @@ from roughvisc.recorder import Checkpoint, Frame
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.files import (
     atomic_write,
-    open_unlinked,
     pack_with_checksum,
-    refuse_link,
     unpack_with_checksum,
 )
 from roughvisc.variables import RESULT_FORMAT
@@ -157,7 +155,7 @@ class RowFile:
         self._begins = [0]  # of the rows in the file, and where the next is to begin
         self._waiting: list[Mapping[str, Array]] = []
         self._weight = 0  # of those that wait [bytes]
-        self._stream = os.fdopen(open_unlinked(path, os.O_RDWR, "rows of a run"), "r+b", buffering=0)
+        self._stream = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b", buffering=0)
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Take up a row, whose arrays are not changed any more."""
@@ -322,11 +320,6 @@ class CheckpointWriter:
         so many accepted steps.
     stop : callable or None
         Asked after every accepted step.
-
-    Raises
-    ------
-    FolderError
-        If the folder or a file in it is a link.
     """
 
     def __init__(
@@ -339,10 +332,7 @@ class CheckpointWriter:
         steps: int | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> None:
-        refuse_link(folder, "the folder of an unfinished run")
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
-        for path in self._paths:
-            refuse_link(path, "a checkpoint of a run")
         folder.mkdir(exist_ok=True)
         self.rows = RowFile(folder / "rows")
         self.in_memory = False

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.study.statement.identity import program_version
-from roughvisc.study.storage.files import UNSEALED, require_folder, verify_checksum, warn_once
+from roughvisc.study.storage.files import require_file, require_folder, warn_once
 from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
-from roughvisc.study.storage.store import NETCDF, is_json_table, result_files, result_path
+from roughvisc.study.storage.store import is_json_table, open_result, result_files, result_path
 from roughvisc.variables.axes import AXES, axis_of
 
 log = logging.getLogger("roughvisc")
@@ -58,8 +58,6 @@ class Entry:
         Everything over the rows, ``time`` or ``speed`` too.
     x, y : ndarray
         Positions of the cells. [m]
-    sealed : bool
-        Whether the file has a checksum.
     """
 
     file: str
@@ -69,7 +67,6 @@ class Entry:
     histories: dict[str, NDArray[Any]] = field(repr=False)
     x: NDArray[np.float64] = field(repr=False)
     y: NDArray[np.float64] = field(repr=False)
-    sealed: bool = True
 
     @property
     def key(self) -> str:
@@ -114,30 +111,21 @@ def read_entry(path: Path) -> Entry:
     Raises
     ------
     InputError
-        If the file is no result, or is damaged.
+        If the file cannot be read, is no result, or is damaged.
     """
-    import netCDF4
-
-    try:
-        stamp = _stamp(path)
-        sealed = verify_checksum(path)
-        with NETCDF, netCDF4.Dataset(path) as file:
-            file.set_auto_mask(False)
-            attributes = dict(file.__dict__)
-            histories = {name: file[name][:] for name in _names_of_histories() if name in file.variables}
-            fields = {name: v.dtype.str for name, v in file.variables.items() if v.dimensions[-2:] == ("x", "y")}
-            x, y = file["x"][:], file["y"][:]
-    except (OSError, RuntimeError, IndexError, AttributeError) as error:
-        raise InputError(
-            f"{path}: is damaged, or no result of roughvisc ({error}): expected a whole one; run it again"
-        ) from error
+    require_file(path)
+    stamp = _stamp(path)
+    with open_result(path) as result:
+        attributes = {name: one.item() if isinstance(one, np.generic) else one for name, one in result.attrs.items()}
+        histories = {name: result[name].values for name in _names_of_histories() if name in result.variables}
+        fields = {str(name): one.dtype.str for name, one in result.variables.items() if one.dims[-2:] == ("x", "y")}
+        grid = [np.asarray(result[name].values, float) for name in ("x", "y") if name in result.variables]
     along = axis_of(histories)
     absent = [name for name in (along, "force", "status") if name not in histories]
-    if absent or not is_json_table(attributes.get("case")):
-        raise InputError(f"{path}: holds no {', '.join([*absent, 'case'])}: expected a result of roughvisc run")
-    plain = {name: v.item() if isinstance(v, np.generic) else v for name, v in attributes.items()}
-    kept = {name: v for name, v in plain.items() if isinstance(v, str | int | float)}
-    return Entry(path.name, stamp, kept, fields, histories, np.asarray(x, float), np.asarray(y, float), sealed)
+    if absent or len(grid) < 2 or not is_json_table(attributes.get("case")):
+        raise InputError(f"{path}: holds no {', '.join([*absent, 'grid or case'])}: expected a result of roughvisc run")
+    kept = {str(name): one for name, one in attributes.items() if isinstance(one, str | int | float)}
+    return Entry(path.name, stamp, kept, fields, histories, grid[0], grid[1])
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -173,8 +161,6 @@ def index_of(folder: Path, known: Iterable[Entry] = (), *, warn: bool = True) ->
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
                 entry = read_entry(path)
-            elif not entry.sealed and warn:
-                warn_once(path, f"{path}: {UNSEALED}")
         except InputError as error:
             problems[path.stem] = str(error)
         except FileNotFoundError:  # gone meanwhile
@@ -204,7 +190,7 @@ def save_index(folder: Path, index: Index) -> None:
         grid = json.dumps([_packed(entry.x), _packed(entry.y)])  # most results are on one
         histories = {name: _packed(values) for name, values in entry.histories.items()}
         number = grids.setdefault(grid, len(grids))
-        results[entry.file] = [*entry.stamp, entry.attributes, entry.fields, number, entry.sealed, histories]
+        results[entry.file] = [*entry.stamp, entry.attributes, entry.fields, number, histories]
     stated = {"version": program_version(), "grids": [json.loads(grid) for grid in grids], "results": results}
     write_json(folder / INDEX, stated)
 
@@ -217,9 +203,9 @@ def _load(path: Path) -> dict[str, Entry]:
             return {}
         grids = [(_unpacked(x), _unpacked(y)) for x, y in stated["grids"]]
         entries = {}
-        for file, (size, changed, attributes, fields, grid, sealed, packed) in stated["results"].items():
+        for file, (size, changed, attributes, fields, grid, packed) in stated["results"].items():
             histories = {name: _unpacked(one) for name, one in packed.items()}
-            entries[file] = Entry(file, (size, changed), attributes, fields, histories, *grids[grid], sealed)
+            entries[file] = Entry(file, (size, changed), attributes, fields, histories, *grids[grid])
         return entries
     except FileNotFoundError:
         return {}

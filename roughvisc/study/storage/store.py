@@ -26,11 +26,11 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
-from roughvisc.errors import InputError
+from roughvisc.errors import DamagedError, InputError, UnusableFileError
 from roughvisc.labels import annotate
 from roughvisc.recorder import chunks
 from roughvisc.steps import STEPS, steps_of, with_steps
-from roughvisc.study.storage.files import append_checksum, atomic_write, is_news, verify_checksum
+from roughvisc.study.storage.files import atomic_write, require_file
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import shown
 from roughvisc.variables import RESULT_FORMAT
@@ -48,7 +48,7 @@ _NEARLY_FULL = 1 << 20
 #: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms, which would slow a run by more than a tenth.
 _WORTHWHILE, _WORTHWHILE_ROUNDED = 0.25, 0.5
 _SMALL = 1 << 16  # compressed in any case [bytes]
-_TINY = 1 << 12  # neither chunked nor compressed: the chunk's own entry in the file would outweigh it [bytes]
+_TINY = 1 << 12  # not compressed [bytes]
 #: End of the name of the borders of cells in a file; a Dataset has none, its cells are all alike.
 BOUNDS = "_bounds"
 
@@ -58,18 +58,35 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
 
     Raises
     ------
-    InputError
-        If the file is damaged, gone, or holds no such variable.
+    UnusableFileError
+        If the file is gone or must not be read.
+    DamagedError
+        If a block does not match its checksum, or the file holds no such variable.
     """
-    verify_checksum(Path(path))
+    require_file(Path(path))
     try:
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             return np.asarray(file[name][key])
     except (OSError, RuntimeError, LookupError) as error:
-        raise InputError(
-            f"{path}: its {name} cannot be read ({error}): the file is damaged; run its study again"
-        ) from error
+        raise _unreadable(Path(path), error, f"its {name}: ") from error
+
+
+def _unreadable(path: Path, error: Exception, what: str = "") -> InputError:
+    """Return the error of a file that the library could not read: the system refused, or its content is broken."""
+    if not (isinstance(error, OSError) and error.errno is not None and error.errno > 0):  # the library's are negative
+        try:
+            with path.open("rb") as stream:  # the library tells no failing disk from wrong bytes
+                while stream.read(1 << 24):
+                    pass
+        except OSError as refusal:
+            error = refusal
+    if isinstance(error, OSError) and error.errno is not None and error.errno > 0:
+        text = f"{path}: cannot be read: {error.strerror or error}: expected a result of roughvisc (.nc)"
+        return UnusableFileError(text, key=str(path), found=error.strerror)
+    reason = f"{what}{error}"
+    text = f"{path}: is damaged: {reason}: expected a whole result; remove the file and run its study again"
+    return DamagedError(text, key=str(path), found=reason)
 
 
 class ResultBackend(BackendEntrypoint):
@@ -144,13 +161,14 @@ def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
 def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
     """What netCDF4 is told of a variable."""
     encoding: dict[str, Any] = {"fill_value": False}
+    if variable.ndim:
+        encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
     if variable.dtype.kind == "f" and may_be_missing(name):
         encoding["fill_value"] = variable.dtype.type(np.nan)
     bits = bits_kept(variable, precision)
     if bits is not None:
         encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
     if variable.nbytes > _TINY:
-        encoding["chunksizes"] = chunks(variable.shape)
         encoding |= _filters(variable, bits)
     return encoding
 
@@ -255,7 +273,6 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
                 declared = [_declare_part(file, group, part, precision) for group, part in parts.items()]
                 for written, variable in [pair for pairs in declared for pair in pairs]:
                     _write(written, variable)
-            append_checksum(temporary)
         except (
             RuntimeError,
             PermissionError,
@@ -374,15 +391,55 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     return plain
 
 
-def quarantine(path: Path, problem: str) -> None:
-    """Give what is no whole result another name, by which nobody takes it for one, and say why."""
+def set_aside(path: Path, error: DamagedError) -> str:
+    """Rename a damaged result; return the line that says so."""
     aside = path.with_name(f"{path.name}.damaged")
-    news = is_news(path, problem)
     os.replace(path, aside)
-    if news:
-        log.warning("%s; it is renamed to %s and computed again", problem, aside.name)
-    else:
-        log.info("%s: is renamed to %s and computed again", path, aside.name)
+    return f"{path}: is damaged: {error.found}; it is renamed to {aside.name} and computed again"
+
+
+def require_hdf5(path: Path) -> None:
+    """Refuse a file that the HDF5 library cannot open, or that would have it read other files.
+
+    Raises
+    ------
+    DamagedError
+        If it is truncated, or no HDF5 file.
+    UnusableFileError
+        If the system refuses, or it holds a link, a virtual dataset, or data in another file.
+    """
+    import h5py
+
+    with path.open("rb") as stream:
+        if stream.read(3) == b"CDF":  # of a former netCDF, which has no links
+            return
+    try:
+        with NETCDF, h5py.File(path, "r") as file:  # under netCDF's lock: both may use one library
+            found = _outside(file, set())
+    except (OSError, RuntimeError, LookupError, ValueError) as error:
+        raise _unreadable(path, error) from error
+    if found:
+        expected = "a result with all of its data in the file"
+        raise UnusableFileError(f"{path}: holds {found}: expected {expected}", key=str(path), found=found)
+
+
+def _outside(group: Any, seen: set[int]) -> str:
+    """Return what a group of an HDF5 file holds that is stored elsewhere; empty if nothing."""
+    import h5py
+
+    for name in group:
+        link = group.get(name, getlink=True)
+        place = f"{group.name.rstrip('/')}/{name}"
+        if not isinstance(link, h5py.HardLink):
+            return f"a link to another place, {place}"
+        member = group[name]
+        if isinstance(member, h5py.Dataset) and (member.is_virtual or member.external):
+            return f"data of another file, {place}"
+        if isinstance(member, h5py.Group) and (address := h5py.h5o.get_info(member.id).addr) not in seen:
+            seen.add(address)
+            if found := _outside(member, seen):
+                return found
+    return ""
 
 
 def open_result(path: str | Path) -> xr.Dataset:
@@ -400,26 +457,34 @@ def open_result(path: str | Path) -> xr.Dataset:
 
     Raises
     ------
-    InputError
-        If the file is absent, not a NetCDF file, damaged, or not a result.
+    UnusableFileError
+        If the file is absent, must not be read, is of a later version, or holds something else than a result.
+    DamagedError
+        If it was read and is broken.
+
+    Notes
+    -----
+    Every block of a variable has a checksum (fletcher32), which is verified when the block is read. Histories are read
+    here. :func:`roughvisc.study.storage.upkeep.verify` reads all.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: does not exist: expected a result of roughvisc (.nc)")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder: expected a result of roughvisc (.nc)")
-    verify_checksum(path)
+    require_file(path)
+    require_hdf5(path)
     try:
         dataset = xr.open_dataset(path, engine=ResultBackend)
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InputError(
-            f"{path}: is not a NetCDF file, or is damaged: expected a result of roughvisc ({error})"
-        ) from error
-    found = _foreign(dataset)
-    if found:
+    except (OSError, ValueError, RuntimeError, LookupError) as error:
+        raise _unreadable(path, error) from error
+    if found := _later_format(dataset.attrs) or _foreign(dataset):
         dataset.close()
-        raise InputError(f"{path}: {found}: expected a result of roughvisc")
+        expected = f"a result of roughvisc of format {RESULT_FORMAT}"
+        raise UnusableFileError(f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected)
     return dataset
+
+
+def _later_format(attributes: Mapping[Any, Any]) -> str:
+    """Return the format of a file if this version does not read it; empty if it does."""
+    found = attributes.get("result_format", RESULT_FORMAT)
+    return "" if found == RESULT_FORMAT else f"is of format {found}"
 
 
 def _foreign(dataset: xr.Dataset) -> str:

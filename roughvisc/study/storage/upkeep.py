@@ -10,33 +10,32 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from roughvisc.errors import InputError, InUseError
-from roughvisc.study.storage.files import checksum_error, is_sealed, require_folder
+from roughvisc.study.storage.files import require_file, require_folder
 from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.store import NETCDF, result_path, results_at
+from roughvisc.study.storage.store import NETCDF, open_result, require_hdf5, result_path, results_at
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is known of one file.
+    """What was found in one file.
 
     Attributes
     ----------
     path : Path
         The file.
     flaw : str
-        What is wrong with it; empty if nothing was found.
-    sealed : bool
-        Whether it states a checksum. One that does not, of an earlier version or changed by another program, was read
-        to its end all the same.
+        What is wrong with it; empty if nothing.
+    has_checksums : bool
+        Whether all of its arrays have checksums. Those of another program may have none.
     """
 
     path: Path
     flaw: str
-    sealed: bool
+    has_checksums: bool
 
 
 def verify(place: str | Path) -> list[Verdict]:
-    """Read results to their last byte and hold them against their checksums.
+    """Read results to their last byte and compare every block with its checksum.
 
     Parameters
     ----------
@@ -46,7 +45,7 @@ def verify(place: str | Path) -> list[Verdict]:
     Returns
     -------
     list of Verdict
-        One a file, in order of their names.
+        One per file, sorted by name.
 
     Raises
     ------
@@ -60,26 +59,33 @@ def verify(place: str | Path) -> list[Verdict]:
 
 
 def _verdict(path: Path) -> Verdict:
-    try:
-        found = checksum_error(path, again=True)
-        return Verdict(path, found or _unreadable(path), is_sealed(path))
-    except OSError as error:
-        return Verdict(path, f"it cannot be read: {error.strerror or error}", False)
-
-
-def _unreadable(path: Path) -> str:
-    """What the library cannot read of a file; empty if nothing."""
+    """Open a result as any other program does, and read all variables."""
     import netCDF4
 
     try:
+        require_file(path)
+        require_hdf5(path)
+        checked = True
         with NETCDF, netCDF4.Dataset(path) as file:
             for group in (file, *file.groups.values()):
                 for variable in group.variables.values():
+                    checked &= not variable.ndim or bool((variable.filters() or {}).get("fletcher32"))
                     for first in range(0, len(variable), 16) if variable.ndim else ():
                         variable[first : first + 16]
+    except InputError as error:
+        return Verdict(path, str(error), False)
     except (OSError, RuntimeError, LookupError, AttributeError, ValueError) as error:
-        return f"it cannot be read: {error}"
-    return ""
+        return Verdict(path, f"{path}: is damaged: {error}", False)
+    return Verdict(path, "", checked)
+
+
+def _opens(path: Path) -> bool:
+    """Return whether a file is a result, as far as opening it shows."""
+    try:
+        open_result(path).close()
+    except InputError:
+        return False
+    return True
 
 
 _OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
@@ -94,8 +100,7 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     Parameters
     ----------
     folder : path
-        Of results. A case that a run is at work on is left alone. Of a link the link itself is removed at most, never
-        what it leads to.
+        Of results. A case that a run is at work on is left alone.
     everything : bool
         Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were set aside,
         and records of failures.
@@ -135,13 +140,9 @@ def _is_abandoned(path: Path) -> bool:
 def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> list[Path]:
     """Remove what no run of one case can use, while its lock is held."""
     lock, result = lock_path(folder, key), result_path(folder, key)
-    if lock.is_symlink():  # nobody's lock
-        return [path for path in [lock] if _removed(path)]
-    finished = everything or (result.exists() and not checksum_error(result))
+    finished = everything or _opens(result)
     needed = [
-        path
-        for path in paths
-        if path.suffix == ".unfinished" and not path.is_symlink() and any(path.glob("checkpoint.*")) and not finished
+        path for path in paths if path.suffix == ".unfinished" and any(path.glob("checkpoint.*")) and not finished
     ]
     if needed == paths:
         return []

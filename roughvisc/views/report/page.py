@@ -23,7 +23,7 @@ from roughvisc.study.audit.audit import audit
 from roughvisc.study.audit.limits import Finding
 from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
-from roughvisc.study.storage.files import atomic_write, verify_checksum
+from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import no_results, open_result, result_files
 from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
@@ -99,7 +99,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         in_folder = source.is_dir()
         sources: list[Any] = _files(source) if in_folder else [source]
         for one in sources:
-            verify_checksum(one)  # before anything is drawn, and before the folder's index warns of it
+            open_result(one).close()  # before anything is drawn, and before the folder's index warns of it
         if in_folder:
             swept_cases = read_sweep(source)
             numbers = number_by_key(swept_cases)

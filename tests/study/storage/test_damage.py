@@ -1,0 +1,308 @@
+"""Damaged results are noticed, set aside and computed again; what cannot be read is refused and left as it is."""
+
+import os
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from support import BALL, refused
+
+import roughvisc as rv
+from roughvisc.errors import DamagedError, UnusableFileError
+from roughvisc.study.execution.run import run_case
+from roughvisc.study.statement.case import read_cases, read_study
+from roughvisc.study.storage.upkeep import clean_folder, verify
+
+SMALL = BALL.replace("[24, 21]", "[12, 9]")
+TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory):
+    """A case and its result's file; tests copy it."""
+    folder = tmp_path_factory.mktemp("sample")
+    (folder / "ball.toml").write_text(SMALL)
+    case = read_study(folder / "ball.toml")
+    return case, run_case(case, folder / "out")
+
+
+@pytest.fixture
+def copied(sample):
+    """The study, its case and a copy of its result, where another user can reach them."""
+    case, original = sample
+    folder = Path(tempfile.mkdtemp())
+    folder.chmod(0o777)
+    (folder / "ball.toml").write_text(SMALL)
+    (folder / "out").mkdir()
+    path = folder / "out" / original.name
+    shutil.copy(original, path)
+    yield folder / "ball.toml", case, path
+    shutil.rmtree(folder)
+
+
+def with_flipped_bit(path, name, place=0):
+    """Flip one bit of a stored block of a variable."""
+    with h5py.File(path) as file:
+        block = file[name].id.get_chunk_info(0)
+    content = bytearray(path.read_bytes())
+    content[block.byte_offset + block.size // 2 + place] ^= 4
+    path.write_bytes(content)
+
+
+def is_noticed(path):
+    """Whether reading all of a result fails."""
+    try:
+        ds = rv.open_result(path).load()
+        _ = ds.roughvisc.steps
+    except DamagedError:
+        return True
+    except rv.InputError:
+        return True
+    return False
+
+
+def test_arrays__all_have_checksums(sample):
+    with netCDF4.Dataset(sample[1]) as file:
+        arrays = [one for group in (file, file["steps"]) for one in group.variables.values() if one.ndim]
+        assert len(arrays) > 20
+        assert all(one.filters()["fletcher32"] for one in arrays)
+
+
+def test_damage__is_noticed_in_any_block_of_any_array(sample, tmp_path):
+    path = tmp_path / "result.nc"
+    with h5py.File(sample[1]) as file:
+        names = [f"{group}{name}" for group in ("", "steps/") for name in file[group or "/"] if "_bounds" not in name]
+        arrays = [name for name in names if isinstance(file[name], h5py.Dataset) and file[name].chunks]
+    assert {"pressure", "force", "status", "steps/force"} <= set(arrays)
+    for name in arrays:
+        shutil.copy(sample[1], path)
+        with_flipped_bit(path, name)
+        assert is_noticed(path), name
+
+
+def test_damage__of_random_bits_and_lengths_changes_no_value(sample, tmp_path):
+    path, rng = tmp_path / "result.nc", np.random.default_rng(17)
+    whole = np.fromfile(sample[1], np.uint8)
+    expected = rv.open_result(sample[1]).load()
+    noticed = 0
+    for at in rng.integers(len(whole), size=60):
+        damaged = whole.copy()
+        damaged[at] ^= 1 << rng.integers(8)
+        damaged.tofile(path)
+        if is_noticed(path):
+            noticed += 1
+        else:  # a byte that means nothing
+            xr.testing.assert_equal(rv.open_result(path).load(), expected)
+    assert noticed > 5
+    for length in rng.integers(len(whole), size=20):
+        whole[:length].tofile(path)
+        with pytest.raises(DamagedError):
+            rv.open_result(path)
+
+
+def test_opening__reads_no_field(copied):
+    """A damaged field is noticed when it is read, by any program."""
+    _, _, path = copied
+    with_flipped_bit(path, "pressure")
+    ds = rv.open_result(path)
+    assert float(ds.force[-1]) == pytest.approx(5e-3)
+    with pytest.raises(DamagedError) as failure:
+        ds.pressure.load()
+    assert failure.value.key == str(path)
+    with xr.open_dataset(path) as plain, pytest.raises((RuntimeError, OSError)):
+        plain.pressure.load()
+    with pytest.raises(DamagedError):
+        rv.open_results(path.parent).pressure.compute(scheduler="sync")
+
+
+DAMAGE = {
+    "truncated": lambda path: os.truncate(path, path.stat().st_size // 2),
+    "empty": lambda path: os.truncate(path, 0),
+    "no HDF5": lambda path: path.write_text("force [N]\n1\n"),
+    "wrong bit": lambda path: with_flipped_bit(path, "force"),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_run__sets_a_damaged_result_aside_and_computes_it_again(copied, sample, damage, invoke, caplog):
+    study, _, path = copied
+    DAMAGE[damage](path)
+    content = path.read_bytes()
+    assert invoke("run", study, "--out", path.parent, "-q", "--no-plots")[0] == 0
+    (warning,) = [one.getMessage() for one in caplog.records if one.levelname == "WARNING"]
+    assert warning.startswith(f"{path}: is damaged")
+    assert path.with_name(f"{path.name}.damaged").read_bytes() == content
+    again, first = (rv.open_result(one).load().drop_vars("wall_time") for one in (path, sample[1]))
+    xr.testing.assert_equal(again, first)
+
+
+def test_sweep__computes_a_damaged_result_again(tmp_path):
+    (tmp_path / "ball.toml").write_text(TWO_LOADS)
+    cases = read_cases(tmp_path / "ball.toml")
+    first = rv.sweep(cases, tmp_path / "out", workers=0, progress=False).load()
+    path = tmp_path / "out" / f"{cases[1].key}.nc"
+    with_flipped_bit(path, "force")
+    again = rv.sweep(cases, tmp_path / "out", workers=0, progress=False)
+    xr.testing.assert_equal(again.drop_vars("wall_time"), first.drop_vars("wall_time"))
+    assert [one.name for one in path.parent.glob("*.damaged")] == [f"{path.name}.damaged"]
+
+
+@contextmanager
+def another_user():
+    """Give up the rights of root, which reads everything."""
+    if not hasattr(os, "geteuid") or os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+def forbidden(path):
+    path.chmod(0o000)
+
+
+def later(path):
+    with netCDF4.Dataset(path, "a") as file:
+        file.result_format = np.int64(2)
+
+
+def folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def of_another_case(path):
+    with netCDF4.Dataset(path, "a") as file:
+        file.case_key = "0" * 16
+
+
+def weather(path):
+    xr.Dataset({"temperature": ("time", [1.0])}).to_netcdf(path)
+
+
+def linked(path):
+    with h5py.File(path, "a") as file:
+        del file["pressure"]
+        file["pressure"] = h5py.ExternalLink("secret.h5", "pressure")
+
+
+def linked_below(path):
+    with h5py.File(path, "a") as file:
+        file.create_group("more/deep")["secret"] = h5py.ExternalLink("secret.h5", "pressure")
+
+
+def linked_inside(path):
+    with h5py.File(path, "a") as file:
+        file["other"] = h5py.SoftLink("/pressure")
+
+
+def virtual(path):
+    with h5py.File(path, "a") as file:
+        shape = file["height"].shape
+        layout = h5py.VirtualLayout(shape, "f8")
+        layout[...] = h5py.VirtualSource("secret.h5", "height", shape)
+        file.create_virtual_dataset("secret", layout)
+
+
+def stored_elsewhere(path):
+    with h5py.File(path, "a") as file:
+        file.create_dataset("secret", (4,), "f8", external=[("secret.bin", 0, 32)])
+
+
+REFUSED = [forbidden, later, folder, pipe, of_another_case, weather]
+REFUSED += [linked, linked_below, linked_inside, virtual, stored_elsewhere]
+
+
+@pytest.mark.parametrize("change", REFUSED)
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files of POSIX")
+def test_run__refuses_what_is_not_damaged_and_leaves_it(copied, change, invoke):
+    study, case, path = copied
+    change(path)
+    before = path.lstat()
+    with another_user():
+        status, _, err = invoke("run", study, "--out", path.parent, "-q", "--no-plots")
+        with pytest.raises(UnusableFileError):
+            run_case(case, path.parent)
+        if change is not of_another_case:
+            with refused(str(path)):
+                rv.open_result(path)
+    assert (status, str(path) in err, "Traceback" in err) == (2, True, False)
+    assert sorted(one.name for one in path.parent.iterdir()) == [path.name]
+    assert (path.lstat().st_ino, path.lstat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+
+
+@pytest.mark.parametrize("change", [forbidden, later, pipe, linked])
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files of POSIX")
+def test_sweep__refuses_it_before_anything_is_computed(copied, change, invoke):
+    study, case, path = copied
+    study.write_text(TWO_LOADS)
+    assert case.key in [one.key for one in read_cases(study)]
+    change(path)
+    path.parent.chmod(0o777)
+    with another_user():
+        status, _, err = invoke("run", study, "--out", path.parent, "-q", "--workers", "0")
+    assert (status, str(path) in err) == (2, True)
+    assert [one.name for one in path.parent.glob("*.nc*")] == [path.name]
+
+
+def test_links__are_not_followed(copied):
+    """Neither by opening a result nor by looking at a folder."""
+    _, _, path = copied
+    os.mkfifo(path.parent / "secret.h5")  # whoever opens it waits forever
+    linked(path)
+    with refused(str(path)):
+        rv.open_result(path)
+    assert verify(path)[0].flaw
+    with pytest.raises(rv.InputError):
+        rv.open_results(path.parent)
+
+
+def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invoke):
+    _, _, path = copied
+    for name in "abc":
+        shutil.copy(path, path.with_name(f"{name}.nc"))
+    path.unlink()
+    out = path.parent
+    with_flipped_bit(out / "b.nc", "pressure")
+    rv.open_result(out / "a.nc").load().to_netcdf(out / "c.nc.tmp")
+    os.replace(out / "c.nc.tmp", out / "c.nc")
+    found = verify(out)
+    assert [(one.path.name, bool(one.flaw), one.has_checksums) for one in found] == [
+        ("a.nc", False, True),
+        ("b.nc", True, False),
+        ("c.nc", False, False),
+    ]
+    content = (out / "b.nc").read_bytes()
+    status, said, err = invoke("verify", out)
+    assert status == 1
+    assert said.startswith("2 of 3 files intact")
+    assert str(out / "b.nc") in err
+    assert (out / "b.nc").read_bytes() == content
+    (out / "b.nc").unlink()
+    assert invoke("verify", out)[0] == 0
+    shutil.rmtree(out)
+    assert invoke("verify", out)[0] == 2
+
+
+def test_clean__keeps_the_checkpoint_of_a_case_whose_result_is_damaged(copied):
+    _, case, path = copied
+    unfinished = path.parent / f".{case.key}.unfinished"
+    unfinished.mkdir()
+    (unfinished / "checkpoint.0").write_bytes(b"state")
+    os.truncate(path, 100)
+    clean_folder(path.parent)
+    assert unfinished.exists()
