@@ -21,7 +21,7 @@ from roughvisc.mechanics.bodies.layered import Layered, effective_compliance
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.models import Material, Prony
 from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, quantities, said
 
 Array = NDArray[np.float64]
 # Ages at which compliances are compared, the first at which all are known and none is zero or infinite. [s]
@@ -60,10 +60,10 @@ class LayeredBody(Body):
 
     def __repr__(self) -> str:
         *layers, base = self.strata
-        said = repr(base.material)
+        text = repr(base.material)
         for one in layers[::-1]:
-            said = f"layer({one.material!r}, thickness={one.thickness!r}, on={said})"
-        return said
+            text = f"layer({one.material!r}, thickness={said(one.thickness, 'm')}, on={text})"
+        return text
 
     @property
     def materials(self) -> tuple[Material, ...]:

@@ -1,4 +1,4 @@
-"""``audit``: for a result, or a case before it runs, what the model leaves out and whether that matters there."""
+"""``audit``: what the model leaves out, and whether that matters in a result."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from roughvisc.mechanics.bodies.sheet import Base
 from roughvisc.notebook import table
 from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface
-from roughvisc.study.audit.evidence import Evidence, of_case, of_result
+from roughvisc.study.audit.evidence import of_result
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, Finding
-from roughvisc.study.statement.case import Case
+from roughvisc.study.audit.limits import Finding
 
 #: In the order of the table of limits.
 _VERDICTS = (
@@ -78,14 +77,6 @@ class Audit:
     def _repr_html_(self) -> str:
         return table(self.title or "audit", [(one.name, one.verdict, one.shown, one.sentence) for one in self.findings])
 
-    @property
-    def warning(self) -> str:
-        """The assumptions that are broken or doubtful, with their numbers, in one line; empty if none is."""
-        words = {
-            verdict: [f"{f.name} ({f.shown})" for f in self if f.verdict == verdict] for verdict in (BROKEN, DOUBTFUL)
-        }
-        return "; ".join(f"{verdict}: {', '.join(named)}" for verdict, named in words.items() if named)
-
     def to_dataset(self) -> xr.Dataset:
         """The findings over ``assumption``: number, verdict, sentence, and from where on it is doubtful and broken."""
         columns = {
@@ -102,7 +93,7 @@ class Audit:
 
 
 def audit(
-    result: xr.Dataset | Case,
+    result: xr.Dataset,
     *,
     work_of_adhesion: float | str | None = None,
     yield_strength: float | str | None = None,
@@ -113,12 +104,12 @@ def audit(
     heat_conductivity: float | str | None = None,
     volumetric_heat_capacity: float | str | None = None,
 ) -> Audit:
-    """Check the assumptions of the model for a result or a case.
+    """Check the assumptions of the model for a result.
 
     Parameters
     ----------
-    result : xarray.Dataset or Case
-        A result of one case, or a case that has not run, for which less is known.
+    result : xarray.Dataset
+        A result of one case.
     work_of_adhesion : float or str, optional
         Work of adhesion of the two surfaces. [J/m2]
     yield_strength : float or str, optional
@@ -141,7 +132,7 @@ def audit(
     Audit
         A number, a verdict and a sentence for each assumption that applies. Values that are not given come from the
         table ``[audit]`` of the study, if there is one. Without a value the verdict is ``not known``, and the sentence
-        says what to give, and which values would do no harm.
+        says what to give.
 
     Raises
     ------
@@ -174,25 +165,8 @@ def audit(
         volumetric_heat_capacity=volumetric_heat_capacity,
     )
     if base is not None and thickness is None:
-        raise InputError(f"base is {base!r} without a thickness: expected both, or neither")
-    if isinstance(result, Case):
-        return evaluate(of_case(result, result.height()), given, result.title)
+        raise InputError(key="base", found=base, expected="a thickness too")
     evidence = of_result(result)
-    return evaluate(evidence, given, str(result.attrs.get("title", "")))
-
-
-def evaluate(evidence: Evidence, given: AuditInputs, title: str) -> Audit:
-    """The verdicts on what is known of a scene.
-
-    Parameters
-    ----------
-    evidence : Evidence
-        What is known; what its study states for an audit counts where `given` states nothing.
-    given : Given
-        What the user states.
-    title : str
-        Of the scene.
-    """
     given = given.over(evidence.given)
     found = (verdict(evidence, given) for verdict in _VERDICTS)
-    return Audit(title, tuple(one for one in found if one is not None))
+    return Audit(str(result.attrs.get("title", "")), tuple(one for one in found if one is not None))

@@ -1,4 +1,4 @@
-"""What is known of a scene, from a result or from a case that has not run: its surface, its contact, its bodies."""
+"""Evidence of an audit: surface, contact and bodies of a result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.case import Case
-from roughvisc.topography.grid import nominal_area, spacing
+from roughvisc.topography.grid import spacing
 from roughvisc.variables import OTHER_DIMS
 from roughvisc.variables.axes import axis_of
 
@@ -152,8 +152,6 @@ class Evidence:
         Contact fraction there.
     contact : Contact or None
         Pressures and spots there.
-    ran : bool
-        Whether there is a result.
     """
 
     boundary: str
@@ -175,7 +173,6 @@ class Evidence:
     area: float = math.nan
     fraction: float = math.nan
     contact: Contact | None = None
-    ran: bool = True
     given: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -202,7 +199,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     _check(dataset)
     case = Case.from_json(dataset.attrs["case"]) if "case" in dataset.attrs else None
     longest = _longest(dataset["height"]) if "height" in dataset else math.inf
-    attrs = _with_the_case(dataset.attrs, case, longest)
+    attrs = dataset.attrs
     row = dataset.isel({axis_of(dataset): _fullest(dataset)})
     area = float(row.get("contact_area", math.nan))
     texture, size, slope = None, (math.nan, math.nan), math.nan
@@ -239,53 +236,6 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         area=area,
         fraction=float(row.get("contact_fraction", math.nan)),
         contact=contact,
-        given=_stated(case),
-    )
-
-
-def of_case(
-    case: Case,
-    height: xr.DataArray,
-    texture: Texture | None = None,
-    *,
-    force: float = math.nan,
-    approach: float = math.nan,
-    fraction: float = math.nan,
-) -> Evidence:
-    """Evidence of a case before it runs.
-
-    Parameters
-    ----------
-    case : Case
-    height : xarray.DataArray
-        Its surface. [m]
-    texture : Texture, optional
-        Of the surface, if it has been measured before.
-    force, approach, fraction : float
-        The largest that are foreseen. [N], [m], [-]
-    """
-    boundary, kernel = case.settings.solve.boundary, case.body().kernel
-    experiment = case.experiment().on_area(nominal_area(height))
-    end = experiment.creep_time(_longest(height))
-    early, late = (float(complete(case.material()).contact_compliance(t)) for t in (0.0, end))
-    texture = texture or texture_of(height, boundary, str(height.attrs.get("recipe", "")))
-    return Evidence(
-        boundary=boundary,
-        size=texture.size,
-        texture=texture,
-        slope=loaded_slope(height, boundary, approach),
-        early=early,
-        late=late,
-        bodies=bodies_of(case, end),
-        sheet=kernel if isinstance(kernel, Sheet) else None,
-        kernel=case.body().attributes().get("kernel", ""),
-        time_scale=experiment.time_scale,
-        speed=experiment.largest_speed,
-        force=force,
-        approach=approach,
-        area=fraction * math.prod(texture.size),
-        fraction=fraction,
-        ran=False,
         given=_stated(case),
     )
 
@@ -330,32 +280,16 @@ def bodies_of(case: Case, end: float) -> tuple[Body, ...]:
 
 def _check(dataset: Any) -> None:
     if not isinstance(dataset, xr.Dataset):
-        raise InputError(f"audit: found {type(dataset).__name__}: expected a result (xarray.Dataset), or a Case")
+        raise InputError(key="audit", found=type(dataset).__name__, expected="a result (xarray.Dataset)")
     axis = axis_of(dataset.variables)
     if extra := [str(dim) for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]:
-        raise InputError(
-            f"audit: found a dimension {extra[0]!r}: expected the result of one case, as open_result opens its file"
-        )
+        raise InputError(key="audit", found=extra[0], expected="the result of one case, as open_result opens its file")
     for name in (axis, "force", "approach"):
         if name not in dataset.variables:
-            raise InputError(f"audit: the result holds no {name!r}: expected a result of one case")
+            raise InputError(key="audit", found=[*map(str, dataset.variables)], expected=f"a result with {name!r}")
     if not dataset.sizes.get(axis):
-        raise InputError(f"audit: the result holds no {axis} at all: expected one at least")
+        raise InputError(key="audit", found=[], expected=f"a {axis} at least")
     expect_declared_units(dataset)
-
-
-def _with_the_case(attrs: Mapping[Any, Any], case: Case | None, size: float) -> dict[str, Any]:
-    """Attributes of a result, with what those of an earlier version lack and their case says."""
-    known = {"boundary": "free", **attrs}
-    if case is None or "compliance_at_end" in known:
-        return known
-    material, experiment = complete(case.material()), case.experiment()
-    found = {
-        "compliance_at_once": float(material.contact_compliance(0.0)),
-        "compliance_at_end": float(material.contact_compliance(experiment.creep_time(size))),
-        "time_scale": experiment.time_scale,
-    }
-    return found | ({} if separability_error(material) else {"poisson": material.poisson}) | known
 
 
 def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[Body, ...]:

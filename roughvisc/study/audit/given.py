@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -34,7 +33,7 @@ class AuditInputs:
             if value is not None:
                 object.__setattr__(self, name, stated_quantity(value, unit, name, **bounds))
         if self.base not in (None, *get_args(Base)):
-            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
+            raise InputError(key="base", found=self.base, expected=" or ".join(map(repr, get_args(Base))))
 
     def over(self, others: Mapping[str, Any]) -> AuditInputs:
         """These, and the others where these state nothing."""
@@ -58,8 +57,8 @@ def from_options(texts: Mapping[str, str | None]) -> AuditInputs:
     try:
         return AuditInputs(**values)
     except InputError as error:
-        name, rest = re.match(r"\w+", str(error))[0], re.sub(r"^\w+", "", str(error))  # type: ignore[index]
-        raise InputError(f"--{name.replace('_', '-')}{rest}") from None
+        key = f"--{error.key.replace('_', '-')}"
+        raise InputError(key=key, found=error.found, expected=error.expected) from None
 
 
 def of_study(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,10 +30,6 @@ from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_mem
 from roughvisc.notebook import table
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
-from roughvisc.study.audit.audit import evaluate
-from roughvisc.study.audit.evidence import of_case
-from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.texture import Texture, texture_of
 from roughvisc.study.cost.coarse_grids import foretold
 from roughvisc.study.cost.estimate import (
     ConvolutionTimer,
@@ -97,10 +93,6 @@ COLUMNS = {
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
     "program_note": ("", "how a measured history became segments"),
     "late_times": ("", "listed times after the end of the program, which are left out; empty if there are none"),
-    "audit": (
-        "",
-        "assumptions that are broken or doubtful, as far as known before a run; empty if none is, or not marched",
-    ),
     "warning": ("", "what is foreseen that may not be meant; empty if nothing"),
     "border_warning": ("", "whether contact is foreseen to reach the border of a free surface, which stops the run"),
     "refusal": ("", "why it cannot run; empty if it can"),
@@ -217,7 +209,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
 
 @dataclass(frozen=True)
 class _Surface:
-    """A surface's height, its copies and :class:`Stage`s, its rms slope and its textures, or why it cannot be had."""
+    """A surface's height, its copies and :class:`Stage`s, its rms slope, or why it cannot be had."""
 
     height: xr.DataArray | None
     grows: bool
@@ -227,7 +219,6 @@ class _Surface:
     mirrored: bool = False
     slope: float = 0.0
     half_slope: float = math.nan
-    textures: dict[str, Texture] = field(default_factory=dict)  # boundary -> what it says of the surface
 
 
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
@@ -369,15 +360,8 @@ class _Ahead:
         } | (self._of_march(self.found) if self.marched else {})
 
     def _of_march(self, found: CostEstimate) -> dict[str, Any]:
-        """Of a case that was marched itself: what an audit says before the run, and how much comes into contact."""
-        surface, case, height = self.surface, self.case, self.surface.height
-        assert height is not None
-        boundary = case.settings.solve.boundary
-        if boundary not in surface.textures:
-            surface.textures[boundary] = texture_of(height, boundary, str(height.attrs.get("recipe", "")))
-        foreseen = {"force": found.force, "approach": found.level, "fraction": found.fraction}
-        evidence = of_case(case, height, surface.textures[boundary], **foreseen)
-        row: dict[str, Any] = {"audit": evaluate(evidence, AuditInputs(), case.title).warning}
+        """Of a case that was marched itself: how much comes into contact."""
+        row: dict[str, Any] = {}
         for prefix, pressed in (("", found.pressed), ("coarser_", found.halved)):  # the latter on cells twice as long
             if pressed is not None:
                 cells = f"{prefix or 'pressed_'}cells"

@@ -125,7 +125,6 @@ _MODELLED = {
     "scheme": "Time",
     "program_note": "Program",
     "late_times": "Kept times",
-    "audit": "Assumptions",
 }
 #: Cells of a grid on which several threads are used.
 _THREADED = 1024**2
