@@ -63,18 +63,14 @@ def _with_tables(app, docname, source):
     from roughvisc.variables.sliding import SLIDING
 
     def table(variables):
-        rows = ["| variable | group | dimensions | unit | meaning |", "|---|---|---|---|---|"]
+        rows = ["| variable | dimensions | unit | meaning |", "|---|---|---|---|"]
         for name, one in variables.items():
-            if one.group == "steps":  # the same as over the kept times
-                continue
             meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
             if name == "status":
                 meaning += ": " + ", ".join(
                     f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS)
                 )
-            rows.append(
-                f"| `{name}` | {one.group or 'root'} | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |"
-            )
+            rows.append(f"| `{name}` | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |")
         return "\n".join(rows)
 
     if docname == "nomenclature":
