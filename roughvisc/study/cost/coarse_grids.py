@@ -71,7 +71,6 @@ def foretold(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         kept=tuple(contact.tolist()),
         pressed=_pressed(found),
         coarse_run=CoarseRun(few, found.sizes[experiment.axis], float(found["convolutions"].sum()), took),
-        halved=_pressed(halved) if max(height.shape) > _COARSE[1] else None,
     )
 
 

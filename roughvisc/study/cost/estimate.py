@@ -225,8 +225,6 @@ class CostEstimate:
         Whether a contact came to the border of a free surface.
     pressed : Pressed or None
         The largest contact on cells as fine as are pressed at once.
-    halved : Pressed or None
-        The same on cells twice as long, where these are coarser than the surface's.
     coarse_run : CoarseRun or None
         From which all this is carried on.
     """
@@ -247,7 +245,6 @@ class CostEstimate:
     push: Push | None = None
     at_border: bool = False
     pressed: Pressed | None = None
-    halved: Pressed | None = None
     coarse_run: CoarseRun | None = None
 
 
@@ -364,13 +361,11 @@ def march_of(case: Case, height: xr.DataArray, copies: Copies | None = None) -> 
         taken = {"steps": taken["steps"] + cells, "convolutions": taken["convolutions"] + cells * each, "slid": cells}
     rows = taken["steps"] if settings.times is None else float(len(kept_times(program, settings.times) or ()))
     finest = pressed(grid, second.push)
-    halved = pressed(grid, second.push, MOST_PRESSED // 2) if max(shapes[grid]) > MOST_PRESSED else None
     known: dict[str, Any] = {
         "whole": first.whole and second.whole,
         "fraction": finest.fraction,
         "at_border": settings.boundary == "free" and finest.at_border,
         "pressed": finest,
-        "halved": halved,
     }
     return replace(_rescaled(second, finest), **taken, **known, rows=rows)
 
@@ -580,11 +575,6 @@ class Solved:
     def growths(self) -> int:
         """How many times the window or the grid grows."""
         return sum(share > 0 for share in self.shares[:-1])
-
-    def on_longer_cells(self) -> Solved:
-        """The same on cells twice as long."""
-        few = [Stage((one.shape[0] // 2, one.shape[1] // 2), one.solved / 4) for one in self.stages]
-        return Solved(tuple(few), self.shares)
 
     def mean(self, of: Callable[[float], float]) -> float:
         """Mean of a function of the cells that are solved on over all convolutions."""

@@ -17,12 +17,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.resources import PART, PROCESS, Available, amount, cores, memory_available, too_large
 from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.protocol import complete
@@ -77,18 +75,11 @@ COLUMNS = {
     "contact_fraction": ("1", "largest contact fraction of an elastic press on the pressed cells; if marched"),
     "pressed_cells_x": ("1", "cells along x that were pressed for the contact fraction; 0: none"),
     "pressed_cells_y": ("1", "cells along y that were pressed for the contact fraction; 0: none"),
-    "coarser_contact_fraction": ("1", "the same on cells twice as long, where the surface has more cells than pressed"),
-    "coarser_cells_x": ("1", "cells along x that were pressed for that; 0: none"),
-    "coarser_cells_y": ("1", "cells along y that were pressed for that; 0: none"),
     "nominal_pressure": ("Pa", "largest nominal pressure, prescribed or of the coarse march: force over nominal area"),
     "full_contact_pressure": ("Pa", "nominal pressure from which on contact takes 95 % of the area (Persson's theory)"),
     "convolutions": ("1", "convolutions expected, one forward and one inverse transform each"),
     "wall_time": ("s", "wall time expected, in one process with one thread"),
     "memory": ("byte", "memory of the process at its peak"),
-    "half_wall_time": ("s", "wall time expected on cells twice as long"),
-    "rms_slope": ("1", "root mean square slope between neighbouring cells"),
-    "half_rms_slope": ("1", "the same of means over cells twice as long"),
-    "half_memory": ("byte", "memory of the process at its peak on cells twice as long"),
     "disk": ("byte", "size of the result"),
     "marched": ("", "whether the cost is from a coarse march of this case, not of the one most like it"),
     "program_note": ("", "how a measured history became segments"),
@@ -112,9 +103,7 @@ _BUDGET = 15.0
 #: Cells of the longer side of a grid still to come that a solve is timed on, at most.
 _TIMED_SIDE = 1024
 #: Columns that count cells.
-_COUNTS = [f"{name}cells_{axis}" for name in ("", "final_", "pressed_", "coarser_") for axis in "xy"]
-#: Fewest cells a side of a surface of which half the resolution is thought of.
-_HALVED = 8
+_COUNTS = [f"{name}cells_{axis}" for name in ("", "final_", "pressed_") for axis in "xy"]
 
 
 class Plan(xr.Dataset):
@@ -134,7 +123,8 @@ class Plan(xr.Dataset):
         rows = [("", *varied, "cells", *_COLUMNS, "refused" if self["refusal"].any() else "")]
         for number in range(min(self.sizes["case"], _SHOWN)):
             one = self.isel(case=number)
-            values = (_text(float(one[name]), unit) for name, unit in _COLUMNS.values())
+            mark = "" if bool(one.marched) else "~"  # of the most similar case
+            values = (mark + _text(float(one[name]), unit) for name, unit in _COLUMNS.values())
             given = (_varied(one[name]) for name in varied)
             rows.append(
                 (str(number), *given, f"{int(one.cells_x)} x {int(one.cells_y)}", *values, str(one.refusal.values))
@@ -218,7 +208,6 @@ class _Surface:
     stages: tuple[Stage, ...] = ()
     mirrored: bool = False
     slope: float = 0.0
-    half_slope: float = math.nan
 
 
 def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
@@ -275,15 +264,7 @@ def _surface(case: Case) -> _Surface:
         stages_of(profile, profile.can_grow()),
         profile.mirrored,
         rms_slope(height),
-        _half_slope(height, boundary),
     )
-
-
-def _half_slope(height: xr.DataArray, boundary: Boundary) -> float:
-    """Root mean square slope on cells twice as long; missing where there are too few cells."""
-    if min(height.shape) < _HALVED:
-        return math.nan
-    return rms_slope(coarser(height, 2.0, boundary))
 
 
 def _nearest_case(number: int, others: Sequence[int], parameters: Mapping[str, Any]) -> int:
@@ -361,13 +342,10 @@ class _Ahead:
 
     def _of_march(self, found: CostEstimate) -> dict[str, Any]:
         """Of a case that was marched itself: how much comes into contact."""
-        row: dict[str, Any] = {}
-        for prefix, pressed in (("", found.pressed), ("coarser_", found.halved)):  # the latter on cells twice as long
-            if pressed is not None:
-                cells = f"{prefix or 'pressed_'}cells"
-                row |= {f"{prefix}contact_fraction": pressed.fraction}
-                row |= {f"{cells}_x": pressed.shape[0], f"{cells}_y": pressed.shape[1]}
-        return row
+        if found.pressed is None:
+            return {}
+        x, y = found.pressed.shape
+        return {"contact_fraction": found.pressed.fraction, "pressed_cells_x": x, "pressed_cells_y": y}
 
 
 def _late_times(case: Case) -> str:
@@ -416,7 +394,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
     shape, cells = solved.stages[-1].shape, solved.cells
     timed = height if shape == height.shape else over(height, shape, _TIMED_SIDE)
     convolution = stopwatch.seconds(timed, settings.boundary, body.kernel) * work(cells) / work(timed.size)
-    quarter = work(cells / 4) / work(cells)
     needed = partial(bytes_needed, settings, found=found, choice=choice, part=solved.part, grows=solved.growths > 0)
     beside = stopwatch.beside(found.coarse_run, settings.boundary, body.kernel)
     row |= replace(ahead, found=found).expected(shape, needed, there)
@@ -429,10 +406,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "wall_time": wall_time(settings, solved, found, choice, convolution, beside),
-        "half_wall_time": wall_time(settings, solved.on_longer_cells(), found, choice, convolution * quarter, beside),
-        "half_memory": needed(cells // 4),
-        "rms_slope": surface.slope,
-        "half_rms_slope": surface.half_slope,
         "disk": disk(case, cells, found, surface.mirrored or surface.grows),  # an indenter is symmetric
     }
 

@@ -108,13 +108,14 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}"),
         ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
         ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
-        ("At half the resolution", _at_half(costs)),
         ("Estimated from", f"coarse runs of {int(costs['marched'].sum())} of {total} cases"),
     ]
     parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
     parts += [Text(f"Warning: {text}", style="bold red") for text in _warnings(costs)]
     if total > 1:
         parts += [Text(), _case_table(costs, varied)]
+        if not costs["marched"].all():
+            parts.append(Text("~ Estimated from the coarse run of the most similar case.", style="italic"))
     return Group(*parts)
 
 
@@ -128,10 +129,6 @@ _MODELLED = {
 }
 #: Cells of a grid on which several threads are used.
 _THREADED = 1024**2
-#: Memory of a case from which a plan tells what half the resolution takes. [byte]
-_LARGE = 1e9
-#: A contact on cells twice as long that is this much larger tells that one on shorter cells is smaller.
-_FALLS = 1.02
 #: Cases that a plan lists one by one.
 _LISTED = 20
 
@@ -144,46 +141,21 @@ def _grid(row: xr.Dataset) -> str:
 
 
 def _contact(costs: xr.Dataset) -> str:
-    """How much comes into contact, and on which cells that was found; on cells twice as long, if there is more."""
+    """Return how much comes into contact, and the grids of this estimate."""
     whole = "final grid" if (costs["final_cells_x"] > costs["cells_x"]).any() else "area"
-    own, longer = costs["contact_fraction"], costs["coarser_contact_fraction"]
-    if not np.isfinite(own).any():
+    known = costs.isel(case=np.flatnonzero(np.isfinite(costs["contact_fraction"].values)))
+    if not known.sizes["case"]:
         return ""
-    text = f"about {_per_cent(own)} % of the {whole}, estimated on {_pressed_on(costs, own)} cells"
-    if not longer.max() > _FALLS * own.where(longer.notnull()).max():
-        return text
-    return f"{text}; {_per_cent(longer)} % on {_pressed_on(costs, longer)}: expect less on the finer grid of the run"
-
-
-def _per_cent(parts: xr.DataArray) -> str:
-    found = 100 * parts.values[np.isfinite(parts.values)]
-    return " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
-
-
-def _pressed_on(costs: xr.Dataset, found: xr.DataArray) -> str:
-    """The grids on which some contact fractions were found."""
-    x, y = (f"{'coarser' if str(found.name).startswith('coarser') else 'pressed'}_cells_{axis}" for axis in "xy")
-    known = costs.isel(case=np.flatnonzero(np.isfinite(found.values)))
-    grids = _range_of(known, lambda row: f"{int(row[x])} x {int(row[y])}")
-    return f"{'grids' if ',' in grids else 'a grid'} of {grids}"
+    found = 100 * known["contact_fraction"].values
+    parts = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
+    grids = _range_of(known, lambda row: f"{int(row['pressed_cells_x'])} x {int(row['pressed_cells_y'])}")
+    return f"about {parts} % of the {whole}, estimated on {'grids' if ',' in grids else 'a grid'} of {grids} cells"
 
 
 def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
     """How many cases at once, and how many threads each may use."""
     large = bool(((costs["cells_x"] * costs["cells_y"]) >= _THREADED).any())
     return f"{processes} in parallel" + (f", {threads} threads each" if large and threads > 1 else "")
-
-
-def _at_half(costs: xr.Dataset) -> str:
-    """What a case on cells twice as long takes, where that is worth a thought; and what tells how wrong it is."""
-    if not bool((costs["memory"] >= _LARGE).any()):
-        return ""
-    kept = float((costs["half_rms_slope"] / costs["rms_slope"]).min())
-    lost = f"the rms slope falls by {100 * (1 - kept):.2g} %; " if kept < 1 else ""
-    return (
-        f"{_span(costs['half_wall_time'], 's')} and {size(float(costs['half_memory'].max()))} per case; {lost}"
-        "`roughvisc trade` measures the loss of accuracy"
-    )
 
 
 def _warnings(costs: xr.Dataset) -> list[str]:
@@ -247,7 +219,8 @@ def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
     for heading, _ in (*settings, *counts, *costing):
         table.add_column(Text(heading), justify="right", overflow="fold")
     for i, cut in enumerate(refused):
-        found = [Text("cannot run")] if cut else [Text(cells[i]) for _, cells in (*counts, *costing)]
+        mark = "" if bool(listed["marched"][i]) else "~"
+        found = [Text("cannot run")] if cut else [Text(mark + cells[i]) for _, cells in (*counts, *costing)]
         table.add_row(*(Text(cells[i]) for _, cells in settings), *found)
     if costs.sizes["case"] > _LISTED:
         table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))

@@ -1,4 +1,4 @@
-"""The elastic press that a plan tells the contact by, and the pressure that a first study is given."""
+"""The elastic press by which a plan estimates the contact, and the pressure of a first study."""
 
 import math
 
@@ -11,7 +11,7 @@ from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.cost import first_pressure as first_module
 from roughvisc.study.cost.first_pressure import first_pressure
-from roughvisc.study.cost.press import Push, copy_to_press, press
+from roughvisc.study.cost.press import Push, press
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.inspection import inspect_scan
 
@@ -52,12 +52,6 @@ def test_press__nothing_and_everything():
     assert press(wave, Push(approach=0.99 * mean_gap), "periodic", HALF_SPACE).fraction < 1
 
 
-def test_copy_to_press__is_the_surface_where_that_is_small_enough():
-    height = rv.self_affine((1e-3, 1e-3), (60, 45), hurst=0.8, rms_slope=0.1, seed=1)
-    assert copy_to_press(height, "periodic", 60) is height
-    assert copy_to_press(height, "periodic", 30).shape == (30, 22)
-
-
 def touching(surface, pressure, compliance):
     """By the solver itself, on all cells; less 0.088 of the staircase at the rim."""
     operator = Operator(surface.shape, spacing(surface), "periodic")
@@ -81,17 +75,6 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     assert first.late == pytest.approx(0.05, rel=0.05), "the pressure has two digits"
     assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(first.late, rel=near)
     assert touching(surface, first.pressure, 1 / 12e6) == pytest.approx(first.early, rel=2 * near)
-
-
-@pytest.mark.parametrize("contact", [0.02, 0.3, 0.8])
-def test_first_pressure__aims_at_the_contact_that_is_asked_for(contact):
-    scan = rv.self_affine((1e-3, 1e-3), (64, 60), hurst=0.8, rms_slope=0.1, shortcut=5e-5, seed=3)
-    found = inspect_scan(scan)
-    first = first_pressure(scan, found, contact)
-    assert first.contact == contact
-    assert first.late == pytest.approx(contact, rel=0.1), "the pressure has two digits, and cells are whole"
-    surface = rv.level(scan, found.steps["level"])
-    assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(contact, rel=0.1)
 
 
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
