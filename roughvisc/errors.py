@@ -5,6 +5,7 @@ without a traceback.
 """
 
 import unicodedata
+from typing import Self
 
 #: Characters of one message on the screen, at most.
 ON_SCREEN = 600
@@ -51,9 +52,9 @@ class InputError(RoughviscError, ValueError):
         super().__init__(message)
         self.key, self.found, self.expected = key, found, expected
 
-    def prefixed(self, text: str) -> "InputError":
+    def prefixed(self, text: str) -> Self:
         """Return this error with a file, table or key in front of its message."""
-        return InputError(f"{text}: {self}", key=self.key, found=self.found, expected=self.expected)
+        return type(self)(f"{text}: {self}", key=self.key, found=self.found, expected=self.expected)
 
 
 class EdgeContactError(InputError):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import io
 import logging
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -124,6 +126,9 @@ class Commands(click.Group):
     """Errors made on purpose end in one message and an exit status, never in a traceback."""
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):  # letters that its encoding lacks are spelt out
+                stream.reconfigure(errors="backslashreplace")
         with ending_at_once():
             return super().main(*arguments, **settings)
 

@@ -28,7 +28,7 @@ from roughvisc.problem import Problem
 from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
 from roughvisc.topography.borders import is_mirrored
-from roughvisc.topography.grid import nominal_area
+from roughvisc.topography.grid import counts, nominal_area
 
 _PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
 #: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
@@ -325,7 +325,8 @@ def require_memory_of_curve(shape: tuple[int, int], settings: Settings) -> None:
 
 
 def require_surface(shape: tuple[int, int]) -> None:
-    """Refuse a surface that cannot be made in the memory there is. [cells]"""
+    """Refuse a surface that has too many cells, or cannot be made in the memory there is. [cells]"""
+    counts("shape", shape)
     _require(shape, lambda cells: 8.0 * _MADE * cells)
 
 

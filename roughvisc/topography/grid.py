@@ -318,7 +318,8 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
             f"{name} is {shown(value)}: expected a whole number of cells of at least {low}, or a pair of them"
         )
     if both[0] * both[1] > MOST_CELLS:
-        raise InputError(f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}")
+        text = f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}"
+        raise InputError(text, key=name, found=value, expected=f"at most {MOST_CELLS:.3g} cells")
     return int(both[0]), int(both[1])
 
 

@@ -26,7 +26,6 @@ from roughvisc.errors import (
     TransientError,
     UnusableFileError,
 )
-from roughvisc.experiment.resources import require_surface
 from roughvisc.labels import annotate
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
@@ -104,9 +103,6 @@ def compute(
     InputError, ConvergenceError
         As :func:`roughvisc.simulate` and :func:`roughvisc.friction`, with the study's name in front.
     """
-    with _named(case):
-        if case.made_shape is not None:
-            require_surface(case.made_shape)
     height = case.height()
     with _named(case):
         problem = Problem(height, case.body(), case.solving())
@@ -129,7 +125,9 @@ def _named(case: Case) -> Iterator[None]:
     except (InputError, ConvergenceError) as error:
         if case.origin is None or (isinstance(error, TransientError) and not isinstance(error, TooLargeError)):
             raise
-        raise type(error)(f"{case.origin}: {error}") from error
+        if isinstance(error, InputError):
+            raise error.prefixed(str(case.origin)) from error
+        raise ConvergenceError(f"{case.origin}: {error}") from error
 
 
 def _provenance(case: Case, rows: str, before: str, transforms: str) -> dict[str, str | int]:

@@ -116,13 +116,17 @@ class Case:
         ChangedError
             If its files are no longer those that the key stands for.
         """
+        from roughvisc.experiment.resources import require_surface  # slow to import
+
         _ = self._identity  # of the files as they are before they are read
         try:
+            if self.made_shape is not None:
+                require_surface(self.made_shape)
             height = self.settings.surface.height()
         except InputError as error:
             if self._changed():
                 raise self._change() from error
-            raise InputError(line(self.origin, "surface", str(error))) from error
+            raise error.prefixed("surface" if self.origin is None else f"{self.origin}: surface") from error
         if self._changed():
             raise self._change()
         return height
