@@ -78,7 +78,7 @@ def simulate(
         punch; the attribute ``warnings`` of the result says so if contact reached the border.
     grid_error : bool
         Whether to estimate the grid error from two more runs, on cells twice and four times as long: ``grid_error``,
-        ``grid_error_area`` and the bounds ``contact_area_lower`` and ``contact_area_upper`` at the output times.
+        ``grid_error_area`` and others at the output times.
     numerics : Numerics
         Settings that are rarely changed: length of the time steps, algorithm, and memory of past pressures.
     threads : int, optional
@@ -143,7 +143,6 @@ def friction(
     direction: Direction = "x",
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] = (),
-    last_octave: bool = False,
     grid_error: bool = Settings.grid_error,
     threads: int | None = None,
     progress: bool | Progress = True,
@@ -168,9 +167,6 @@ def friction(
         Tolerance on the iteration errors of pressure (L1, over the load) and friction (relative).
     fields : sequence of str
         Fields to keep: any of ``pressure`` and ``gap``, in the frame of the profile.
-    last_octave : bool
-        Whether to compute the contribution of the shortest octave of wavelengths to friction and area, at twice the
-        cost. If it is large, wavelengths that the scan does not resolve may add as much again.
     grid_error : bool
         Whether to estimate the grid errors ``grid_error_friction`` and ``grid_error_area`` from the same curve on cells
         twice and four times as long. It takes about a third more time.
@@ -208,7 +204,7 @@ def friction(
     >>> int(ds.friction_coefficient.argmax("speed"))
     1
     """
-    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, last_octave=last_octave)
+    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
     settings = Settings(
         tolerance=tolerance,
         fields=fields,

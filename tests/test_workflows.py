@@ -45,9 +45,6 @@ def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     first = steps.friction_coefficient.where(steps.time < 7e-3, drop=True)
     assert first.max() < 1.02 * ends[0]
     assert again.max() > 1.04 * ends[0], "contact has grown in the rest"
-    assert np.trapezoid(steps.friction_force, steps.sliding_distance) == pytest.approx(
-        float(ds.friction_work[-1]), rel=0.01
-    )
     assert float(ds.sliding_distance[-1]) == pytest.approx(1.8e-3)
     assert float(ds.force.min()) == 0
     assert (ds.status.values != NOT_CONVERGED).all()
@@ -103,9 +100,6 @@ def test_friction__rises_and_falls_as_the_rubber_stiffens(tmp_path):
     assert (np.diff(friction[: most + 1]) > 0).all()
     assert (np.diff(friction[most:]) < 0).all()
     assert (np.diff(curve.contact_area) < 0).all(), "the area falls with the speed"
-    accuracy = curve
-    assert ((accuracy.last_octave_friction > 0) & (accuracy.last_octave_friction < 1)).all()
-    assert (accuracy.last_octave_area < 0).all(), "finer roughness takes area away"
 
 
 @pytest.mark.thorough

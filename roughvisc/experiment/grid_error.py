@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser, pressure_distance
-from roughvisc.mechanics.contact.neighbours import bounds_with_grid, neighbours
+from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.topography.indenters import grown
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.grid_errors import GRID_ERROR
@@ -179,13 +179,10 @@ def with_grid_error(
 
 
 def _with_errors(dataset: xr.Dataset, found: Mapping[str, Array]) -> xr.Dataset:
-    """A result with errors of the grid, and bounds on the contact area that hold them."""
+    """Return a result with the errors of its grid."""
     axis = axis_of(dataset.variables)
-    bounds = (f"contact_area_solver_{end}" for end in ("lower", "upper"))
-    solver = (dataset[name if name in dataset else "contact_area"].values for name in bounds)
-    lower, upper = bounds_with_grid(*solver, found["contact_area"] * _largest(dataset, "contact_area"))
-    columns = {GRID_ERROR[name]: error for name, error in found.items() if GRID_ERROR[name] in AXES[axis].variables}
-    columns |= {"contact_area_lower": lower, "contact_area_upper": upper}
+    known = {name: GRID_ERROR[name] for name in found if name in GRID_ERROR}
+    columns = {known[name]: found[name] for name in known if known[name] in AXES[axis].variables}
     columns["grid_error"] = np.maximum(found["pressure"], found["approach"])
     return dataset.assign({name: (axis, values) for name, values in columns.items()})
 

@@ -219,8 +219,6 @@ class LoadingRows(Rows):
             self._scene = larger[0]
         self.end = program.duration
         self._border = None if state is None else state.border
-        #: Whether the profile has a mean plane of its own: that of an indenter depends on how large its grid is.
-        self._has_mean_plane = settings.boundary == "free" and not self.profile.can_grow()
         spacing, kernel, single = self.profile.spacing, body.kernel, settings.tolerance >= _SINGLE
         self._reach = lru_cache(maxsize=2)(lambda window: FarFieldDisplacement(window, spacing, kernel, single=single))
         self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, spacing, kernel))
@@ -292,8 +290,6 @@ class LoadingRows(Rows):
             "force": shown.force,
             "approach": shown.approach,
             "work": step.work,
-            "stored_energy": step.stored,
-            "dissipated_energy": step.dissipated,
             "time_error": step.uncertainty.relative(*largest),
             "iterations": step.state.iterations,
             "convolutions": step.state.convolutions,
@@ -304,8 +300,6 @@ class LoadingRows(Rows):
             "mean_gap": mean_gap,
             **friction_columns(step),
         }
-        if self._has_mean_plane:  # separation of the profile's and the undeformed plane in free space [m]
-            row["mean_plane_separation"] = self.profile.mean_gap - shown.approach
         if kept:
             row |= error_columns(step, self._choice.series_error, largest) | area_columns(step, contact, touching, area)
         facts = {

@@ -194,20 +194,3 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
         f"The rms slope of the loaded surface is {slope:.2g}: the method assumes small slopes, with an error of the "
         f"order of the squared slope. Beyond {LARGEST_SLOPE:g} the results are a rough estimate."
     )
-
-
-#: Part of the friction that the shortest octave of waves may add without a word.
-_MUCH_OF_FRICTION = 0.2
-
-
-def octave_note(dataset: xr.Dataset) -> str:
-    """What to say of a surface whose shortest waves add much of the friction; empty if they do not."""
-    if "last_octave_friction" not in dataset:
-        return ""
-    most = float(dataset["last_octave_friction"].max())
-    if not most > _MUCH_OF_FRICTION:
-        return ""
-    return (
-        f"The shortest octave of wavelengths adds up to {100 * most:.0f} % of the friction: wavelengths that the scan "
-        "does not resolve may add as much again."
-    )

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties
 from roughvisc.experiment.profile import Profile
@@ -17,7 +16,6 @@ from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.topography.resampling import resample_periodic
-from roughvisc.topography.spectrum import without_last_octave
 from roughvisc.variables.grid_errors import GRID_ERROR
 
 Array = NDArray[np.float64]
@@ -78,19 +76,6 @@ class SlidingGrid:
         """That of a surface."""
         sides = profile.spacing[::-1] if turn.swapped else profile.spacing
         return cls(np.ascontiguousarray(turn.there(profile.gap)), (sides[0], sides[1]))
-
-    def smooth(self) -> tuple[SlidingGrid, float]:
-        """The same without its shortest octave of waves, and the length below which these are. [m]
-
-        Raises
-        ------
-        InputError
-            If there are no others.
-        """
-        gap, shortest = without_last_octave(self.gap, self.spacing)
-        if not np.ptp(gap) > 1e-9 * np.ptp(self.gap):
-            raise InputError("height has no wavelengths above its shortest octave: expected last_octave = False")
-        return SlidingGrid(gap, self.spacing), shortest
 
     def coarser(self, factor: float) -> SlidingGrid | None:
         """The same waves on cells about so many times longer, as far as these can hold them; None if there is none."""

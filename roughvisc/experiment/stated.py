@@ -70,7 +70,7 @@ def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, floa
 
 
 def area_columns(step: Step, contact: NDArray[np.bool_], counted: float, area: float) -> dict[str, float]:
-    """Bounds on the contact area of a step, by the cells that time steps and contact solver leave in doubt. [m2]
+    """Error of the contact area of a step, by the cells that time steps and contact solver leave in doubt. [m2]
 
     Parameters
     ----------
@@ -83,11 +83,11 @@ def area_columns(step: Step, contact: NDArray[np.bool_], counted: float, area: f
     """
     in_doubt, unknown = uncertain_cells(step, contact), step.uncertainty
     lower, upper = area_bounds(counted, area, unknown.inside + in_doubt[0], unknown.outside + in_doubt[1])
-    return {"contact_area_solver_lower": float(lower), "contact_area_solver_upper": float(upper)}
+    return {"contact_area_error": float(max(area - lower, upper - area))}
 
 
 def friction_columns(step: Step) -> dict[str, float]:
-    """Distance, forces and work of an accepted step; empty for a program without slides."""
+    """Distance and forces of an accepted step; empty for a program without slides."""
     scene, state = step.scene, step.state
     if not scene.motions:
         return {}
@@ -100,7 +100,6 @@ def friction_columns(step: Step) -> dict[str, float]:
         "friction_coefficient": friction / force if force > 0 else math.nan,
         "friction_force_across": force_across(scene.operator, pressure, step.displacement, slide),
         "friction_force_error": step.uncertainty.friction,
-        "friction_work": slid.work,
     }
 
 
@@ -127,7 +126,7 @@ def error_columns(step: Step, series_error: float, largest: tuple[float, float] 
     largest_force, largest_approach = largest or (state.largest_force, state.largest_approach)
     of_force, of_approach = series_error * state.largest_force, series_error * state.largest_approach
     is_viscoelastic, unit = step.scene.is_viscoelastic, step.scene.tolerance if largest_force > 0 else 0.0
-    solved = step.solver_error + _INHERITED * unit if is_viscoelastic else max(step.solver_error, _LEAST * unit)
+    solved = _solver_error(step, largest_force)
     force = approach = 0.0
     if step.control == "approach" or not step.given:
         force = unknown.force + solved * shown.force + of_force
@@ -142,17 +141,20 @@ def error_columns(step: Step, series_error: float, largest: tuple[float, float] 
         force / largest_force if largest_force > 0 else 0.0,
         approach / largest_approach if largest_approach > 0 else 0.0,
     )
-    carried = _SUMMED * solved + series_error
     return {
         "stated_error": relative,
         "residual": step.solver_error,
-        "residual_bound": step.bound,
-        "pressure_error": pressure,
         "force_error": force,
         "approach_error": approach,
-        "work_error": unknown.work + carried * abs(step.work),
-        "dissipated_energy_error": unknown.dissipated + carried * abs(step.dissipated),
     }
+
+
+def _solver_error(step: Step, largest_force: float) -> float:
+    """Relative error of the pressure by the contact solver, in this step and in those before."""
+    unit = step.scene.tolerance if largest_force > 0 else 0.0
+    if step.scene.is_viscoelastic:
+        return step.solver_error + _INHERITED * unit
+    return max(step.solver_error, _LEAST * unit)
 
 
 def meets_tolerance(step: Step, series_error: float, largest: tuple[float, float] | None = None) -> bool:
@@ -167,7 +169,9 @@ def meets_tolerance(step: Step, series_error: float, largest: tuple[float, float
         return True
     found = error_columns(step, series_error, largest)
     most = _AT_MOST * scene.tolerance
-    if found["stated_error"] > most or found["work_error"] > most * state.largest_work:
+    solved = _solver_error(step, largest[0] if largest else state.largest_force)
+    work_error = step.uncertainty.work + (_SUMMED * solved + series_error) * abs(step.work)
+    if found["stated_error"] > most or work_error > most * state.largest_work:
         return False
     if not scene.is_soft:
         return not found["stated_error"] > scene.tolerance

@@ -17,7 +17,6 @@ from roughvisc.experiment.notes import (
     border_note,
     contact_stands_alone,
     creep_left,
-    octave_note,
     slope_note,
     surface_stands_alone,
     wake_note,
@@ -57,7 +56,7 @@ class SteadySliding(Experiment):
 
     Parameters
     ----------
-    speeds, load, pressure, direction, last_octave
+    speeds, load, pressure, direction
         As :func:`roughvisc.friction` has them; the speeds become a tuple.
 
     Raises
@@ -75,7 +74,6 @@ class SteadySliding(Experiment):
     load: float | None = None
     pressure: float | None = None
     direction: Direction = "x"
-    last_octave: bool = False
 
     axis: ClassVar[str] = "speed"
     table: ClassVar[str] = "friction"
@@ -146,11 +144,11 @@ class SteadySliding(Experiment):
         return max(self.asked)
 
     def cheaper(self) -> tuple[SteadySliding, int, float]:
-        """Some of the speeds, evenly spread; without its shortest octave a speed costs half."""
+        """Some of the speeds, evenly spread."""
         order = np.argsort(self.asked)
         few = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW, len(order))).astype(int))]
-        few_speeds = replace(self, speeds=[self.asked[number] for number in few], last_octave=False)
-        return few_speeds, len(order), 1.0 + float(self.last_octave)
+        few_speeds = replace(self, speeds=[self.asked[number] for number in few])
+        return few_speeds, len(order), 1.0
 
     def force(self, area: float) -> float:
         """Load on a surface of an area [m2]. [N]"""
@@ -193,9 +191,6 @@ class SlidingRows(Rows):
         self._alone = surface_stands_alone(self._profile.height)
         #: Part of the creep that is left where the next contact comes, by the speed.
         self._creep_left: dict[float, float] = {}
-        self._smooth: SlidingGrid | None = None
-        if curve.last_octave:
-            self._smooth, _ = self._face.smooth()
         self._coarser = CoarserFaces(self._face) if problem.settings.grid_error else None
 
     def __iter__(self) -> Iterator[Row]:
@@ -210,20 +205,18 @@ class SlidingRows(Rows):
         law = self._body.over_frequencies(speed * self._face.waves, 0.1 * tolerance)
         sliding = self._face.sliding(speed, law)
         found = self._face.slide(sliding, self._force, tolerance)
-        row, fields = self._row(found, speed)
+        row, fields = self._row(found)
         row["friction_force_across"] = sliding.force_across(on_rows(found.pressure, sliding))
         theory = persson(sliding, on_rows(self._face.gap, sliding), row["nominal_pressure"])
         row["persson_friction_coefficient"] = theory.friction_coefficient
         row["persson_contact_fraction"] = theory.contact_fraction
-        if self._smooth is not None:
-            row |= self._added(row, found, self._smooth.slide(sliding, self._force, tolerance))
         if self._coarser is not None:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
-        row["convolutions"] = sliding.convolutions  # those without the shortest octave, too
+        row["convolutions"] = sliding.convolutions
         facts = {"number": number, "creep_left": self._creep(found, speed, law)}
         return Row(speed, row, fields, state=done, facts=facts, done=float(done))
 
-    def _row(self, found: SteadyState, speed: float) -> tuple[dict[str, Any], dict[str, Array]]:
+    def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Numbers and fields of a state, in the frame of the profile."""
         profile, force = self._profile, self._force
         pressure, displacement = self._turn.back(found.pressure), self._turn.back(found.displacement)
@@ -242,13 +235,10 @@ class SlidingRows(Rows):
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
-            "dissipated_power": found.power_force * speed,
-            "loss_tangent": found.loss_tangent,
             "stated_error": max(found.residual, found.friction_residual),
             "pressure_residual": found.residual,
             "friction_residual": found.friction_residual,
             "iterations": found.vectors,
-            "outer_iterations": found.iterations,
             "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
         }
         fields = {"pressure": np.ascontiguousarray(pressure), "gap": gap}
@@ -260,16 +250,6 @@ class SlidingRows(Rows):
             return 0.0
         ages = self._face.period / speed, np.inf
         return max(creep_left(*(float(one.contact_compliance(age)) for age in ages)) for one in law.materials)
-
-    def _added(self, row: dict[str, Any], found: SteadyState, without: SteadyState) -> dict[str, float]:
-        """What the shortest octave of waves adds, relative to what there is with it."""
-        if not (found.converged and without.converged and found.power_force > 0):
-            return {"last_octave_friction": np.nan, "last_octave_area": np.nan}
-        area = areas(without.pressure > 0, self._profile.spacing)[1]
-        return {
-            "last_octave_friction": 1 - without.power_force / found.power_force,
-            "last_octave_area": 1 - area / row["contact_area"],
-        }
 
     def order(self, records: RowStore) -> list[int]:
         """In the order in which the speeds were given."""
@@ -288,5 +268,5 @@ class SlidingRows(Rows):
             log.warning("%s", note)
         return {
             "direction": self._curve.direction,
-            "warnings": warnings_text({**warnings, "octave": octave_note(dataset)}),
+            "warnings": warnings_text(warnings),
         }

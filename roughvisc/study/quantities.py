@@ -92,11 +92,12 @@ def _variable(name: str) -> Callable[[xr.Dataset, Array], Any]:
 
 
 def _of_area(result: xr.Dataset, values: Array) -> Any:
-    """In proportion to the contact area, whose bounds are stated."""
-    if "contact_area_solver_lower" not in result:
+    """In proportion to the contact area, whose error is stated."""
+    if "contact_area_error" not in result:
         return None
-    lower, upper = (result[f"contact_area_solver_{end}"].values for end in ("lower", "upper"))
-    return np.abs(values) * np.divide(upper - lower, 2 * upper, out=np.zeros_like(upper), where=upper > 0)
+    error = result["contact_area_error"].values
+    upper = result["contact_area"].values + error
+    return np.abs(values) * np.divide(error, upper, out=np.zeros_like(upper), where=upper > 0)
 
 
 def _of_gap(result: xr.Dataset, values: Array) -> Any:

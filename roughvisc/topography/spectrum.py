@@ -59,31 +59,6 @@ def _wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np
     return q_x, q_y, count
 
 
-def without_last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, float]:
-    """Heights that repeat, without the shortest octave of their waves.
-
-    Parameters
-    ----------
-    z : ndarray, shape (nx, ny)
-        Heights. [m]
-    cells : tuple of float
-        Cell sides. [m]
-
-    Returns
-    -------
-    heights : ndarray, shape (nx, ny)
-        Without the waves shorter than the length below. [m]
-    shortest : float
-        Twice the wavelength above which 99 % of the mean square slope lie: what is below that one counts as none. [m]
-    """
-    q_x, q_y, count = _wavevectors(z.shape, cells)
-    waves, q = scipy.fft.rfft2(z), np.hypot(q_x[:, None], q_y)
-    begins = last_octave(q, count * q**2 * np.abs(waves) ** 2)
-    if not begins:
-        return z, 0.0
-    return scipy.fft.irfft2(np.where(q <= begins, waves, 0.0), s=z.shape), 2 * np.pi / begins
-
-
 def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
     """Wave number beyond which the shortest octave of waves lies; zero of a surface without slopes. [rad/m]
 

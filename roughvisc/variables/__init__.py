@@ -66,7 +66,7 @@ VARIABLES: dict[str, Variable] = {
         "Pa",
         "contact pressure",
         "zero outside the contact and where the profile is absent",
-        ancillary=("pressure_error", "grid_error_pressure"),
+        ancillary=("grid_error_pressure",),
         short="pressure",
         cell_methods="x: y: mean",
     ),
@@ -92,7 +92,7 @@ VARIABLES: dict[str, Variable] = {
         "N",
         "normal force",
         "prescribed under load control, found under approach control",
-        ancillary=("force_error", "grid_error_force"),
+        ancillary=("force_error",),
         short="force",
         every_step=True,
         in_table="last",
@@ -106,7 +106,7 @@ VARIABLES: dict[str, Variable] = {
         "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
         "absent; while the contact is open: the value at which it would just close; first touch is at the highest "
         "cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while mean_gap "
-        "(periodic) and mean_plane_separation (free space) do",
+        "(periodic) does",
         ancillary=("approach_error", "grid_error_approach"),
         short="approach",
         every_step=True,
@@ -124,31 +124,11 @@ VARIABLES: dict[str, Variable] = {
         "J",
         "work of the force",
         "on the approach since the start; "
-        "over every accepted step, kept or not, as that of the pressure on the displacement: stored_energy plus "
-        "dissipated_energy, with that of the friction force in a slide; a jump is quasi-static; with periodic "
+        "over every accepted step, kept or not, as that of the pressure on the displacement, "
+        "stored and dissipated, with that of the friction force in a slide; a jump is quasi-static; with periodic "
         "boundaries without the uniform displacement",
-        ancillary=("work_error",),
         short="work",
         every_step=True,
-    ),
-    "stored_energy": Variable(
-        _SERIES,
-        "J",
-        "stored energy",
-        "in the springs of the material; "
-        "exact for pressure linear in each step; missing where the memory is the direct history",
-        every_step=True,
-        may_be_missing=True,
-    ),
-    "dissipated_energy": Variable(
-        _SERIES,
-        "J",
-        "dissipated energy",
-        "in the material since the start; "
-        "exact for pressure linear in each step; missing where the memory is the direct history",
-        ancillary=("dissipated_energy_error",),
-        every_step=True,
-        may_be_missing=True,
     ),
     "contact_area": Variable(
         _SERIES,
@@ -157,13 +137,7 @@ VARIABLES: dict[str, Variable] = {
         "corrected for the grid: "
         "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is that between "
         "cells in contact and present cells out of contact: where the material ends the count is exact",
-        ancillary=(
-            "contact_area_lower",
-            "contact_area_upper",
-            "contact_area_solver_lower",
-            "contact_area_solver_upper",
-            "grid_error_area",
-        ),
+        ancillary=("contact_area_error", "grid_error_area"),
         short="contact area",
         every_step=True,
         in_table="last",
@@ -192,17 +166,6 @@ VARIABLES: dict[str, Variable] = {
         ancillary=("approach_error", "grid_error_gap"),
         every_step=True,
         may_be_missing=True,
-        in_table="last",
-    ),
-    "mean_plane_separation": Variable(
-        _SERIES,
-        "m",
-        "mean-plane separation",
-        "of the mean plane of the profile and the undeformed plane of the half-space; "
-        "free space alone: mean undeformed gap over the present cells minus approach; negative once the mean plane has "
-        "passed the other; not stated of an indenter that is known beyond its grid: its mean would be that of the grid",
-        ancillary=("approach_error",),
-        every_step=True,
         in_table="last",
     ),
     **SLIDES,
@@ -245,21 +208,6 @@ VARIABLES: dict[str, Variable] = {
         may_be_missing=True,
         in_table="largest",
     ),
-    "residual_bound": Variable(
-        _SERIES,
-        "1",
-        "bound on the contact solver's error",
-        "of the pressure, relative, in the energy norm: "
-        "sqrt(2 gap / p.Kp) with the duality gap of the step's contact problem",
-        may_be_missing=True,
-    ),
-    "pressure_error": Variable(
-        _SERIES,
-        "1",
-        "stated error of the pressure",
-        "its absolute values summed (L1), over the largest force of the kept rows so far",
-        may_be_missing=True,
-    ),
     "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),
     "approach_error": Variable(
         _SERIES,
@@ -268,43 +216,13 @@ VARIABLES: dict[str, Variable] = {
         "zero where the approach is prescribed",
         may_be_missing=True,
     ),
-    "work_error": Variable(_SERIES, "J", "stated error of the work", may_be_missing=True),
-    "dissipated_energy_error": Variable(_SERIES, "J", "stated error of the dissipated energy", may_be_missing=True),
-    "contact_area_lower": Variable(
+    "contact_area_error": Variable(
         _SERIES,
         "m^2",
-        "lower bound on the contact area",
-        "in practice: "
-        "contact_area_solver_lower less the error of the grid: grid_error_area times the largest contact area",
+        "stated error of the contact area",
+        "the area of the cells that time steps and contact solver leave in doubt, in contact or out of it, whichever "
+        "is larger; the grid's part is stated apart",
         may_be_missing=True,
-        in_table="last",
-    ),
-    "contact_area_upper": Variable(
-        _SERIES,
-        "m^2",
-        "upper bound on the contact area",
-        "in practice: "
-        "contact_area_solver_upper and the error of the grid: grid_error_area times the largest contact area",
-        may_be_missing=True,
-        in_table="last",
-    ),
-    "contact_area_solver_lower": Variable(
-        _SERIES,
-        "m^2",
-        "lower bound on this grid's contact area",
-        "the contact area without the cells that time steps and contact solver leave in doubt; without the error of "
-        "the grid, which is mostly larger",
-        may_be_missing=True,
-        in_table="last",
-    ),
-    "contact_area_solver_upper": Variable(
-        _SERIES,
-        "m^2",
-        "upper bound on this grid's contact area",
-        "the contact area with the cells that time steps and contact solver leave in doubt; without the error of the "
-        "grid, which is mostly larger",
-        may_be_missing=True,
-        in_table="last",
     ),
     "grid_error": Variable(
         _SERIES,

@@ -53,13 +53,4 @@ SLIDES: dict[str, Variable] = {
         "of steps of one cell, by a companion march in steps of two; the rest of the grid's error comes on top",
         may_be_missing=True,
     ),
-    "friction_work": Variable(
-        _SERIES,
-        "J",
-        "work of the friction force",
-        "since the start, "
-        "by the balance of energy: what the body has stored and dissipated in slides, less the work of the normal "
-        "force; the integral of friction_force over sliding_distance checks it",
-        every_step=True,
-    ),
 }

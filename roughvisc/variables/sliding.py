@@ -59,9 +59,6 @@ SLIDING: dict[str, Variable] = {
         in_table="last",
     ),
     **over_axis("speed", _SHARED),
-    "dissipated_power": Variable(("speed",), "W", "dissipated power", "in the material"),
-    "loss_tangent": Variable(("speed",), "1", "largest loss tangent", "over the waves of the grid"),
-    "outer_iterations": Variable(("speed",), "1", "interior-point iterations", dtype="int32"),
     "stated_error": Variable(
         ("speed",),
         "1",
@@ -96,20 +93,5 @@ SLIDING: dict[str, Variable] = {
         "the value at the speed",
         ("grid_error_friction", "grid_error_area", "grid_error_approach", "grid_error_gap"),
         in_table="last",
-    ),
-    "last_octave_friction": Variable(
-        ("speed",),
-        "1",
-        "friction by the shortest octave",
-        "part that the shortest octave of waves adds",
-        may_be_missing=True,
-        in_table="last",
-    ),
-    "last_octave_area": Variable(
-        ("speed",),
-        "1",
-        "contact area by the shortest octave",
-        "part that the shortest octave of waves adds",
-        may_be_missing=True,
     ),
 }

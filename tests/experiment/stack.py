@@ -15,8 +15,7 @@ from roughvisc.variables import STATUS_MEANINGS, Variable, over_axis
 from roughvisc.variables.axes import Axis
 
 SHARED = """pressure gap force nominal_pressure approach contact_area contact_area_counted contact_fraction mean_gap
- stated_error grid_error grid_error_area contact_area_lower contact_area_upper iterations convolutions status
- wall_time"""
+ stated_error grid_error grid_error_area iterations convolutions status wall_time"""
 LOADS = Axis(
     "load",
     over_axis("load", SHARED.split())

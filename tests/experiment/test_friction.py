@@ -48,7 +48,6 @@ def test_dataset__agrees_with_itself(curve):
     np.testing.assert_allclose(curve.nominal_pressure, 2e4)
     np.testing.assert_allclose(curve.pressure.mean(("x", "y")), 2e4, rtol=1e-12)
     np.testing.assert_allclose(curve.friction_coefficient * curve.force, curve.friction_force)
-    np.testing.assert_allclose(curve.dissipated_power, curve.friction_force * curve.speed)
     np.testing.assert_allclose(
         curve.contact_fraction * curve.contact_area_counted / curve.contact_area, (curve.pressure > 0).mean(("x", "y"))
     )
@@ -148,31 +147,6 @@ def test_persson__is_that_of_the_surface_as_it_slides(curve):
     np.testing.assert_allclose(curve.persson_contact_fraction, curve.contact_fraction, rtol=0.5)
 
 
-def test_last_octave__is_the_change_from_a_surface_without_it():
-    """Two waves: the shorter is what is left out; in full contact each has the friction of its own."""
-    x, k = (np.arange(63) + 0.5) / 63 * 1e-3, 2 * np.pi / 1e-3
-    both = 1e-6 * (np.cos(k * x) + 0.4 * np.cos(5 * k * x + 1))
-    long, two = (rv.from_array(np.repeat(z[:, None], 3, 1), spacing=1e-3 / 63) for z in (1e-6 * np.cos(k * x), both))
-    press = {"pressure": 1e6, "speeds": [0.02, 0.2], "tolerance": 1e-6}
-    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
-    exact = 1 - less.friction_coefficient / found.friction_coefficient
-    assert (exact > 0.2).all()
-    np.testing.assert_allclose(found.last_octave_friction, exact, rtol=1e-6)
-    np.testing.assert_allclose(found.last_octave_area, 0, atol=1e-12)
-    assert set(found.variables) <= set(SLIDING)
-    press["pressure"] = 1e3
-    found, less = rv.friction(two, RUBBER, **press, last_octave=True), rv.friction(long, RUBBER, **press)
-    np.testing.assert_allclose(found.last_octave_area, 1 - less.contact_area / found.contact_area, rtol=1e-9)
-    assert (found.last_octave_area < -0.1).all(), "finer roughness takes area away"
-    with pytest.raises(rv.InputError, match="no wavelengths above its shortest octave"):
-        rv.friction(long, RUBBER, **press, last_octave=True)
-
-
-def test_last_octave__of_a_body_without_friction_is_not_known():
-    found = rv.friction(ROUGH, rv.elastic(1e6), pressure=2e4, speeds=0.2, last_octave=True)
-    assert np.isnan(found.last_octave_friction).all()
-
-
 def test_measured_material__by_its_series(curve):
     t = np.geomspace(1e-9, 1e4, 1400)
     table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
@@ -256,9 +230,8 @@ def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion()
         rv.friction(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
 
 
-@pytest.mark.parametrize("last_octave", [False, True])
-def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
-    """Of the solution, of its forces, and of the same without the shortest octave of waves."""
+def test_convolutions__are_all_pairs_of_transforms(monkeypatch):
+    """Of the solution and of its forces."""
     forward, plain = [], transforms(mirrored=False)
 
     def counted(*given, **named):
@@ -266,6 +239,6 @@ def test_convolutions__are_all_pairs_of_transforms(last_octave, monkeypatch):
         return plain.of_field(*given, **named)
 
     monkeypatch.setattr(steady, "transforms", lambda mirrored: replace(plain, of_field=counted))
-    ds = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2], last_octave=last_octave)
+    ds = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2])
     assert int(ds.convolutions.sum()) == len(forward)
     assert (ds.convolutions > 2 * ds.iterations).all()

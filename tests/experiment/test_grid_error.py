@@ -117,7 +117,6 @@ def pressed_by_hand(approach=(1.0, 2.0)):
     pressure[1:4, 1:3] = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
     histories = {"approach": list(approach), "force": [21.0, 42.0]}
     histories |= {"contact_area": [5.0, 4.0], "contact_area_counted": [6.0, 5.5]}
-    histories |= {"contact_area_solver_lower": [4.5, 3.5], "contact_area_solver_upper": [5.5, 4.0]}
     return xr.Dataset(
         {"height": (("x", "y"), np.zeros((6, 5))), "pressure": (("time", "x", "y"), np.stack([pressure, 2 * pressure]))}
         | {name: ("time", values) for name, values in histories.items()},

@@ -93,19 +93,6 @@ def test_rigid_base__is_the_sheet(boundary):
     assert float((abs(found.pressure - sheet.pressure).sum(["x", "y"]) / sheet.pressure.sum(["x", "y"])).max()) < 1e-3
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_all_work__is_dissipated_when_everything_has_relaxed(boundary):
-    height = rv.self_affine(SIDE, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
-    program = rv.Program().load(0.02, over=0.1).hold(0.2).load(0.0, over=0.1).hold(300.0)
-    edge = {"edge": "accept"} if boundary == "free" else {}
-    settings = {"boundary": boundary, "times": [0.3, 0.4, 300.4], "fields": (), **edge}
-    ds = simulated(height, (RUBBER, POLYMER), 1.2e-4, program, **settings)
-    work, dissipated = ds.work.values, ds.dissipated_energy.values
-    assert (np.diff(dissipated) > 0.01 * work[-1]).all()
-    assert dissipated[1] < 0.9 * work[1], "both bodies still hold energy at the end of the load"
-    assert dissipated[2] == pytest.approx(work[2], rel=1e-6)
-
-
 #: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.
 QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
 
@@ -142,5 +129,6 @@ def test_settled_slide_in_full_contact__takes_what_both_bodies_dissipate():
     ds = simulated(height, (QUICK, SLOW), thickness, program, **settings)
     distance, area = float(ds.sliding_distance[1] - ds.sliding_distance[0]), SIDE * 3 * SIDE / cells
     expected = q * amplitude**2 * abs(stiffness.imag) / 2 * area
-    for name in ("friction_work", "dissipated_energy"):
-        assert float(ds[name][1] - ds[name][0]) / distance == pytest.approx(expected, rel=2e-3), name
+    late = ds.roughvisc.steps.where(ds.roughvisc.steps.time >= float(ds.time[0]), drop=True)
+    work = np.trapezoid(late.friction_force, late.sliding_distance)
+    assert work / distance == pytest.approx(expected, rel=2e-3)

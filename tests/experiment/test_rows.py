@@ -63,11 +63,9 @@ def test_rows__of_a_wide_grid_hold_the_same_numbers(monkeypatch, absent):
 def test_every_row__states_an_error(material, program, times):
     ds = result(material, program, times=times)
     assert ds.sizes["time"] > 1
-    for name in ("stated_error", "time_error", "residual", "pressure_error", "force_error", "approach_error"):
+    for name in ("stated_error", "time_error", "residual", "force_error", "approach_error", "contact_area_error"):
         assert np.isfinite(ds[name]).all(), name
         assert (ds[name] >= 0).all(), name
-    assert (ds.contact_area_solver_lower <= ds.contact_area).all()
-    assert (ds.contact_area <= ds.contact_area_solver_upper).all()
 
 
 def test_ancillary_variables__exist():
@@ -111,8 +109,7 @@ def soft_steps(control, tolerance=1e-2):
 def test_steps_that_state_more_than_three_tolerances__are_no_rows(control):
     over = []
     for step in soft_steps(control):
-        found = error_columns(step, 0.0)
-        over.append(max(found["stated_error"], found["work_error"] / step.state.largest_work) / step.scene.tolerance)
+        over.append(error_columns(step, 0.0)["stated_error"] / step.scene.tolerance)
         if meets_tolerance(step, 0.0):
             assert over[-1] <= 3
     assert max(over) > 3

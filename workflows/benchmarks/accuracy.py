@@ -171,11 +171,11 @@ def compared(ds, exact, program):
     for name, given in prescribed(program, ds.time.values).items():
         true[name][given] = np.nan
     true["total"] = np.fmax(true["pressure"], np.fmax(true["approach"], true["force"]))
-    stated = {"total": _row(ds, "stated_error", "time_error"), "pressure": _row(ds, "pressure_error")}
+    stated = {"total": _row(ds, "stated_error", "time_error"), "pressure": _row(ds, "pressure_error", "stated_error")}
     stated |= {name: _row(ds, f"{name}_error") / scale[name] for name in ("approach", "force", "work")}
     found = {name: {"true": _short(true[name]), "stated": _short(stated[name])} for name in QUANTITIES}
-    names = ("contact_area", "contact_area_solver_lower", "contact_area_solver_upper")
-    area, low, high = (_row(ds, name) / cell for name in names)
+    area, error = (_row(ds, name) / cell for name in ("contact_area", "contact_area_error"))
+    low, high = area - error, area + error
     off = (area - exact.contact_area.values / cell).round(6)
     inside = np.where(np.isfinite(low), (low <= area - off + 1e-6) & (area - off <= high + 1e-6), np.nan)
     found["contact_area"] = {"cells_off": _short(off), "inside": _short(inside), "width": _short(high - low)}

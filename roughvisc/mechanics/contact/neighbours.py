@@ -98,9 +98,3 @@ def area_bounds(counted: ArrayLike, area: ArrayLike, inside: ArrayLike, outside:
     counted, area, inside, outside = (np.asarray(one, dtype=float) for one in (counted, area, inside, outside))
     most = 1 + 4 * PERIMETER_CORRECTION
     return np.maximum(area - most * inside, 0.0), np.minimum(area + most * outside, counted + outside)
-
-
-def bounds_with_grid(lower: ArrayLike, upper: ArrayLike, error: ArrayLike) -> tuple[Array, Array]:
-    """Bounds on a contact area, with an error of the grid that comes on top. [m2]"""
-    lower, upper, error = (np.asarray(one, dtype=float) for one in (lower, upper, error))
-    return np.maximum(lower - error, 0.0), upper + error

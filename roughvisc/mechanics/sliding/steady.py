@@ -53,8 +53,6 @@ class SteadyState:
         Interior-point iterations.
     vectors : int
         Vectors of the linear solver in all; each costs two convolutions.
-    loss_tangent : float
-        The largest on the grid.
     """
 
     pressure: Array
@@ -66,7 +64,6 @@ class SteadyState:
     converged: bool
     iterations: int
     vectors: int
-    loss_tangent: float
 
 
 class Sliding:
@@ -114,10 +111,6 @@ class Sliding:
                 "the material creeps without end, and the surface has waves across the motion, which stand still in "
                 "it: there is no steady state; expected a solid, or a profile that does not change across the motion"
             )
-        loss = np.where(acting, np.abs(complex_compliance.imag), 0.0)
-        kept = np.where(acting, complex_compliance.real, 1.0)
-        #: The largest loss tangent.
-        self.loss_tangent = float(np.max(loss / kept))
         # Of the shortest wave of an even grid no sine is seen.
         skew = np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response
         #: Displacement over pressure of each wave. [m/Pa]
@@ -239,5 +232,4 @@ def steady_state(
         converged=found.converged,
         iterations=found.iterations,
         vectors=found.vectors,
-        loss_tangent=sliding.loss_tangent,
     )

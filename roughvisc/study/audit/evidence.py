@@ -211,8 +211,8 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     has_pressure = {"pressure", "height"} <= set(dataset.data_vars)
     contact = contact_of(dataset, row) if has_pressure else None
     rubbed, spots = row, contact
-    if "dissipated_power" in dataset:
-        rubbed = dataset.isel(speed=int(dataset["dissipated_power"].values.argmax()))
+    if "speed" in dataset.dims and "friction_force" in dataset:
+        rubbed = dataset.isel(speed=int((dataset["friction_force"] * dataset["speed"]).values.argmax()))
         spots = contact_of(dataset, rubbed) if has_pressure else None
     thickness = float(attrs.get("thickness", math.inf))
     poisson = attrs.get("poisson", 0.5)
@@ -256,7 +256,8 @@ def _fullest(dataset: xr.Dataset) -> int:
 def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
     """Largest speed and friction power [m/s], [W]; zero and NaN where nothing slides."""
     if "speed" in dataset.dims:
-        return float(dataset["speed"].max()), float(dataset.get("dissipated_power", xr.DataArray(math.nan)).max())
+        friction = dataset.get("friction_force", xr.DataArray(math.nan))
+        return float(dataset["speed"].max()), float((friction * dataset["speed"]).max())
     if "sliding_distance" not in dataset:
         return 0.0, math.nan
     rows = history(dataset)

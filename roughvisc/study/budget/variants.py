@@ -100,8 +100,6 @@ def with_rows(case: Case, places: Any, fields: Iterable[str]) -> Case:
     """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
     settings, experiment = case.solving(), case.experiment()
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
-    if getattr(experiment, "last_octave", False):  # a source of its own here, and twice the cost of every solve
-        changes[f"{experiment.table}.last_octave"] = False
     if places is not None:
         changes |= changed_keys(settings, experiment.with_rows_at(settings, [float(one) for one in places]))
     return vary(case, changes)

@@ -9,7 +9,6 @@ from typing import Any
 import xarray as xr
 from rich.console import Group
 
-from roughvisc.labels import warnings_of
 from roughvisc.observables.leakage import closing_times
 from roughvisc.variables.axes import AXES, Axis, axis_of
 from roughvisc.variables.grid_errors import GRID_ERROR
@@ -22,17 +21,10 @@ _ACROSS = 0.05
 _BESIDE = {
     "contact_fraction",
     "friction_force_across",
-    "mean_plane_separation",
-    "contact_area_lower",
-    "contact_area_upper",
-    "contact_area_solver_lower",
-    "contact_area_solver_upper",
     *GRID_ERROR.values(),
-    "last_octave_friction",
 }
 _COSTS = {
     "convolutions": "convolutions",
-    "outer_iterations": "contact problems",
     "iterations": "solver iterations",
 }
 
@@ -55,7 +47,6 @@ def result_table(dataset: xr.Dataset) -> Group:
             for name in grid_errors
             if name in dataset and (dataset[name] != 0).any()
         ),
-        *([("Shortest octave of waves", _octave(dataset))] if "last_octave_friction" in dataset else []),
         # a file that another program has written may not state its cost
         *((f"Cost: {label}", f"{int(dataset[name].sum())}") for name, label in _COSTS.items() if name in dataset),
         *([("Cost: wall time", readable(float(dataset["wall_time"].max()), "s"))] if "wall_time" in dataset else []),
@@ -133,9 +124,3 @@ def _across(row: xr.Dataset, where: str) -> list[tuple[str, Any]]:
         return []
     side = "left" if across > 0 else "right"
     return [("Force across the motion", f"{readable(abs(across), 'N')} to the {side} {where}")]
-
-
-def _octave(dataset: xr.Dataset) -> str:
-    """What the waves that a scan hardly resolves add, and what that means where it is much."""
-    most = f"adds up to {100 * float(dataset['last_octave_friction'].max()):.2g} % of the friction"
-    return f"{most}: unresolved wavelengths may add as much again" if "octave" in warnings_of(dataset.attrs) else most

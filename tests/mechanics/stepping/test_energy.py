@@ -254,7 +254,6 @@ def test_step_load_on_hardly_any_compliance_at_once__works_by_what_it_sinks(mate
     )
     jump = 2 / 5 * float(exact.approach(0.0))  # Hertz: F is the power 3/2 of the approach
     np.testing.assert_allclose(ds.work, force * (exact.approach(times) - float(exact.approach(0.0)) + jump), rtol=1e-2)
-    assert (ds.work_error < 2e-2 * ds.work).all()
 
 
 def test_ramp_of_load__works_as_force_on_approach():

@@ -136,25 +136,13 @@ def test_jump__of_a_layer_without_instantaneous_compliance_is_refused():
     ],
     ids=["ramp", "jump", "mirrored", "flow", "slide", "free space"],
 )
-def test_energies__of_equal_materials_are_those_of_a_half_space(height, program, boundary, materials):
+def test_work__of_equal_materials_is_that_of_a_half_space(height, program, boundary, materials):
     found, expected = (
         pressed(body, height, program, boundary=boundary).roughvisc.steps
         for body in (rv.layer(materials[0], 1e-4, on=materials[1]), materials[0])
     )
-    for name in ("work", "stored_energy", "dissipated_energy"):
-        assert float(expected[name][-1]) > 0
-        np.testing.assert_allclose(found[name][-1], expected[name][-1], rtol=3e-4)
-
-
-def test_slide__dissipates_in_both_bodies_what_friction_does_in_the_steady_state():
-    body, period, speed = rv.layer(rv.zener(3e6, 1e6, 1e4), 1e-4, on=rv.zener(1e7, 2e6, 2e3)), 5e-4, 1e-2
-    height = rv.wavy(amplitude=1e-6, wavelength=period, size=period, shape=(48, 1), waves=1)
-    program = rv.Program().pressure(2e3, over=0.01).slide(distance=3 * period, speed=speed)
-    steps = pressed(body, height, program, boundary="periodic").roughvisc.steps.isel(step=slice(-12, None))
-    lost = np.diff(steps["dissipated_energy"].values)
-    slid = np.diff(steps["sliding_distance"].values)
-    friction = steps["friction_force"].values
-    np.testing.assert_allclose(lost.sum(), (slid * (friction[1:] + friction[:-1]) / 2).sum(), rtol=0.01)
+    assert float(expected.work[-1]) > 0
+    np.testing.assert_allclose(found.work[-1], expected.work[-1], rtol=3e-4)
 
 
 @pytest.mark.parametrize("thickness", [1e-12, 1e2])

@@ -39,8 +39,8 @@ def test_speeds__are_in_order_and_each_once(read, speeds, found):
 
 
 def test_case__states_a_curve_and_survives_its_text(read):
-    case = read('pressure = "0.2 MPa"\nspeeds = [1, 2]\ndirection = "-y"\nlast_octave = true')
-    assert case.experiment() == SteadySliding(speeds=[1, 2], pressure=2e5, direction="-y", last_octave=True)
+    case = read('pressure = "0.2 MPa"\nspeeds = [1, 2]\ndirection = "-y"')
+    assert case.experiment() == SteadySliding(speeds=[1, 2], pressure=2e5, direction="-y")
     again = Case.from_json(case.to_json())
     assert (again.key, again.experiment()) == (case.key, case.experiment())
     assert "2 speeds from 1 m/s to 2 m/s along -y, under 200 kPa" in case._repr_html_()
@@ -151,16 +151,15 @@ def test_key__of_a_curve_is_that_of_what_is_asked(read, monkeypatch):
         read(text).key
         for text in (
             "load = 2\nspeeds = [10, 1]",
-            'load = 2\nspeeds = [1, 10]\ndirection = "x"\nlast_octave = false',
+            'load = 2\nspeeds = [1, 10]\ndirection = "x"',
             "load = 3\nspeeds = [1, 10]",
             "load = 2\nspeeds = [1, 11]",
             'load = 2\nspeeds = [1, 10]\ndirection = "y"',
-            "load = 2\nspeeds = [1, 10]\nlast_octave = true",
             "pressure = 2\nspeeds = [1, 10]",
         )
     ]
     assert keys[0] == keys[1]
-    assert len(set(keys)) == 6
+    assert len(set(keys)) == 5
 
 
 @pytest.mark.parametrize("said", ["", '[solve]\nboundary = "auto"\n', "[solve]\ntolerance = 1e-3\n"])

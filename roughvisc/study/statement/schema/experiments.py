@@ -12,7 +12,6 @@ from roughvisc.experiment.protocol import Experiment
 from roughvisc.experiment.steady_sliding import DIRECTIONS, SteadySliding
 from roughvisc.mechanics.stepping.program import INSTEAD
 from roughvisc.study.statement.schema.section import (
-    Flag,
     Section,
     Unit,
     choice,
@@ -79,7 +78,6 @@ class FrictionSection(ExperimentSection):
     load: nullable(measured("N", above=0, instead=INSTEAD["load"])) = None
     pressure: nullable(measured("Pa", above=0, instead=INSTEAD["pressure"])) = None
     direction: choice(*DIRECTIONS) = SteadySliding.direction
-    last_octave: Flag = SteadySliding.last_octave
 
     @model_validator(mode="after")
     def _has_one_load(self) -> FrictionSection:
