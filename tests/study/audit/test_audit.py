@@ -271,7 +271,8 @@ def test_friction_curve__is_judged_by_its_speeds():
         for speeds in ([1e-3, 0.1], [1e-3, 0.1, 100.0])
     )
     assert [rv.audit(ds, **given)["inertia"].verdict for ds in (slow, fast)] == ["holds", "broken"]
-    row, power = slow.isel(speed=int(slow.dissipated_power.values.argmax())), float(slow.dissipated_power.max())
+    powers = slow.friction_force * slow.speed
+    row, power = slow.isel(speed=int(powers.values.argmax())), float(powers.max())
     radius = math.sqrt(float(row.contact_area) / math.pi)  # of one crest, one spot
     rise = cf.flash_temperature(power / float(row.contact_area), radius, 0.1, 0.2, 2e6)
     assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise)
