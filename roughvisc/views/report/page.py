@@ -33,7 +33,7 @@ from roughvisc.units import unit_for
 from roughvisc.variables.axes import axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn
-from roughvisc.views.figures.fields import draw_map, label_plane, plane_unit
+from roughvisc.views.figures.fields import draw_map, label_plane, measured_part, plane_unit
 from roughvisc.views.figures.rows import require
 from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
@@ -47,8 +47,10 @@ _PICTURED = 6
 _DRAWN = 3
 #: Cases whose studies are shown; of more, evenly spread ones.
 _STATED = 60
-#: Resolution of pictures, which a screen shows at half this size. [1/inch]
+#: Resolution of pictures. [1/inch]
 _DPI = 110
+#: Width of a figure that a narrow screen shows without scrolling. [inch]
+_WIDE = 5.5
 #: Surfaces that are described.
 _SURFACES = 4
 #: Attributes that state how a result was computed, and whence its surface came.
@@ -91,7 +93,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
         If there is no result, or no `path` where Datasets are given.
     """
     failures: list[dict[str, str]] = []
-    swept: list[dict[str, str]] = []
+    swept: list[dict[str, Any]] = []
     drawn: Rows = ([], [], [])
     numbers: dict[str, int] = {}
     if isinstance(results, str | Path):
@@ -151,18 +153,18 @@ def _opened(source: Path | xr.Dataset) -> Iterator[xr.Dataset]:
             yield dataset
 
 
-def _swept(folder: Path) -> list[dict[str, str]]:
+def _swept(folder: Path) -> list[dict[str, Any]]:
     """Figures of all cases together."""
     results = results_of(folder)
     found = sweep_figures(results) if results is not None else ()
-    return [{"title": title, "src": _uri(figure)} for _, title, figure in found]
+    return [_picture(title, figure) for _, title, figure in found]
 
 
 def _page(
     sources: list[Any],
     numbers: Mapping[str, int],
     failures: list[dict[str, str]],
-    swept: list[dict[str, str]],
+    swept: list[dict[str, Any]],
     drawn: Rows,
 ) -> str:
     pictured, stated = (_evenly(len(sources), most) for most in (_PICTURED, _STATED))
@@ -192,8 +194,8 @@ def _page(
             if what not in surfaces and len(surfaces) < _SURFACES and "height" in dataset:
                 surfaces[what] = _surface(dataset)
     if len(histories) > 1 and not drawn[1]:  # realisations of one case are drawn as one
-        overview = _uri(area_against_load(histories))
-        swept = [*swept, {"title": "Contact area against force, one line per case", "src": overview}]
+        overview = area_against_load(histories)
+        swept = [*swept, _picture("Contact area against force, one line per case", overview)]
     environment = Environment(loader=PackageLoader("roughvisc.views.report", "."), autoescape=True, trim_blocks=True)
     environment.lstrip_blocks = True
     return environment.get_template("report.html.jinja").render(
@@ -220,11 +222,12 @@ def _evenly(count: int, most: int) -> set[int]:
     return set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist())
 
 
-def _uri(figure: Figure) -> str:
-    """A figure as the address of a PNG."""
+def _picture(title: str, figure: Figure) -> dict[str, Any]:
+    """A figure as a PNG in an address, with its title; a wide one is scrolled on a narrow screen."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI)
-    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    return {"title": title, "src": src, "wide": figure.get_figwidth() > _WIDE}
 
 
 def _common_title(rows: list[dict[str, Any]]) -> str:
@@ -232,10 +235,10 @@ def _common_title(rows: list[dict[str, Any]]) -> str:
     return titles.pop() if len(titles) == 1 else f"{len(rows)} results" if rows else "No result"
 
 
-def _figures(dataset: xr.Dataset, every: bool) -> list[dict[str, str]]:
+def _figures(dataset: xr.Dataset, every: bool) -> list[dict[str, Any]]:
     """Figures of one case, without that of the surface."""
     return [
-        {"title": kind.capitalize().replace("_", " "), "src": _uri(figure)}
+        _picture(kind.capitalize().replace("_", " "), figure)
         for kind, figure in figures_of(dataset, leave="surface", every=every)
     ]
 
@@ -283,8 +286,9 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
         attrs = after[name].attrs
         text = [_parameter(one[name]) if one is not None else "" for one in (before, after)]
         rows.append([name.replace("_", " "), attrs["long_name"], *text])
-    filled = int(dataset["filled"].sum()) if "filled" in dataset else 0
-    pictures = [_uri(_before_and_after(found, dataset, filled))] if before is not None else []
+    part = measured_part(dataset)
+    filled = int(part["filled"].sum()) if "filled" in part else 0
+    pictures = [_picture("Heights", _before_and_after(found, part, filled))] if before is not None else []
     steps = found.steps
     del found  # of a big surface no more is held than the next figure needs
     return {
@@ -295,7 +299,7 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
         "measured": before is not None,
         "unchanged": unchanged,
         "parameters": rows,
-        "pictures": [*pictures, _uri(surface(dataset))],
+        "pictures": [*pictures, _picture("Surface", surface(dataset))],
     }
 
 
@@ -312,13 +316,13 @@ def _parameter(value: xr.DataArray) -> str:
 
 @style.apply
 def _before_and_after(found: Treatment, dataset: xr.Dataset, filled: int) -> Figure:
-    """Draw maps of the heights before and after conditioning, filled points marked.
+    """Draw maps of the heights before and after conditioning, without mirror images, filled points marked.
 
     Colours end at the quantiles of 0.5 and 99.5 %, so that spikes do not hide the rest.
     """
     figure = style.new_figure(7.0, 3.0)
     axes = figure.subplots(1, 2)
-    heights = (found.before, found.after)
+    heights = (found.before, measured_part(found.after))
     for ax, height, title in zip(axes, heights, ("before", "after conditioning"), strict=True):
         missing = int(height.isnull().sum())
         ends = np.nanpercentile(height.values, (0.5, 99.5)) - (mean := float(height.mean()))
