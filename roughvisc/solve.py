@@ -72,8 +72,6 @@ def solve(
     for name, found, why in experiment.unsupported(problem.settings):
         raise InputError(f"{name} is {found!r}: {why}")
     problem.check_cells()
-    if complaint := _complaint(problem):
-        log.warning("%s", complaint)
     height, settings, count = problem.height, problem.settings, threads_for(threads)
     again = settings.grid_error and not experiment.states_grid_error
     needed = ("pressure",) if again and "pressure" not in settings.fields else ()
@@ -172,7 +170,7 @@ def dataset_of(problem: Problem, experiment: Experiment, rows: Rows, records: Ro
     )
     dataset = annotate(in_order(dataset))
     stated = _of_the_scene(problem, experiment) | rows.attributes(dataset)
-    stated["warnings"] = warnings_text(warnings_of(stated) | {"material": _complaint(problem)})
+    stated["warnings"] = warnings_text(warnings_of(stated))
     dataset.attrs |= {name: value for name, value in stated.items() if value != ""}
     return with_steps(dataset, _steps(values)) if axis == "time" else dataset
 
@@ -198,9 +196,3 @@ def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
         "time_scale": experiment.time_scale,
         "recipe": str(height.attrs.get("recipe", "")),
     }
-
-
-def _complaint(problem: Problem) -> str:
-    """What is wrong with the measurements of the materials; empty if nothing is."""
-    fits = (getattr(material, "fit", None) for material in problem.body.materials)
-    return "; ".join(fit.complaint for fit in fits if fit is not None and fit.complaint)

@@ -9,9 +9,8 @@ from functools import partial
 
 import mpmath as mp
 import numpy as np
+from references.layer import layer_complement, layer_factor
 from scipy.optimize import brentq
-
-from roughvisc.mechanics.closed_forms.layer import layer_complement, layer_factor
 
 
 def depth_matrix(poisson, modulus):

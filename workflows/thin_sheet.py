@@ -1,7 +1,7 @@
 """A ball on a thin sheet that is bonded to a rigid base: force against depth.
 
-Forces over that on a half-space at the same depth (Hertz), of an incompressible sheet: computed, by the integral
-equation, and by the formula of AFM programs (E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798).
+Forces on an incompressible sheet over the force on a half-space at the same depth (Hertz): computed, and by the formula
+of AFM programs (E. K. Dimitriadis et al., Biophys. J. 82 (2002) 2798).
 
     python workflows/thin_sheet.py [CELLS] [FIGURE]
 """
@@ -19,39 +19,36 @@ RADIUS, THICKNESS, MODULUS = 10e-3, 0.1e-3, 1e6  # m, m, Pa
 DEPTHS = np.array([0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0])  # x = sqrt(R delta) / h
 FORMULA = np.polynomial.Polynomial([1, 1.133, 1.283, 0.769, 0.0975])
 BALL = closed_forms.Paraboloid(RADIUS)
-ON_SHEET = closed_forms.OnSheet(BALL, closed_forms.Sheet(THICKNESS))
 
 
 def main(cells=128, figure="thin_sheet.png"):
-    x = np.unique([*DEPTHS, *np.geomspace(0.08, 2.4, 60)])
-    (_, exact), (contact, at) = by_integral_equation(x), by_integral_equation(DEPTHS)
-    found = np.array([computed(*one, cells) for one in zip(DEPTHS, contact, strict=True)])
+    computed = np.array([force_on_sheet(depth, cells) for depth in DEPTHS])
+    curve = np.geomspace(0.08, 2.4, 60)
     fig = Figure(figsize=(8.4, 3.4), layout="constrained")
     ratio, deviation = fig.subplots(1, 2)
-    for axes, shown in ((ratio, lambda force, _: force), (deviation, lambda force, of: 100 * (force / of - 1))):
-        axes.semilogx(x, shown(exact, exact), "k", lw=1.2, label="integral equation")
-        axes.semilogx(x, shown(FORMULA(x), exact), "--", color="#D55E00", label="Dimitriadis et al. (2002)")
-        axes.semilogx(x, shown(1, exact) * np.ones_like(x), ":", color="0.4", label="half-space (Hertz)")
-        axes.semilogx(DEPTHS, shown(found, at), "o", color="#0072B2", mfc="none", ms=5, label="computed")
-        axes.set(xlabel=r"depth, $\sqrt{R\delta}\,/\,h$", xlim=(x[0], x[-1]))
-    ratio.set(yscale="log", ylabel="force over that on a half-space, $F / F_\\mathrm{H}$")
-    deviation.set(ylim=(-20, 5), ylabel="deviation from the integral equation [%]")
+    ratio.semilogx(curve, FORMULA(curve), "--", color="#D55E00", label="Dimitriadis et al. (2002)")
+    ratio.semilogx(curve, np.ones_like(curve), ":", color="0.4", label="half-space (Hertz)")
+    ratio.semilogx(DEPTHS, computed, "o", color="#0072B2", mfc="none", ms=5, label="computed")
+    deviation.semilogx(DEPTHS, 100 * (FORMULA(DEPTHS) / computed - 1), "o--", color="#D55E00")
+    for axes in (ratio, deviation):
+        axes.set(xlabel=r"depth, $\sqrt{R\delta}\,/\,h$", xlim=(curve[0], curve[-1]))
+    ratio.set(yscale="log", ylabel=r"force over that on a half-space, $F / F_\mathrm{H}$")
+    deviation.set(ylim=(-20, 5), ylabel="deviation of the formula [%]")
     for axis in (ratio.xaxis, ratio.yaxis, deviation.xaxis):
         axis.set(major_locator=LogLocator(subs=(1, 2, 5)), major_formatter="{x:g}", minor_locator=NullLocator())
     ratio.legend(frameon=False)
     fig.savefig(figure, dpi=200)
-    for row in np.transpose([DEPTHS, contact / THICKNESS, at, found / at - 1, FORMULA(DEPTHS) / at - 1, 1 / at - 1]):
-        print("| {:g} | {:.2f} | {:.3f} | {:+.2%} | {:+.1%} | {:+.1%} |".format(*row))
+    print("| depth $x$ | force $F/F_\\mathrm{H}$, computed | Dimitriadis | half-space |\n|---|---|---|---|")
+    for row in np.transpose([DEPTHS, computed, FORMULA(DEPTHS) / computed - 1, 1 / computed - 1]):
+        print("| {:g} | {:.3f} | {:+.1%} | {:+.1%} |".format(*row))
     return fig
 
 
-def by_integral_equation(x):
-    radius = ON_SHEET.radius_at_approach(BALL.reduced(x * THICKNESS))
-    return radius, ON_SHEET.scaled_force(radius) / BALL.scaled_force(x * THICKNESS)
-
-
-def computed(x, radius, cells):
-    ball, press = rv.sphere(RADIUS, 2.6 * radius, cells), rv.Program().approach(BALL.reduced(x * THICKNESS), over=0)
+def force_on_sheet(x, cells):
+    """Return the force over that on a half-space at a depth x = sqrt(R delta) / h."""
+    approach = BALL.reduced(x * THICKNESS)
+    widest = 2.6 * np.sqrt(2) * x * THICKNESS  # of a thin sheet the contact radius is sqrt(2 R delta)
+    ball, press = rv.sphere(RADIUS, widest, cells), rv.Program().approach(approach, over=0)
     ds = rv.simulate(ball, rv.sheet(rv.elastic(MODULUS), THICKNESS), press, tolerance=1e-4, progress=False)
     return float(ds.force[-1]) / (4 * MODULUS * BALL.scaled_force(x * THICKNESS))  # contact modulus 4 G
 

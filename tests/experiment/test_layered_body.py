@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 from layered_ball import POISSONS, RATIOS, WIDTHS, errors
+from references import ElasticLayer, OnSheet, PunchOnSheet
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms import Cone, ElasticLayer, OnSheet, Paraboloid, PunchOnSheet, StepLoad
+from roughvisc.mechanics.closed_forms import Cone, Paraboloid
+from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 
 SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(4e6, 12e5, 4e5, 0.3)  # in proportion
 THICKNESS = 1e-4

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from references import OnSheet, PunchOnSheet, ting
 from scipy.interpolate import CubicSpline
 
 import roughvisc as rv
@@ -14,7 +15,8 @@ from roughvisc.cli import main
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
-from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, ting
+from roughvisc.mechanics.closed_forms import Cone, Paraboloid
+from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.study.statement.case import Case, read_cases, vary
 

@@ -27,12 +27,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from references.fixed_contact import punch_approach, punch_dissipation, punch_force
+from references.layer import ElasticLayer
+from references.sheet import OnSheet
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.body import Body, body_of
 from roughvisc.mechanics.bodies.body import sheet as sheet_of
 from roughvisc.mechanics.bodies.layer import layer as layer_of
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
+from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.materials.models import (
     Material,
     Prony,
@@ -188,7 +192,7 @@ def crossed_waves(cells: int) -> Rows:
 # viscoelastic: contacts that grow, shrink, and stay
 
 
-def _step(cells: int, material: Material) -> tuple[xr.Dataset, closed_forms.StepLoad, float]:
+def _step(cells: int, material: Material) -> tuple[xr.Dataset, StepLoad, float]:
     """A load applied at once on a sphere and kept, to a contact radius of one; with the cell's side."""
     load = 4 / 3 / _ROUND / float(material.contact_compliance(4.0))
     times = [0.5, 1.0, 2.0, 4.0] if material.contact_compliance(0.0) == 0 else [0.0, 0.5, 1.0, 2.0, 4.0]
@@ -215,7 +219,7 @@ def without_jump(cells: int) -> Rows:
     yield "contact radius", _relative(_radius(ds), exact.radius(ds.time)), _radius_error(h, radius) + _TOLERANCE
 
 
-def _on(bodies: dict[str, tuple[Body, Sheet | closed_forms.ElasticLayer]]) -> Callable[[int], Rows]:
+def _on(bodies: dict[str, tuple[Body, Sheet | ElasticLayer]]) -> Callable[[int], Rows]:
     """A ball on what is as thick as the contact comes to be wide; the base takes as much of the grid's error as of it.
 
     The bodies by name, each as it is solved and as the closed form takes it.
@@ -223,9 +227,9 @@ def _on(bodies: dict[str, tuple[Body, Sheet | closed_forms.ElasticLayer]]) -> Ca
 
     def rows(cells: int) -> Rows:
         for name, (body, layer) in bodies.items():
-            on = closed_forms.OnSheet(closed_forms.Paraboloid(_ROUND), layer)
+            on = OnSheet(closed_forms.Paraboloid(_ROUND), layer)
             load = float(on.scaled_force(1.0)) / float(_ZENER.contact_compliance(4.0))
-            exact = closed_forms.StepLoad(on, _ZENER, load)
+            exact = StepLoad(on, _ZENER, load)
             program, times = Program().load(load, over=0).hold(4.0), [0.0, 0.5, 1.0, 2.0, 4.0]
             ds = _press(sphere(_ROUND, _SIZE, cells), body, program, times=times)
             smallest = float(exact.radius(0.0))
@@ -240,7 +244,7 @@ def loaded_punch(cells: int) -> Rows:
     program = Program().load(2.0, over=1.0).hold(1.0).load(0.5, over=0.5).hold(1.0)
     times = [0.5, 1.0, 2.0, 2.5, 3.5]
     ds = _press(flat_punch(1.0, _SIZE, cells), _ZENER, program, times=times)
-    exact = closed_forms.punch_approach(1.0, _ZENER, program, times)
+    exact = punch_approach(1.0, _ZENER, program, times)
     yield "approach", _relative(ds.approach, exact), _SIZE / cells / 2 + _TOLERANCE
     # whatever the outline of the punch, its approach has one course in time
     found, expected = ds.approach.values / float(ds.approach[1]), exact / exact[1]
@@ -253,9 +257,9 @@ def cycled_punch(cells: int) -> Rows:
     ends = 0.5 + period * np.arange(5)
     ds = _press(flat_punch(1.0, _SIZE, cells), _ZENER, program, times=ends, fields=())
     found = float(np.diff(ds.work.values)[-1])
-    exact = closed_forms.punch_dissipation(1.0, _ZENER, amplitude, period)
+    exact = punch_dissipation(1.0, _ZENER, amplitude, period)
     # the force of the start has relaxed by four cycles; its error, of the largest force, acts over the whole path
-    largest = closed_forms.punch_force(1.0, _ZENER, Program().approach(mean, over=0.5), 0.5)
+    largest = punch_force(1.0, _ZENER, Program().approach(mean, over=0.5), 0.5)
     path = 4 * amplitude * float(largest) / exact
     yield "dissipation in a cycle", _relative(found, exact), _SIZE / cells / 2 + _TOLERANCE * path
 
@@ -264,7 +268,7 @@ _SHEETS = {base: (sheet_of(_ZENER, 1.0, base), Sheet(1.0, _ZENER.poisson, base))
 _LAYERS = {
     f"{name} base": (
         layer_of(_ZENER, 1.0, on=base),
-        closed_forms.ElasticLayer(1.0, _ZENER.poisson, base.poisson, base.glassy / _ZENER.glassy),
+        ElasticLayer(1.0, _ZENER.poisson, base.poisson, base.glassy / _ZENER.glassy),
     )
     for name, base in _BASES.items()
 }

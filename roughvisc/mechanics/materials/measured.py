@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
-from roughvisc.mechanics.materials.fit import Fit
-from roughvisc.mechanics.materials.kramers_kronig import Disagreement, disagreement
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -126,7 +124,7 @@ def from_relaxation_table(
         shear,
         t,
     )
-    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson, (float(known[0]), float(known[-1])))
+    return spectrum.material(t.size, f"times {t[0]:g} to {t[-1]:g} s", poisson)
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -173,8 +171,7 @@ def from_dynamic(
     -----
     ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
-    it is smaller. Moduli that no passive material has together are fitted as well as may be, and the ``note`` says how
-    far they are at odds, and where; see :func:`roughvisc.mechanics.materials.kramers_kronig.disagreement`.
+    it is smaller. A large misfit means that the two moduli do not belong to one passive material.
     """
     if frequency_unit not in ("rad/s", "Hz"):
         raise InputError(f"frequency_unit is {frequency_unit!r}: expected 'rad/s' or 'Hz'")
@@ -206,8 +203,6 @@ def from_dynamic(
         omega.size,
         f"frequencies {omega.min():g} to {omega.max():g} rad/s",
         poisson,
-        (1 / float(omega.max()), 1 / float(omega.min())),
-        disagreement(omega, elastic, viscous),
     )
 
 
@@ -268,22 +263,13 @@ class _Spectrum:
         used = np.flatnonzero(moduli[1:])
         return from_relaxation(float(moduli[0]), moduli[1:][used].tolist(), self.theta[used].tolist(), poisson)
 
-    def from_rows(self, poisson: float, rows: NDArray[np.bool_]) -> Prony:
-        """The material from some of the rows, in the order of where they were measured."""
-        return self.series(self.fitted(np.isin(self.at, np.unique(self.at)[rows])), poisson)
-
-    def material(
-        self, rows: int, span: str, poisson: float, measured: tuple[float, float], odds: Disagreement | None = None
-    ) -> Prony:
-        """The material from all rows, with what is to be said of the fit."""
+    def material(self, rows: int, span: str, poisson: float) -> Prony:
+        """Return the material from all rows, with a note on the quality of the fit."""
         misfit = f"largest misfit {np.abs(self.misfit).max():.2g}, rms {self.rms:.2g} (relative)"
         if not math.isnan(self.between):
             misfit += f", error between rows up to about {self.between:.2g} (rows predicted from the others)"
         note = f"{self.terms} terms fitted to {rows} rows, {misfit}, {span}"
-        complaint, off = ("", 0.0) if odds is None else (odds.note, odds.together)
-        fit = Fit(partial(self.from_rows, poisson), np.unique(self.at).size, measured, complaint, off)
-        note = f"{note}; {complaint}" if complaint else note
-        return dataclasses.replace(self.series(self.moduli, poisson), note=note, fit=fit)
+        return dataclasses.replace(self.series(self.moduli, poisson), note=note)
 
 
 def _sparsest(

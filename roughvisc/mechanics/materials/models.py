@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
-from roughvisc.mechanics.materials.fit import PairFit
 from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
 from roughvisc.mechanics.materials.power_law import PowerLaw
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
@@ -278,12 +277,6 @@ class Pair:
         """The notes of both."""
         return "; ".join(f"{name}: {body.note}" for name, body in (("a", self.a), ("b", self.b)) if body.note)
 
-    @property
-    def fit(self) -> PairFit | None:
-        """What the measurements of both leave unknown; None if neither is a fit."""
-        bodies = tuple((body, getattr(body, "fit", None)) for body in (self.a, self.b))
-        return PairFit(bodies) if any(fit is not None for _, fit in bodies) else None
-
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance of one incompressible body that would make the same contact. [1/Pa]"""
         return 4 * self.contact_compliance(t)
@@ -337,5 +330,4 @@ def pair(a: Material, b: Material) -> Prony | Pair:
         tuple(compliances),
         note=both.note,
         stands_for=both.stands_for,
-        fit=both.fit,
     )

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
-from roughvisc.mechanics.materials.fit import AnyFit
 from roughvisc.mechanics.materials.secular import merged, secular_roots
 from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
 from roughvisc.units import Quantity, quantities
@@ -41,9 +40,6 @@ class Prony(PrintedAsBuilt):
         How a fitted series was found: number of terms, misfit. Ignored in comparisons.
     stands_for : str
         What the series represents, if it is not one body with this Poisson ratio; otherwise empty.
-    fit : Fit, optional
-        What the measurement that it was fitted to leaves unknown: ``material.fit.error(times)`` is the relative error
-        of the modulus at 95 %. Ignored in comparisons.
 
     Raises
     ------
@@ -59,7 +55,6 @@ class Prony(PrintedAsBuilt):
     poisson: float = 0.5
     note: str = field(default="", compare=False)
     stands_for: str = field(default="", compare=False)
-    fit: AnyFit | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))

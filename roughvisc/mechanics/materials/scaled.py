@@ -112,9 +112,6 @@ def _scaled(material: Material, remark: str, time_factor: float = 1.0, modulus_f
     if isinstance(material, Tabulated):
         remark = _joined(material.remark, remark)
         return dataclasses.replace(material, times=times, compliances=compliances, remark=remark)
-    fit = material.fit
-    if fit is not None and time_factor != 1:
-        fit = fit.shifted(time_factor)
     return dataclasses.replace(
         material,
         glassy=material.glassy / modulus_factor,
@@ -122,7 +119,6 @@ def _scaled(material: Material, remark: str, time_factor: float = 1.0, modulus_f
         compliances=compliances,
         times=times,
         note=_joined(material.note, remark),
-        fit=fit,
     )
 
 

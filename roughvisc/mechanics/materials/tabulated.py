@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson, checked_rows
-from roughvisc.mechanics.materials.fit import Fit
 from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
 from roughvisc.units import Quantity, quantities
 
@@ -86,17 +85,6 @@ class Tabulated(PrintedAsBuilt):
     def note(self) -> str:
         """The notes as one text."""
         return "; ".join(self.notes)
-
-    @cached_property
-    def fit(self) -> Fit:
-        """What the rows leave unknown: of each left out in turn, the interpolation of the others."""
-        first = next(time for time in self.times if time > 0)
-        return Fit(self._from_rows, len(self.times), (first, self.times[-1]), keeps_ends=True)
-
-    def _from_rows(self, rows: NDArray[np.bool_]) -> Tabulated:
-        kept = np.flatnonzero(rows)
-        times, compliances = (tuple(column[row] for row in kept) for column in (self.times, self.compliances))
-        return Tabulated(times, compliances, self.noise, self.poisson)
 
     def _built(self) -> Built:
         """With readable units; of a long table its ends."""

@@ -6,7 +6,10 @@ import math
 
 from roughvisc.mechanics.bodies.body import BASE
 from roughvisc.mechanics.bodies.sheet import Sheet
-from roughvisc.mechanics.closed_forms.validity import (
+from roughvisc.study.audit.evidence import Evidence
+from roughvisc.study.audit.given import AuditInputs
+from roughvisc.study.audit.limits import LIMITS, Finding, as_text, percent, unknown
+from roughvisc.study.audit.validity import (
     dundurs_coupling,
     flash_temperature,
     half_space_excess,
@@ -14,9 +17,6 @@ from roughvisc.mechanics.closed_forms.validity import (
     moving_load_excess,
     radiation_lag,
 )
-from roughvisc.study.audit.evidence import Evidence
-from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import LIMITS, Finding, as_text, percent, unknown
 
 #: Poisson's ratio by which the shear modulus behind a contact modulus is the least.
 _SOFTEST = 0.5

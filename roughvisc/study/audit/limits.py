@@ -89,8 +89,7 @@ LIMITS: dict[str, Limit] = {
         0.1,
         0.5,
         "10 % off; the approach twice the true one, or the force half the true one",
-        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8; closed_forms.half_space_excess and "
-        "half_space_shortfall",
+        "K. L. Johnson, Contact Mechanics, CUP, 1985, section 5.8",
     ),
     "slope": Limit(
         "Slopes are small.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from roughvisc.mechanics.closed_forms.adhesion import (
+from roughvisc.study.audit.adhesion import (
     adhesive_load,
     conformal_energy,
     pull_off_force,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from layered import elastic_factor
+from references.layer import layer_factor
 
 from roughvisc.mechanics.bodies.layered import effective_compliance
-from roughvisc.mechanics.closed_forms.layer import layer_factor
 
 X = np.array([1e-6, 1e-3, 0.05, 0.4, 1.5, 6.0])
 

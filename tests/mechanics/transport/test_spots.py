@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from references.sheet import PunchOnSheet
 from support import rough_gap
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
-from roughvisc.mechanics.closed_forms import Sheet
-from roughvisc.mechanics.closed_forms.sheet import PunchOnSheet
+from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.transport.spots import frozen_contact
 

@@ -1,16 +1,16 @@
 """Each closed form against an independent check: balance of forces, direct integration, limits, printed numbers."""
 
-import subprocess
-import sys
 from itertools import pairwise
 
 import numpy as np
 import pytest
+import references
 from scipy.integrate import quad
 from scipy.special import ellipkm1
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
+from roughvisc.mechanics.closed_forms import growing_contact
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.stepping.program import Program
 
@@ -189,7 +189,7 @@ def test_step_load__maxwell_pressure_by_the_printed_integral():
 
 def test_kelvin_voigt_step__pressure_carries_the_force_and_ends_as_hertz():
     material = materials.kelvin_voigt(2.0, 3.0, poisson=0.4)
-    press = cf.kelvin_voigt_step(0.5, material, 0.7)
+    press = references.kelvin_voigt_step(0.5, material, 0.7)
     for t in (1e-6, 0.1, 5.0):
         assert force_of(lambda r, t=t: press.pressure(r, t), float(press.radius(t))) == pytest.approx(0.7, rel=3e-8)
     late = cf.hertz(0.5, 2 * 2.0 / (1 - 0.4), 0.7)
@@ -203,7 +203,7 @@ def test_forms__refuse_impossible_input():
     with pytest.raises(InputError, match="waves"):
         cf.full_contact_pressure(1.0, 1.0, 1.0, waves=3)
     with pytest.raises(InputError, match="Kelvin-Voigt"):
-        cf.kelvin_voigt_step(1.0, materials.maxwell(1.0, 1.0), 1.0)
+        references.kelvin_voigt_step(1.0, materials.maxwell(1.0, 1.0), 1.0)
 
 
 class PowerLaw:
@@ -235,12 +235,14 @@ def test_hereditary_integral__equals_quadrature():
         ramps = quad(lambda s, t=t: kernel(t - s) * 3.0, min(1.0, t), min(1.5, t))[0]
         ramps += quad(lambda s, t=t: kernel(t - s) * 1.0, min(1.5, t), t)[0] if t > 1.5 else 0.0
         jumps = 0.5 * kernel(t) - (kernel(t - 1.5) if t >= 1.5 else 0.0)
-        assert float(cf.hereditary_integral(kernel, integral, program, t)) == pytest.approx(ramps + jumps, rel=1e-12)
+        assert float(growing_contact.hereditary_integral(kernel, integral, program, t)) == pytest.approx(
+            ramps + jumps, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize("exponent", [0.1, 0.5, 0.8])
 def test_power_law_ramp__pressure_carries_the_load(exponent):
-    press = cf.power_law_ramp(0.7, 3.0, 0.2, exponent)
+    press = references.power_law_ramp(0.7, 3.0, 0.2, exponent)
     for t in (1e-3, 2.0):
         radius = float(press.radius(t))
         assert force_of(lambda r, t=t: press.pressure(r, t), radius) == pytest.approx(3.0 * t, rel=1e-8)
@@ -248,7 +250,7 @@ def test_power_law_ramp__pressure_carries_the_load(exponent):
 
 def test_power_law_ramp__pressure_is_uniform_for_a_square_root():
     # a ~ t^(1/2) and E ~ t^(-1/2): int (t - s)^(-1/2) (s - t_r)^(-1/2) ds = pi, whatever r
-    press = cf.power_law_ramp(0.7, 3.0, 0.2, 0.5)
+    press = references.power_law_ramp(0.7, 3.0, 0.2, 0.5)
     radius = float(press.radius(2.0))
     expected = 6.0 / (np.pi * radius**2)
     np.testing.assert_allclose(press.pressure(np.array([0, 0.1, 0.5, 0.99]) * radius, 2.0), expected, rtol=1e-10)
@@ -258,7 +260,7 @@ def test_lee_radok__agrees_with_the_special_cases():
     law = PowerLaw(0.0, 0.2, 0.4)
     times = np.array([0.1, 1.0, 2.0])
     ramp = cf.lee_radok(cf.Paraboloid(0.7), law, Program().load(6.0, over=2.0))
-    special = cf.power_law_ramp(0.7, 3.0, 0.2, 0.4)
+    special = references.power_law_ramp(0.7, 3.0, 0.2, 0.4)
     np.testing.assert_allclose(ramp.radius(times), special.radius(times), rtol=1e-14)
     step = cf.lee_radok(SPHERE, ZENER, Program().load(0.3, over=0.0).hold(2.0))
     np.testing.assert_allclose(step.approach(times), cf.lee_radok_step(1.0, ZENER, 0.3).approach(times), rtol=1e-14)
@@ -268,7 +270,7 @@ def test_lee_radok__agrees_with_the_special_cases():
 
 @pytest.fixture(scope="module")
 def triangle():
-    return cf.ting(SPHERE, ZENER, TRIANGLE)
+    return references.ting(SPHERE, ZENER, TRIANGLE)
 
 
 def test_ting__triangle_on_zener_has_the_known_values(triangle):
@@ -279,7 +281,7 @@ def test_ting__triangle_on_zener_has_the_known_values(triangle):
 
 
 def test_ting__half_sine_on_maxwell_has_the_known_values():
-    contact = cf.ting(SPHERE, materials.maxwell(1.0, 1.0), lambda t: np.sin(np.pi * t / 2), end=2.0)
+    contact = references.ting(SPHERE, materials.maxwell(1.0, 1.0), lambda t: np.sin(np.pi * t / 2), end=2.0)
     assert contact.time_of_maximum == pytest.approx(1.360907073, abs=1e-9)
     assert float(contact.radius(1.9)) == pytest.approx(0.5355782231, abs=1e-10)
     assert float(contact.approach(1.9)) == pytest.approx(0.4100906593, abs=1e-10)
@@ -302,7 +304,7 @@ def test_ting__growth_is_lee_radok(triangle):
 
 def test_ting__step_is_lee_radok():
     material = STEP["two modes and flow"]
-    contact = cf.ting(SPHERE, material, Program().load(0.7, over=0.0).hold(2.0))
+    contact = references.ting(SPHERE, material, Program().load(0.7, over=0.0).hold(2.0))
     press = cf.lee_radok_step(1.0, material, 0.7)
     r = np.array([0.0, 0.2, 0.5, 0.9, 0.99]) * float(press.radius(1.3))
     np.testing.assert_allclose(contact.pressure(r, 1.3), press.pressure(r, 1.3), rtol=1e-9)
@@ -310,19 +312,11 @@ def test_ting__step_is_lee_radok():
 
 def test_ting__pressure_under_the_apex_of_a_cone_is_infinite():
     program = Program().load(1.0, over=1.0).load(0.0, over=1.0)
-    contact = cf.ting(cf.Cone(0.2), ZENER, program)
+    contact = references.ting(cf.Cone(0.2), ZENER, program)
     times = np.array([0.5, 1.5, 2.0])
     assert contact.pressure(0.0, times).tolist() == [np.inf, np.inf, 0.0]
     near = contact.pressure(np.geomspace(1e-2, 1e-8, 7) * contact.radius(0.5), 0.5)
     assert np.diff(near) == pytest.approx(np.full(6, np.diff(near)[-1]), rel=1e-3)  # it grows as the logarithm
-
-
-def test_ting__refuses_what_grows_again():
-    fall = Program().load(1.0, over=0.0).hold(1.0).load(0.2, over=0.0).hold(1.0)
-    with pytest.raises(InputError, match="grows again"):
-        cf.ting(SPHERE, ZENER, fall)
-    with pytest.raises(InputError, match="grows again"):
-        cf.ting(SPHERE, ZENER, Program().load(1.0, over=1.0).load(0.1, over=1.0).load(2.0, over=1.0))
 
 
 REDUCED = {
@@ -344,7 +338,7 @@ def test_reduced_contact__growth_is_lee_radok(name, indenter):
     tolerance = 3e-5 if name == "kelvin-voigt" else 1e-5
     for program in (step, ramp):
         exact = cf.lee_radok(indenter, REDUCED[name], program)
-        found = cf.reduced_contact(indenter, REDUCED[name], program, times, steps=60, elements=2000)
+        found = references.reduced_contact(indenter, REDUCED[name], program, times, steps=60, elements=2000)
         np.testing.assert_allclose(found.radius, exact.radius(times), rtol=tolerance)
         np.testing.assert_allclose(found.approach, exact.approach(times), rtol=tolerance)
 
@@ -360,8 +354,8 @@ def test_reduced_contact__growth_is_lee_radok(name, indenter):
 @pytest.mark.parametrize("indenter", [SPHERE, cf.Cone(0.3)], ids=["sphere", "cone"])
 def test_reduced_contact__single_maximum_is_ting(name, indenter):
     times = [0.5, 1.2, 1.7, 1.9]
-    exact = cf.ting(indenter, REDUCED[name], TRIANGLE)
-    found = cf.reduced_contact(indenter, REDUCED[name], TRIANGLE, times)
+    exact = references.ting(indenter, REDUCED[name], TRIANGLE)
+    found = references.reduced_contact(indenter, REDUCED[name], TRIANGLE, times)
     np.testing.assert_allclose(found.radius, exact.radius(times), rtol=1e-5)
     np.testing.assert_allclose(found.approach, exact.approach(times), rtol=4e-7)
     assert found.error < 3e-5
@@ -369,28 +363,20 @@ def test_reduced_contact__single_maximum_is_ting(name, indenter):
 
 @pytest.mark.parametrize(("name", "t"), [("zener", 1.7), ("zener stiff", 1.2)])
 def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
-    exact = float(cf.ting(SPHERE, REDUCED[name], TRIANGLE).approach(t))
-    passes = [cf.reduced_contact(SPHERE, REDUCED[name], TRIANGLE, [t], steps=n, refinements=1) for n in (40, 80, 160)]
+    exact = float(references.ting(SPHERE, REDUCED[name], TRIANGLE).approach(t))
+    passes = [
+        references.reduced_contact(SPHERE, REDUCED[name], TRIANGLE, [t], steps=n, refinements=1) for n in (40, 80, 160)
+    ]
     errors = np.abs(np.array([float(found.approach[0]) for found in passes]) - exact)
     orders = np.log2(errors[:-1] / errors[1:])
     assert np.all(orders > 1.7), orders
 
 
-def test_reduced_contact__sum_over_all_forces_equals_recursion():
-    program = Program().load(1.0, over=0.0).hold(0.5).load(0.0, over=0.5).hold(0.5).load(0.5, over=1.0)
-    both = [
-        cf.reduced_contact(SPHERE, ZENER, program, [0.5, 0.75, 1.2, 2.0, 2.5], steps=30, elements=800, exponentials=e)
-        for e in (True, False)
-    ]
-    for name in ("radius", "approach", "force", "work"):
-        np.testing.assert_allclose(getattr(both[0], name), getattr(both[1], name), rtol=1e-9, atol=1e-12)
-
-
 def test_reduced_contact__dent_recovers_as_ting_says():
     program = TRIANGLE.hold(2.0)
-    exact = cf.ting(SPHERE, ZENER, program)
+    exact = references.ting(SPHERE, ZENER, program)
     times = [2.2, 3.0, 4.0]
-    found = cf.reduced_contact(SPHERE, ZENER, program, times)
+    found = references.reduced_contact(SPHERE, ZENER, program, times)
     np.testing.assert_allclose(found.approach, exact.approach(times), rtol=1e-6)
     np.testing.assert_array_equal(found.radius, 0)
 
@@ -398,8 +384,8 @@ def test_reduced_contact__dent_recovers_as_ting_says():
 def test_reduced_contact__held_approach_relaxes_with_the_modulus():
     material = STEP["two modes and flow"]
     program = Program().load(0.7, over=0.0).hold(3.0, control="approach")
-    found = cf.reduced_contact(SPHERE, material, program, [0.0, 0.1, 1.0, 3.0], steps=200)
-    relaxation = cf.ContactRelaxation.of(material)
+    found = references.reduced_contact(SPHERE, material, program, [0.0, 0.1, 1.0, 3.0], steps=200)
+    relaxation = growing_contact.ContactRelaxation.of(material)
     np.testing.assert_allclose(found.force, 0.7 * relaxation(found.times) / relaxation(0.0), rtol=2e-6)
     np.testing.assert_allclose(found.radius, found.radius[0], rtol=1e-6)
     work = 0.4 * 0.7 * found.approach[0]  # int W d(approach) = 2/5 W approach of an elastic sphere
@@ -409,8 +395,8 @@ def test_reduced_contact__held_approach_relaxes_with_the_modulus():
 def test_reduced_contact__approach_at_constant_speed_on_a_cone():
     # a ~ t and an elastic force ~ a^2, so that W = int E(t - s) d(k s^2)
     cone, speed = cf.Cone(0.3), 0.2
-    relaxation = cf.ContactRelaxation.of(ZENER)
-    found = cf.reduced_contact(cone, ZENER, Program().approach(speed * 2, over=2.0), [0.5, 1.0, 2.0])
+    relaxation = growing_contact.ContactRelaxation.of(ZENER)
+    found = references.reduced_contact(cone, ZENER, Program().approach(speed * 2, over=2.0), [0.5, 1.0, 2.0])
     k = float(cone.scaled_force(cone.radius_at_approach(speed)))
     force = [quad(lambda s, t=t: relaxation(t - s) * 2 * k * s, 0, t)[0] for t in found.times]
     np.testing.assert_allclose(found.force, force, rtol=1e-6)
@@ -420,7 +406,7 @@ def test_reduced_contact__approach_at_constant_speed_on_a_cone():
 def test_reduced_contact__settled_cycle_loses_the_known_work(period, loss, digits):
     cycles = 6
     program = Program.cycle(1.0, 0.9, period, cycles)
-    found = cf.reduced_contact(SPHERE, ZENER, program, np.arange(cycles + 1) * period, steps=40, elements=1500)
+    found = references.reduced_contact(SPHERE, ZENER, program, np.arange(cycles + 1) * period, steps=40, elements=1500)
     work = np.diff(found.work)
     assert work[-1] == pytest.approx(loss, rel=digits)  # from an independent program, to fewer digits
     assert work[-1] == pytest.approx(work[-2], rel=2e-5)
@@ -431,7 +417,7 @@ def test_reduced_contact__kelvin_voigt_under_approach():
     material, speed = materials.kelvin_voigt(1.0, 0.5), 0.1
     modulus, viscosity = 4.0, 2.0
     program = Program().approach(0.2, over=0.2 / speed).approach(0.1, over=0.1 / speed)
-    found = cf.reduced_contact(SPHERE, material, program, [0.5, 1.5, 2.2, 2.7])
+    found = references.reduced_contact(SPHERE, material, program, [0.5, 1.5, 2.2, 2.7])
     lag = np.array([0, 0, 1, 1]) * viscosity * speed / modulus
     radius = SPHERE.radius_at_approach(found.approach - lag)
     dashpots = np.array([1, 1, 0, 0]) * 2 * radius * viscosity * speed
@@ -443,8 +429,8 @@ def test_reduced_contact__units_are_neutral():
     length, pressure = 1e-6, 3e7
     program = Program().load(pressure * length**2, over=1.0).load(0.0, over=1.0).hold(0.1)
     material = materials.zener(pressure, 0.5 * pressure, 0.5 * pressure)
-    small = cf.reduced_contact(cf.Paraboloid(length), material, program, [0.5, 1.5], steps=30, elements=500)
-    plain = cf.reduced_contact(SPHERE, ZENER, TRIANGLE.hold(0.1), [0.5, 1.5], steps=30, elements=500)
+    small = references.reduced_contact(cf.Paraboloid(length), material, program, [0.5, 1.5], steps=30, elements=500)
+    plain = references.reduced_contact(SPHERE, ZENER, TRIANGLE.hold(0.1), [0.5, 1.5], steps=30, elements=500)
     np.testing.assert_allclose(small.radius / length, plain.radius, rtol=1e-9)
     np.testing.assert_allclose(small.approach / length, plain.approach, rtol=1e-9)
     np.testing.assert_allclose(small.work / (pressure * length**3), plain.work, rtol=1e-9)
@@ -452,27 +438,22 @@ def test_reduced_contact__units_are_neutral():
 
 def test_reduced_contact__reload_after_long_rest_is_the_first_loading():
     program = TRIANGLE.hold(200.0) + TRIANGLE
-    found = cf.reduced_contact(SPHERE, ZENER, program, [0.5, 1.5, 202.5, 203.5])
+    found = references.reduced_contact(SPHERE, ZENER, program, [0.5, 1.5, 202.5, 203.5])
     np.testing.assert_allclose(found.radius[2:], found.radius[:2], rtol=2e-5)
     np.testing.assert_allclose(found.approach[2:], found.approach[:2], rtol=2e-6)
 
 
-def test_reduced_contact__refuses_a_jump_of_approach_without_glassy_compliance():
-    with pytest.raises(InputError, match="jump of approach"):
-        cf.reduced_contact(SPHERE, REDUCED["kelvin-voigt"], Program().approach(0.1, over=0.0).hold(1.0))
-
-
 def test_punch__approach_undoes_force():
     # C and E are each other's inverse: hold the approach that a load of one second reached
-    relaxation = cf.ContactRelaxation.of(ZENER)
+    relaxation = growing_contact.ContactRelaxation.of(ZENER)
     times = np.linspace(0, 3, 7)
     product = [
         quad(lambda s, t=t: ZENER.contact_compliance(t - s) * relaxation(s), 0, t, epsabs=1e-13)[0] for t in times
     ]
     np.testing.assert_allclose(product, times, atol=1e-12)
-    force = cf.punch_force(0.2, ZENER, Program().approach(0.1, over=0.0).hold(3.0), times)
+    force = references.punch_force(0.2, ZENER, Program().approach(0.1, over=0.0).hold(3.0), times)
     np.testing.assert_allclose(force, 2 * 0.2 * 0.1 * relaxation(times), rtol=1e-14)
-    approach = cf.punch_approach(0.2, ZENER, Program().load(0.5, over=0.0).hold(3.0), times)
+    approach = references.punch_approach(0.2, ZENER, Program().load(0.5, over=0.0).hold(3.0), times)
     np.testing.assert_allclose(approach, 0.5 / 0.4 * ZENER.contact_compliance(times), rtol=1e-14)
 
 
@@ -482,43 +463,13 @@ def test_punch__settled_cycle_loses_what_is_stated():
     approach = 1.0 + 0.3 * np.sin(2 * np.pi * times / period)
     program = Program.table(times.tolist(), approach.tolist(), control="approach")
     last = slice(-steps - 1, None)
-    force = cf.punch_force(0.2, ZENER, program, times[last])
+    force = references.punch_force(0.2, ZENER, program, times[last])
     work = np.sum((force[1:] + force[:-1]) / 2 * np.diff(approach[last]))
-    assert work == pytest.approx(cf.punch_dissipation(0.2, ZENER, 0.3, period), rel=1e-4)
+    assert work == pytest.approx(references.punch_dissipation(0.2, ZENER, 0.3, period), rel=1e-4)
 
 
 def test_full_contact_wave__starts_elastic_and_relaxes_to_the_rubber():
     amplitude, wavelength = 1e-6, 1e-3
-    pressure = cf.full_contact_wave(amplitude, 2 * np.pi / wavelength, ZENER, [0.0, 1e3])
+    pressure = references.full_contact_wave(amplitude, 2 * np.pi / wavelength, ZENER, [0.0, 1e3])
     for found, compliance in zip(pressure, ZENER.contact_compliance([0.0, 1e3]), strict=True):
         assert found == pytest.approx(cf.full_contact_pressure(amplitude, wavelength, 1 / compliance, waves=1))
-
-
-def test_reduced_contact__keeps_times_that_are_no_exact_sums():
-    """0.1 + (0.35 - 0.1) is not 0.35 in floating point: the state at such a time was left zero."""
-    times = np.linspace(0, 0.4, 9)
-    assert 0.1 + (times[7] - 0.1) != times[7]
-    program = Program().approach(1e-2, over=0.1).approach(2e-3, over=0.3)
-    found = cf.reduced_contact(cf.Cone(0.02), materials.maxwell(1.0, 1.0), program, times, steps=20)
-    value = np.interp(times, [0, 0.1, 0.4], [0, 1e-2, 2e-3])
-    assert found.approach == pytest.approx(value, rel=1e-12)
-    assert np.all(found.radius[1:] > 0)
-
-
-def test_names__are_those_of_the_stub_whichever_module_comes_first():
-    from roughvisc.mechanics.closed_forms import single_maximum
-
-    assert dir(cf) == sorted(cf.__all__)
-    for name in cf.__all__:
-        assert getattr(cf, name).__name__ == name
-    assert cf.ting is single_maximum.ting
-    with pytest.raises(AttributeError, match="closed_forms' has no attribute 'boussinesq'"):
-        cf.boussinesq  # noqa: B018
-
-
-def test_import__of_one_closed_form_leaves_the_others_alone():
-    code = "import sys; from roughvisc.mechanics.closed_forms import hertz; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
-    assert "roughvisc.mechanics.closed_forms.elastic" in loaded
-    assert not {"roughvisc.mechanics.closed_forms.cylinder", "roughvisc.mechanics.closed_forms.adhesion"} & loaded

@@ -23,10 +23,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from references.element_memory import AllForces, Exponentials
+from references.sheet import OnSheet
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.closed_forms.element_memory import AllForces, Exponentials
 from roughvisc.mechanics.closed_forms.indenters import Indenter
-from roughvisc.mechanics.closed_forms.sheet import OnSheet
 from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
 from roughvisc.mechanics.stepping.program import Program, Segment
 from roughvisc.units import quantities

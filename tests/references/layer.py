@@ -55,7 +55,7 @@ class ElasticLayer:
     --------
     A punch of a radius of one thickness, on a layer of a tenth of the modulus of its base; and on equal materials:
 
-    >>> from roughvisc.mechanics.closed_forms.sheet import PunchOnSheet
+    >>> from references.sheet import PunchOnSheet
     >>> for ratio in (0.1, 1.0):
     ...     layer = ElasticLayer(1.0, poisson=0.5, base_poisson=0.5, modulus_ratio=ratio)
     ...     print(round(PunchOnSheet(1.0, layer).scaled_stiffness / 2, 4))

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from references import OnSheet, PunchOnSheet
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies.sheet import Sheet
-from roughvisc.mechanics.closed_forms import Cone, OnSheet, Paraboloid, PunchOnSheet, StepLoad, reduced_contact
+from roughvisc.mechanics.closed_forms import Cone, Paraboloid
+from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 
 #: W. C. Hayes, L. M. Keer, G. Herrmann, L. F. Mockros, J. Biomech. 5 (1972) 541, table 1: force over that of a
 #: half-space under a flat punch on a bonded layer, by Poisson's ratio, over the ratios of radius to thickness.
@@ -121,23 +123,3 @@ def test_growing_contact__is_that_of_lee_and_radok():
     half_space = StepLoad(Paraboloid(1e-3), material, 2e-3)
     np.testing.assert_allclose(thick.radius(t), half_space.radius(t), rtol=1e-6)
     assert (press.radius(t) < half_space.radius(t)).all()
-
-
-def test_reduced_contact__refuses_a_sheet_before_it_computes(monkeypatch):
-    """Of independent elements the force is the sum of what each sinks in, 2 int (d(a) - d(x)) dx: not on a sheet."""
-    contact, a = OnSheet(Paraboloid(1e-3), Sheet(1e-4)), 1e-4
-    nodes, weights = np.polynomial.legendre.leggauss(20)
-    depths = contact.reduced(a) - contact.reduced(a * (nodes + 1) / 2)
-    assert a * float(weights @ depths) < 0.6 * float(contact.scaled_force(a))
-    monkeypatch.setattr(OnSheet, "_contact", None)
-    program = rv.Program().load(2e-3, over=1.0).load(0.0, over=1.0)
-    with pytest.raises(rv.InputError, match=r"indenter is on a sheet .*thickness=0.0001.*holds on a half-space only"):
-        reduced_contact(contact, rv.zener(1e6, 3e5, 1e5), program)
-
-
-def test_many_radii__keep_their_shape():
-    contact = OnSheet(Paraboloid(10.0), Sheet(1.0))
-    radii = np.array([[0.1, 0.2], [0.2, 0.3]])
-    assert contact.scaled_force(radii).shape == contact.reduced(radii).shape == (2, 2)
-    assert contact.scaled_pressure(np.array([0.0, 0.05])[:, None, None], radii).shape == (2, 2, 2)
-    assert float(contact.height(2.0)) == 0.2

@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
+import references
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
-from roughvisc.mechanics.bodies.sheet import complement
+from roughvisc.mechanics.bodies.sheet import Sheet, complement
+from roughvisc.study.audit import adhesion, validity
 
 
 def jkr_force(a, radius, modulus, w):
@@ -19,18 +21,18 @@ def jkr_force(a, radius, modulus, w):
 
 def test_pull_off__is_that_of_jkr_and_of_dmt_in_the_limits():
     radius, w = 2e-3, 0.04
-    assert cf.pull_off_force(radius, w) == pytest.approx(1.5 * math.pi * w * radius, rel=1e-15)
-    assert cf.pull_off_force(radius, w, tabor=0.0) == pytest.approx(2 * math.pi * w * radius, rel=1e-15)
+    assert adhesion.pull_off_force(radius, w) == pytest.approx(1.5 * math.pi * w * radius, rel=1e-15)
+    assert adhesion.pull_off_force(radius, w, tabor=0.0) == pytest.approx(2 * math.pi * w * radius, rel=1e-15)
     # by the curve of load over contact radius, whose least value is the force of separation
     least = min(jkr_force(a, radius, 1e6, w) for a in np.linspace(0, 1e-3, 10_001))
-    assert -least == pytest.approx(cf.pull_off_force(radius, w), rel=1e-6)
+    assert -least == pytest.approx(adhesion.pull_off_force(radius, w), rel=1e-6)
 
 
 @pytest.mark.parametrize("tabor", [1e-3, 0.3, 1.0, 5.0, 1e3])
 def test_pull_off__falls_from_dmt_to_jkr(tabor):
-    found = cf.pull_off_force(1.0, 1.0, tabor) / math.pi
+    found = adhesion.pull_off_force(1.0, 1.0, tabor) / math.pi
     assert 1.5 < found < 2 or tabor in (1e-3, 1e3)
-    assert cf.pull_off_force(1.0, 1.0, 1.01 * tabor) <= found * math.pi
+    assert adhesion.pull_off_force(1.0, 1.0, 1.01 * tabor) <= found * math.pi
 
 
 def maugis_balance(m, a, parameter):
@@ -47,13 +49,13 @@ def test_pull_off__between_the_limits_is_that_of_maugis(parameter):
     for a in np.geomspace(0.01, 3, 400):
         m = brentq(maugis_balance, 1.0, 1e6, args=(a, parameter))
         forces.append(a**3 - parameter * a**2 * (math.sqrt(m**2 - 1) + m**2 * math.acos(1 / m)))
-    found = cf.pull_off_force(1.0, 1.0, parameter / 1.1570) / math.pi
+    found = adhesion.pull_off_force(1.0, 1.0, parameter / 1.1570) / math.pi
     assert found == pytest.approx(-min(forces), rel=1.7e-2)
 
 
 def test_adhesive_load__presses_a_sphere_to_the_radius_of_jkr():
     radius, modulus, w, force = 1e-2, 3e6, 0.05, 0.02
-    load = float(cf.adhesive_load(force, cf.pull_off_force(radius, w)))
+    load = float(adhesion.adhesive_load(force, adhesion.pull_off_force(radius, w)))
     a = cf.hertz(radius, modulus, load).radius
     assert jkr_force(a, radius, modulus, w) == pytest.approx(force, rel=1e-12)
 
@@ -62,14 +64,14 @@ def test_tabor_parameter__is_the_height_of_the_neck_over_the_range():
     """With (R w^2 / E*^2)^(1/3), of a rubber ball of a centimetre some micrometres."""
     radius, modulus, w = 1e-2, 1e6, 0.1
     neck = (radius * w**2 / modulus**2) ** (1 / 3)
-    assert cf.tabor_parameter(radius, modulus, w, neck) == pytest.approx(1.0, rel=1e-14)
-    assert cf.tabor_parameter(8 * radius, modulus, w, neck) == pytest.approx(2.0, rel=1e-14)
+    assert adhesion.tabor_parameter(radius, modulus, w, neck) == pytest.approx(1.0, rel=1e-14)
+    assert adhesion.tabor_parameter(8 * radius, modulus, w, neck) == pytest.approx(2.0, rel=1e-14)
 
 
 def test_punch_pull_off__is_that_of_the_energy():
     """Griffith: the energy F^2 / 4 a E* falls with the radius by 2 pi a w (Maugis 2000)."""
     a, modulus, w = 2e-3, 5e6, 0.05
-    force = cf.punch_pull_off(a, modulus, w)
+    force = adhesion.punch_pull_off(a, modulus, w)
     step = 1e-6 * a
     energies = [force**2 / (4 * (a + side) * modulus) for side in (-step, step)]
     assert (energies[0] - energies[1]) / (2 * step) == pytest.approx(2 * math.pi * a * w, rel=1e-8)
@@ -87,7 +89,9 @@ def test_rough_attraction__is_that_of_rims_around_spots():
     rim = brentq(lambda s: gap(s) / reach - 1, 1e-9 * d, 0.1 * d, xtol=1e-12 * d)
     attraction = math.pi * d * rim * w / reach  # around a spot whose perimeter is pi d ...
     repulsion = d**2 * slope * modulus / 2  # ... for an area d^2: the perimeter is pi over d times the area
-    assert cf.rough_attraction(slope, laplacian, modulus, w, reach) == pytest.approx(attraction / repulsion, rel=1e-4)
+    assert adhesion.rough_attraction(slope, laplacian, modulus, w, reach) == pytest.approx(
+        attraction / repulsion, rel=1e-4
+    )
 
 
 def test_conformal_energy__is_half_the_work_of_the_pressure_that_flattens_a_wave():
@@ -95,17 +99,17 @@ def test_conformal_energy__is_half_the_work_of_the_pressure_that_flattens_a_wave
     x = (np.arange(64) + 0.5) / 64 * 2 * np.pi / k
     flattening = modulus * k * a / 2 * np.cos(k * x)  # Westergaard: p* = E* k a / 2
     work = np.mean(flattening * a * np.cos(k * x)) / 2
-    assert cf.conformal_energy(k * a**2 / 2, modulus) == pytest.approx(work, rel=1e-12)
+    assert adhesion.conformal_energy(k * a**2 / 2, modulus) == pytest.approx(work, rel=1e-12)
 
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.4, "bonded"), (0.5, "bonded"), (0.5, "slipping")])
 def test_half_space_excess__is_near_the_fredholm_equation(poisson, base):
-    ball, sheet = cf.Paraboloid(1.0), cf.Sheet(1e-2, poisson, base)
+    ball, sheet = cf.Paraboloid(1.0), Sheet(1e-2, poisson, base)
     for a in (2e-4, 1e-3, 5e-3, 1e-2, 2e-2):
         force, approach = float(ball.scaled_force(a)), float(ball.reduced(a))
-        there = cf.OnSheet(ball, sheet)
+        there = references.OnSheet(ball, sheet)
         true = 1 - float(there.reduced(there.radius_at_scaled_force(force))) / approach
-        found = cf.half_space_excess(sheet, 1.0, force, approach)
+        found = validity.half_space_excess(sheet, 1.0, force, approach)
         assert 0.75 * true < found < 1.25 * true
         if a < 1e-3:
             assert found == pytest.approx(true, rel=0.03)
@@ -115,31 +119,31 @@ def test_half_space_excess__has_the_integrals_that_are_stated():
     for base, expected in (("bonded", 1.7702), ("slipping", 1.16758)):
         integral = quad(lambda s, base=base: float(complement(s, 0.5, base)), 0, 40)[0]
         assert integral == pytest.approx(expected, abs=5e-5)
-        first = cf.half_space_excess(cf.Sheet(1.0, 0.5, base), 1.0, 1e-6, 1.0)
+        first = validity.half_space_excess(Sheet(1.0, 0.5, base), 1.0, 1e-6, 1.0)
         assert first == pytest.approx(expected / math.pi * 1e-6, rel=1e-4)
 
 
 def test_dundurs_coupling__of_a_rigid_partner_and_of_like_bodies():
-    assert cf.dundurs_coupling([2e-6], [0.3]) == pytest.approx(0.4 / 1.4, rel=1e-14)
-    assert cf.dundurs_coupling([2e-6, 1e-20], [0.3, 0.2]) == pytest.approx(0.4 / 1.4, rel=1e-12)
-    assert cf.dundurs_coupling([2e-6, 2e-6], [0.3, 0.3]) == 0
+    assert validity.dundurs_coupling([2e-6], [0.3]) == pytest.approx(0.4 / 1.4, rel=1e-14)
+    assert validity.dundurs_coupling([2e-6, 1e-20], [0.3, 0.2]) == pytest.approx(0.4 / 1.4, rel=1e-12)
+    assert validity.dundurs_coupling([2e-6, 2e-6], [0.3, 0.3]) == 0
     # Johnson (1985), eq. (5.3): ((1-2v1)/G1 - (1-2v2)/G2) / ((1-v1)/G1 + (1-v2)/G2) / 2
     (g1, v1), (g2, v2) = (1e6, 0.4), (3e6, 0.25)
     johnson = ((1 - 2 * v1) / g1 - (1 - 2 * v2) / g2) / ((1 - v1) / g1 + (1 - v2) / g2) / 2
     compliances = [(1 - v) / (2 * g) for g, v in ((g1, v1), (g2, v2))]
-    assert cf.dundurs_coupling(compliances, [v1, v2]) == pytest.approx(abs(johnson), rel=1e-12)
+    assert validity.dundurs_coupling(compliances, [v1, v2]) == pytest.approx(abs(johnson), rel=1e-12)
     with pytest.raises(InputError, match="compliances has 0 bodies"):
-        cf.dundurs_coupling([], [])
+        validity.dundurs_coupling([], [])
 
 
 def test_sticking_stiffness__goes_to_one_of_incompressible_bodies():
-    assert cf.sticking_stiffness(0.5 - 1e-9) == pytest.approx(1.0, abs=1e-8)
-    assert cf.sticking_stiffness(0.0) == pytest.approx(math.log(3), rel=1e-14)
+    assert validity.sticking_stiffness(0.5 - 1e-9) == pytest.approx(1.0, abs=1e-8)
+    assert validity.sticking_stiffness(0.0) == pytest.approx(math.log(3), rel=1e-14)
 
 
 def test_adhesion__refuses_what_is_not_positive():
     for bad in (0.0, -1.0, math.nan):
         with pytest.raises(InputError, match="radius is"):
-            cf.pull_off_force(bad, 0.05)
+            adhesion.pull_off_force(bad, 0.05)
         with pytest.raises(InputError, match="contact_modulus is"):
-            cf.tabor_parameter(1.0, bad, 0.05, 3e-10)
+            adhesion.tabor_parameter(1.0, bad, 0.05, 3e-10)

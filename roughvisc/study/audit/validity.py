@@ -10,12 +10,8 @@ from collections.abc import Sequence
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.sheet import Sheet
-from roughvisc.mechanics.closed_forms.indenters import Paraboloid, positive
-from roughvisc.mechanics.closed_forms.sheet import OnSheet
+from roughvisc.mechanics.closed_forms.indenters import positive
 from roughvisc.units import Quantity, quantities
-
-#: Contact radii in thicknesses up to which the equation of a sheet is solved to its precision.
-_WIDEST = 10.0
 
 
 @quantities(compliance="1/Pa", force="N", approach="m")
@@ -46,13 +42,7 @@ def half_space_excess(sheet: Sheet, compliance: Quantity, force: Quantity, appro
 
     Examples
     --------
-    >>> from roughvisc.mechanics.closed_forms import Paraboloid, OnSheet
-    >>> ball, sheet = Paraboloid(1.0), Sheet(1.0)
-    >>> force, approach = (float(f(0.1)) for f in (ball.scaled_force, ball.reduced))
-    >>> there = OnSheet(ball, sheet)
-    >>> round(float(1 - there.reduced(there.radius_at_scaled_force(force)) / approach), 4)
-    0.0747
-    >>> round(half_space_excess(sheet, 1.0, force, approach), 4)
+    >>> round(half_space_excess(Sheet(1.0), compliance=1.0, force=4e-3 / 3, approach=1e-2), 4)
     0.0699
     """
     first = sheet.relief * compliance * force / approach
@@ -75,26 +65,17 @@ def half_space_shortfall(sheet: Sheet, compliance: Quantity, force: Quantity, ap
     Returns
     -------
     float
-        :math:`1 - F / F_{sheet}` at the same approach; 1 where the sheet is thinner than a tenth of the contact radius.
-        [-]
+        :math:`1 - F / F_{sheet}` at the same approach. [-]
 
     Notes
     -----
-    The paraboloid that has this force at this approach has the contact radius :math:`a = 3 C F / 4 \delta` and the
-    radius of curvature :math:`a^2 / \delta`. On the sheet it is solved by the Fredholm equation of
-    :class:`~roughvisc.closed_forms.OnSheet`.
-
-    Examples
-    --------
-    >>> ball = Paraboloid(1.0)
-    >>> round(half_space_shortfall(Sheet(0.1), 1.0, float(ball.scaled_force(0.01)), float(ball.reduced(0.01))), 4)
-    0.1143
+    With the excess ``e`` of :func:`half_space_excess` to first order, the force on the sheet is
+    :math:`F (1 + 1.5 e + 2.27 e^2 + 2 e^3)`. The first coefficient is exact for a sphere; the others are fitted to the
+    Fredholm equation of a sphere on bonded and slipping sheets. The shortfall is within 8 % of it up to an approach of
+    :math:`h^2/R`.
     """
-    radius = 3 * compliance * force / (4 * approach)
-    if radius > _WIDEST * sheet.thickness:
-        return 1.0
-    on_sheet = OnSheet(Paraboloid(radius**2 / approach), sheet)
-    return 1 - compliance * force / float(on_sheet.scaled_force(on_sheet.radius_at_approach(approach)))
+    first = sheet.relief * compliance * force / approach
+    return 1 - 1 / (1 + 1.5 * first + 2.27 * first**2 + 2 * first**3)
 
 
 @quantities(compliances="1/Pa")
