@@ -70,12 +70,12 @@ def half_space_shortfall(sheet: Sheet, compliance: Quantity, force: Quantity, ap
     Notes
     -----
     With the excess ``e`` of :func:`half_space_excess` to first order, the force on the sheet is
-    :math:`F (1 + 1.5 e + 2.27 e^2 + 2 e^3)`. The first coefficient is exact for a sphere; the others are fitted to the
-    Fredholm equation of a sphere on bonded and slipping sheets. The shortfall is within 8 % of it up to an approach of
+    :math:`F (1 + 1.5 e + 2.27 e^2 + 3 e^3)`. The first coefficient is exact for a sphere; the others are fitted to the
+    Fredholm equation of a sphere on bonded and slipping sheets. The shortfall is within 7 % of it up to an approach of
     :math:`h^2/R`.
     """
     first = sheet.relief * compliance * force / approach
-    return 1 - 1 / (1 + 1.5 * first + 2.27 * first**2 + 2 * first**3)
+    return 1 - 1 / (1 + 1.5 * first + 2.27 * first**2 + 3 * first**3)
 
 
 @quantities(compliances="1/Pa")
