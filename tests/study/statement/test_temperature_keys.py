@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from support import refused
 
 import roughvisc as rv
 from roughvisc.study.statement.case import Case, read_cases, vary
@@ -62,34 +63,20 @@ def test_temperature__sweeps_and_its_axis_has_a_unit(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "key"),
     [
-        ({"temperature": 300}, "material.reference_temperature: missing: expected a temperature in K"),
-        ({"wlf_c1": 3}, "material.temperature: missing: expected a temperature in K, or with its unit, beside wlf_c1"),
-        (
-            {"temperature": 300, "reference_temperature": 290},
-            "material.wlf_c1: missing: expected wlf_c1 and wlf_c2, or",
-        ),
-        (
-            {**WLF, "wlf_c2": "90 degC"},
-            "found '90 degC', a temperature: expected a difference of temperatures, such as",
-        ),
-        (
-            {**WLF, "activation_energy": 8e4},
-            "material.activation_energy: found wlf_c1 and wlf_c2 and activation_energy",
-        ),
-        (
-            {**WLF, "temperature": "-75 degC"},
-            "material.temperature: found 198.15 K: expected above 203.15 K, where the",
-        ),
-        ({**ARRHENIUS, "temperature": 25}, "material.temperature: found 25 K and a reference of 293.15 K, a shift by"),
-        ({**ARRHENIUS, "temperature": "25 C"}, "found '25 C', which is in coulomb: expected a number in K"),
-        ({**ARRHENIUS, "shift_factor": 2}, "material.shift_factor: found beside temperature: expected one of them"),
-        ({"shift_factor": -2}, "material.shift_factor: found -2: expected a number at least 1e-30"),
-        ({"temperatur": 300}, "material.temperatur: unknown key; did you mean 'temperature'?"),
+        ({"temperature": 300}, "material.reference_temperature"),
+        ({"wlf_c1": 3}, "material.temperature"),
+        ({"temperature": 300, "reference_temperature": 290}, "material.wlf_c1"),
+        ({**WLF, "wlf_c2": "90 degC"}, "material.wlf_c2"),
+        ({**WLF, "activation_energy": 8e4}, "material.activation_energy"),
+        ({**WLF, "temperature": "-75 degC"}, "material.temperature"),
+        ({**ARRHENIUS, "temperature": 25}, "material.temperature"),
+        ({**ARRHENIUS, "shift_factor": 2}, "material.shift_factor"),
+        ({"shift_factor": -2}, "material.shift_factor"),
+        ({"temperatur": 300}, "material.temperatur"),
     ],
 )
-def test_temperature__refuses(case, table, said):
-    with pytest.raises(rv.InputError) as error:
+def test_temperature__is_refused_at_the_key(case, table, key):
+    with refused(key):
         at(case, table)
-    assert said in str(error.value)
