@@ -84,7 +84,7 @@ TABLES = {
 #: first word of a table's name -> the table whose meanings hold where it has none of its own
 _SHARED = {"generate": "generate: any", "material": "material: any"}
 _WORDS = {
-    "control": "'load' or 'approach'",
+    "control": "'load', 'approach' or 'pressure'",
     "cycle": "a table",
     "friction": "a table",
     "note": "a text",

@@ -1,9 +1,5 @@
 """What tests of several modules share: cases, scenes, and how they are looked at."""
 
-import re
-import shutil
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -191,20 +187,6 @@ def told(figure):
         found += ax.get_legend().get_texts() if ax.get_legend() else []
     found += [text for legend in figure.legends for text in legend.get_texts()]
     return [text.get_text() for text in found if text is not None and text.get_gid() != "exaggeration"]
-
-
-def changed_package(folder, page, test, places):
-    """Folder with a copy of the package in which a page's code, as far as a test runs it, stands above some lines."""
-    shutil.copytree(Path(rv.__file__).parent, folder / "roughvisc", ignore=shutil.ignore_patterns("__pycache__"))
-    text = (Path(__file__).parents[1] / "docs" / page).read_text(encoding="utf-8")
-    shown = re.findall(rf"<!-- not run: tests/{test} runs it -->\n```python\n(.*?)```", text, re.S)
-    for (name, below), code in zip(places, shown, strict=True):
-        path = folder / "roughvisc" / name
-        before = path.read_text(encoding="utf-8")
-        assert before.count(below) == 1, f"{name}: {below}"
-        assert f"roughvisc/{name}`" in text
-        path.write_text(before.replace(below, code + below), encoding="utf-8")
-    return folder
 
 
 def refused(key=None, found=None):

@@ -1,14 +1,10 @@
 """A result as a user has it: one flat Dataset, the history of its steps, and what xarray does to both."""
 
-import os
-import subprocess
-import sys
-
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import changed_package, refused
+from support import refused
 
 import roughvisc as rv
 
@@ -180,33 +176,3 @@ def test_warnings__are_one_attribute_of_one_line_each(tmp_path):
     assert {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()} == {"accuracy", "border", "slope"}
     ds.to_netcdf(tmp_path / "tilted.nc")
     assert rv.open_result(tmp_path / "tilted.nc").attrs["warnings"] == ds.attrs["warnings"]
-
-
-#: What a new variable touches, and above which line: its entry, and where the rows are made.
-NEW_VARIABLE = [
-    ("variables/__init__.py", '    "nominal_pressure": Variable('),
-    ("experiment/loading.py", '            "force": shown.force,'),
-]
-
-USED = """
-import sys
-import roughvisc as rv
-
-ds = rv.run(sys.argv[1], sys.argv[2], progress=False)
-peak = ds.largest_pressure
-assert (peak == ds.pressure.max(("x", "y"))).all() and peak.units == "Pa"
-assert ds.roughvisc.steps.largest_pressure.max() >= peak.max()
-assert rv.open_results(sys.argv[2]).largest_pressure.dims == ("case", "time")
-assert rv.to_table(sys.argv[2])["largest largest_pressure [Pa]"].item() == peak.max()
-"""
-
-
-@pytest.mark.thorough
-def test_new_variable__touches_two_files(tmp_path):
-    """Its entry and where it is computed, as the page about it states."""
-    package = changed_package(tmp_path, "howto/add-a-variable.md", "test_result.py", NEW_VARIABLE)
-    (tmp_path / "ball.toml").write_text(STUDY)
-    command = [sys.executable, "-c", USED, tmp_path / "ball.toml", tmp_path / "out"]
-    env = os.environ | {"PYTHONPATH": str(package)}
-    done = subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""The page on study files: every key of the schema has its row, and every example is accepted."""
+"""The page on study files: every key has its row, and every example is accepted."""
 
 import re
 import tomllib
@@ -6,12 +6,11 @@ import tomllib
 import pytest
 from test_docs import BASE, DOCS, there  # noqa: F401  a fixture
 
-import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.schema.keys import meanings
 from roughvisc.study.statement.schema.material import COLUMNS, MODELS, SPRINGS, TEMPERATURE
-from roughvisc.study.statement.schema.surface import RECIPES
+from roughvisc.study.statement.schema.program import TABLES
 from roughvisc.views.sweep_figures.case_text import study_text
 
 PAGE = (DOCS / "study-files.md").read_text(encoding="utf-8")
@@ -64,31 +63,13 @@ def test_meanings__are_of_keys_that_exist(study_keys):
         assert set(keys) - {"beside"} <= known, name
 
 
-def test_rows__say_what_the_schema_says(study_keys):
-    found = {row[0]: row[1:4] for row in study_keys.rows("solve")}
-    assert found["tolerance"] == ("a number at least 1e-12 and below 1", "", "`0.001`")
-    assert found["time_step"] == ("'auto', or a time above 0", "s", "`auto`")
-    zener = {row[0]: row[1:4] for row in study_keys.rows("material: zener")}
-    assert zener["kelvin_viscosity"] == ("a quantity above 0", "Pa s", "required")
-    second = {row[0]: row[1:4] for row in study_keys.rows("surface.second")}
-    assert second["offset"] == ("a length, or a list of two, along x and along y", "m", "`[0.0, 0.0]`")
-
-
-def test_schema__says_what_every_key_means():
-    schema = rv.study_schema()
-    sections = {"study": schema, **schema["$defs"]}
-    for name, section in sections.items():
-        for key, one in section["properties"].items():
-            assert one["description"], f"{name}.{key}"
-    of_solve = schema["$defs"]["SolveSection"]["properties"]["edge"]["description"]
-    assert of_solve.startswith(meanings()["solve"]["edge"][0])
-    assert schema["$defs"]["SecondFile"]["properties"]["flip"]["description"].startswith("axis along which")
-
-
-def test_meaning__that_is_missing_is_named(study_keys, monkeypatch):
-    monkeypatch.delitem(meanings()["solve"], "edge")
-    with pytest.raises(KeyError, match=r"keys\.toml: \['solve'\] has no edge"):
-        study_keys.table("solve")
+def test_page__has_every_control_and_every_key_of_a_recording(study_keys):
+    for table in ("program: hold", "program: cycle", "program: table"):
+        (words,) = (words for key, words, *_ in study_keys.rows(table) if key == "control")
+        assert all(f"'{name}'" in words for name in TABLES), table
+    recording = PAGE.split("STUDY_KEYS program.table")[1].split("##")[0]
+    for kind in TABLES.values():
+        assert not [key for key in kind.recording.model_fields if not re.search(rf"\b{key}\b", recording)]
 
 
 def surfaces(study_keys, name, key, example):
@@ -195,10 +176,3 @@ def example_in(study_keys, data, name, key, one, folder):
     else:
         data[head] = {**BASE.get(head, {}), **(BESIDE.get(key, {}) if head == "audit" else {}), key: one}
         data["program"] = [{"load": 1e-4, "over": 0.1}]
-
-
-def test_recipes__have_a_table_each(study_keys):
-    assert {name.removeprefix("generate: ") for name in study_keys.TABLES if name.startswith("generate")} == {
-        *RECIPES,
-        "any",
-    }

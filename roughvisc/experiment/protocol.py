@@ -111,7 +111,7 @@ class Experiment(Protocol):
     Attributes
     ----------
     axis : str
-        Name of the axis of its rows, which :func:`roughvisc.variables.axes.declare` has made known.
+        Name of the axis of its rows, one of :data:`roughvisc.variables.axes.AXES`.
     table : str
         Table of a study file that states it.
     called : str

@@ -1,4 +1,4 @@
-"""What the rows of a result lie over: times of a history, speeds of steady sliding, or what an experiment declares."""
+"""What the rows of a result lie over: times of a history, or speeds of steady sliding."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from roughvisc.errors import InputError
 from roughvisc.units import unit_for
 from roughvisc.variables import VARIABLES, Variable
 from roughvisc.variables.sliding import SLIDING
@@ -71,27 +70,29 @@ class Axis:
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
 ROW, ROWS = "row", "rows"
-#: Name of an axis -> what is said of it.
-AXES: dict[str, Axis] = {}
-
-
-def declare(axis: Axis) -> Axis:
-    """Make an axis known, so that its results can be written, read, tabulated and drawn.
-
-    Raises
-    ------
-    InputError
-        If another axis has its name, or has a variable of that name, by which its results would be taken for others;
-        or if its coordinate is none of its variables.
-    """
-    if AXES.setdefault(axis.name, axis) != axis:
-        raise InputError(f"the axis {axis.name!r} is known already: expected another name")
-    if others := [other.name for other in AXES.values() if other.name != axis.name and axis.name in other.variables]:
-        del AXES[axis.name]
-        raise InputError(f"the axis {axis.name!r} is a variable over {others[0]}: expected another name")
-    if axis.name not in axis.variables:
-        raise InputError(f"the axis {axis.name!r} is none of its variables: expected a Variable of that name")
-    return axis
+TIME = Axis(
+    "time",
+    VARIABLES,
+    needed=("time", "force", "approach"),
+    residual="residual",
+    rows="kept times",
+    symbol="t",
+    advice="a looser tolerance or shorter steps",
+    model="A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space.",
+)
+SPEED = Axis(
+    "speed",
+    SLIDING,
+    needed=("speed", "force", "friction_coefficient"),
+    residual="pressure_residual",
+    rows="speeds",
+    symbol="V",
+    advice="a looser tolerance",
+    model="A rigid rough profile that slides steadily on a linear viscoelastic body, without shear or adhesion.",
+    telling="friction_coefficient",
+)
+#: Name of an axis -> the axis.
+AXES: dict[str, Axis] = {axis.name: axis for axis in (TIME, SPEED)}
 
 
 def axis_of(names: Container[str]) -> str:
@@ -103,30 +104,3 @@ def axis_of(names: Container[str]) -> str:
     ('time', 'speed')
     """
     return next((name for name in AXES if name != "time" and name in names), "time")
-
-
-TIME = declare(
-    Axis(
-        "time",
-        VARIABLES,
-        needed=("time", "force", "approach"),
-        residual="residual",
-        rows="kept times",
-        symbol="t",
-        advice="a looser tolerance or shorter steps",
-        model="A rigid rough profile pressed without friction or adhesion on a linear viscoelastic half-space.",
-    )
-)
-SPEED = declare(
-    Axis(
-        "speed",
-        SLIDING,
-        needed=("speed", "force", "friction_coefficient"),
-        residual="pressure_residual",
-        rows="speeds",
-        symbol="V",
-        advice="a looser tolerance",
-        model="A rigid rough profile that slides steadily on a linear viscoelastic body, without shear or adhesion.",
-        telling="friction_coefficient",
-    )
-)

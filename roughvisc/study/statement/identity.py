@@ -10,7 +10,7 @@ from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.settings import ENTRIES
-from roughvisc.study.statement.schema import EXPERIMENTS, Study
+from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
 from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
@@ -34,8 +34,6 @@ _PROSE = {
 #: Keys of ``[solve]`` and ``[keep]`` that count at their defaults too. No new key does, so that the keys of former
 #: cases stay. The precision of the file is a key of ``[keep]`` and no setting of a solve.
 _ALWAYS = {name for name, entry in ENTRIES.items() if entry.always_in_key} | {"precision"}
-#: Keys of a surface that came later: where they are absent they do not count, so that the keys of former cases stay.
-_LATER = {"shortest_wave", "realisation"}
 
 
 def identity(settings: Study) -> tuple[str, str]:
@@ -48,7 +46,7 @@ def identity(settings: Study) -> tuple[str, str]:
     """
     stated = settings.model_dump(
         mode="json",
-        exclude={"title", "audit", "observe", "program", "surface", "material", *EXPERIMENTS},
+        exclude={"title", "audit", "observe", "program", "surface", "material", "friction"},
         serialize_as_any=True,
     )
     for table, section in (("solve", settings.solve), ("keep", settings.keep)):
@@ -90,7 +88,7 @@ def surface_content(surface: Raw) -> tuple[str, dict[str, Any]]:
         The conditioning, of the card too.
     """
     stated = surface.model_dump(mode="json", serialize_as_any=True, exclude={"second"})
-    stated = {key: value for key, value in stated.items() if value is not None or key not in _LATER}
+    stated = {key: value for key, value in stated.items() if value is not None}
     second = getattr(surface, "second", None)
     above = {} if second is None else {"second": surface_content(second)}
     if not isinstance(surface, FromFile):

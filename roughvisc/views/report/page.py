@@ -21,7 +21,6 @@ from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.audit.limits import Finding
-from roughvisc.study.statement.schema import EXPERIMENTS
 from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import index_of
@@ -246,7 +245,6 @@ def _figures(dataset: xr.Dataset, every: bool) -> list[dict[str, Any]]:
 def _study(dataset: xr.Dataset) -> dict[str, Any]:
     """What was run and whence it came, for one case."""
     case = json.loads(dataset.attrs.get("case", "{}"))
-    others = [name for name in EXPERIMENTS if name in case and name != "friction"]
 
     def told(names: Sequence[str]) -> list[list[str]]:
         return [[name.replace("_", " "), str(dataset.attrs[name])] for name in names if name in dataset.attrs]
@@ -255,7 +253,6 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
         "material": case_text.material_words(case["material"]) if "material" in case else "",
         "program": case_text.program_words(case["program"]) if "program" in case else [],
         "friction": case_text.friction_words(case["friction"]) if "friction" in case else "",
-        "others": [[name, case_text.table_words(name, case[name])] for name in others],
         "settings": told(_SETTINGS),
         "origin": told(_ORIGIN),
         "warnings": list(warnings_of(dataset.attrs).values()),

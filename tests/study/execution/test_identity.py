@@ -8,14 +8,12 @@ import xarray as xr
 from support import BALL
 
 from roughvisc.api import run
-from roughvisc.errors import ChangedError, InputError
+from roughvisc.errors import ChangedError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.failures import record_path
-from roughvisc.topography import readers
-from roughvisc.topography.scans import open_scan
 
 SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'
 STUDY = BALL[: BALL.index("generate")] + SCAN + BALL[BALL.index("level") :]
@@ -94,16 +92,3 @@ def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
         run(case, tmp_path / "out", progress=False)
     assert not (tmp_path / "out").exists()
     assert read_study(study).key != key
-
-
-def test_open_scan__a_file_that_changes_while_it_is_read(scan, monkeypatch):
-    plausible = readers._plausible
-
-    def slow(*args):
-        found = plausible(*args)
-        bump(scan, 2e-5)
-        return found
-
-    monkeypatch.setattr(readers, "_plausible", slow)
-    with pytest.raises(InputError, match=r"scan\.npy: was changed while it was read"):
-        open_scan(scan, unit="m", spacing=4e-5)

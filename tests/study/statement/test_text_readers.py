@@ -4,7 +4,6 @@ import codecs
 
 import numpy as np
 import pytest
-from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError

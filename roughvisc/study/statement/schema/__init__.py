@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
-from pydantic.fields import FieldInfo
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
@@ -13,15 +12,13 @@ from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection
-from roughvisc.study.statement.schema.experiments import ExperimentSection, FrictionSection
+from roughvisc.study.statement.schema.experiments import FrictionSection
 from roughvisc.study.statement.schema.material import AnyMaterial
 from roughvisc.study.statement.schema.program import AnySegment
 from roughvisc.study.statement.schema.section import Section, Text, a_list, nullable, refuse, shown
 from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
 from roughvisc.study.statement.schema.surface import AnySurface
 
-#: Tables that state an experiment other than a program.
-EXPERIMENTS = ["friction"]
 #: Part of a program's duration by which a kept time may exceed it.
 _ROUNDING = 1e-12
 _SEGMENTS = "a list of [[program]] tables, at least one"
@@ -29,24 +26,21 @@ _SEGMENTS = "a list of [[program]] tables, at least one"
 
 def _segments(value: Any, info: ValidationInfo) -> Any:
     """Segments, or none where another table states an experiment; a study whose other table is wrong hears of that."""
-    others = [name for name in EXPERIMENTS if info.data.get(name) is not None]
     if value is not None:
-        if others:
-            raise InputError(f"found together with [{others[0]}]: expected one of them: a study states one experiment")
+        if info.data.get("friction") is not None:
+            raise InputError("found together with [friction]: expected one of them: a study states one experiment")
         return tuple(a_list(value, _SEGMENTS) or a_list(None, _SEGMENTS))
-    if not others and all(name in info.data for name in EXPERIMENTS):
-        raise InputError(
-            f"missing: expected {_SEGMENTS}, or a table {' or '.join(f'[{name}]' for name in EXPERIMENTS)}"
-        )
+    if info.data.get("friction", ...) is None:
+        raise InputError(f"missing: expected {_SEGMENTS}, or a table [friction]")
     return value
 
 
 def _with_boundary(solve: SolveSection, info: ValidationInfo) -> SolveSection:
     """How it is computed, with the boundary that ``auto`` stands for, which the study then does not state itself."""
-    if not {"surface", *EXPERIMENTS} <= set(info.data):  # what is wrong there is said first
+    if not {"surface", "friction"} <= set(info.data):  # what is wrong there is said first
         return solve
-    stated = [section for name in EXPERIMENTS if (section := info.data[name]) is not None]
-    found = known_boundary(solve, stated[0].experiment().boundary if stated else None, info.data["surface"].boundary)
+    friction = info.data["friction"]
+    found = known_boundary(solve, friction.experiment().boundary if friction else None, info.data["surface"].boundary)
     if found is None:
         raise refuse("boundary", OPEN_BOUNDARY.format(mirror="mirror = true in [surface]"))
     if found == solve.boundary:
@@ -89,8 +83,7 @@ class Study(Section):
 
     def experiment(self) -> Experiment:
         """What is done with the surface."""
-        stated = [section for name in EXPERIMENTS if (section := getattr(self, name)) is not None]
-        return stated[0].experiment() if stated else Loading(self.loading())
+        return self.friction.experiment() if self.friction is not None else Loading(self.loading())
 
     def late_times(self) -> tuple[float, ...]:
         """Return the listed times after the end of the program, which are not kept. [s]"""
@@ -138,32 +131,3 @@ class StudyFile(Study):
         dict[str, list[Any]] | list[dict[str, Any]] | None,
         WithJsonSchema({"anyOf": [_VARIED, {"type": "array", "items": {"type": "object"}}]}),
     ] = None
-
-
-def add_experiment(section: type[ExperimentSection], table: str) -> None:
-    """Let studies state another experiment.
-
-    Parameters
-    ----------
-    section : type of ExperimentSection
-        Its keys, as fields of a pydantic model, and the experiment that they stand for.
-    table : str
-        Name of its table in a study file.
-
-    Raises
-    ------
-    InputError
-        If studies have a table of that name.
-    """
-    if table in Study.model_fields:
-        raise InputError(f"a study has a table [{table}] already: expected another name")
-    EXPERIMENTS.append(table)
-    for study in (Study, StudyFile):
-        fields = study.model_fields
-        known = dict(fields)
-        fields.clear()
-        for name, one in known.items():
-            if name == "program":  # whose check looks at the tables before it
-                fields[table] = FieldInfo.from_annotated_attribute(nullable(section), None)
-            fields[name] = one
-        study.model_rebuild(force=True)
