@@ -145,7 +145,7 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
 
 def test_help__summaries_of_commands_are_whole(invoke):
     listed = invoke("--help")[1].split("Commands:")[1].strip().splitlines()
-    assert len(listed) == 12
+    assert len(listed) == 11
     assert all(line.endswith(".") and not line.endswith("..") for line in listed)
 
 

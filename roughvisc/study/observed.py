@@ -76,27 +76,32 @@ def observe(
 
 
 def _add(case: Case, path: Path) -> bool:
-    """Add to one file what it lacks; whether it lacked anything."""
-    wanted: Mapping[str, Any] = case.settings.observe.stated()
+    """Add to one file the quantities that it lacks; return whether it lacked any."""
     with open_result(path) as result:
-        before = json.loads(result.attrs.get(OBSERVED, "{}"))
-        lacking = {name: values for name, values in wanted.items() if before.get(name) != values}
-        if not lacking:
+        if not _lacking(case, result):
             return False
-        require_writable(path.parent, f"since {path.name} lacks {', '.join(lacking)}")
+    require_writable(path.parent, f"since {path.name} lacks what is to be observed")
+    with lock_case(lock_path(path.parent, case.key)), open_result(path) as result:  # read again: it may have changed
+        lacking = _lacking(case, result)
         try:
             found = asked(_frame_by_frame(result), lacking).compute()
         except InputError as error:
             raise error.prefixed(str(path)) from error
-        told = {"case": case.to_json(), OBSERVED: json.dumps(before | wanted)}
+        known = json.loads(result.attrs.get(OBSERVED, "{}")) | lacking
         whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
             found, compat="equals", join="exact"
         )
-        whole.attrs = result.attrs | told
-        with lock_case(lock_path(path.parent, case.key)):
-            write_result(whole, path, precision=case.settings.keep.precision)
+        whole.attrs = result.attrs | {"case": case.to_json(), OBSERVED: json.dumps(known)}
+        write_result(whole, path, precision=case.settings.keep.precision)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True
+
+
+def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
+    """Return the observables that a result does not have, or has for other values."""
+    before = json.loads(result.attrs.get(OBSERVED, "{}"))
+    wanted: Mapping[str, Any] = case.settings.observe.stated()
+    return {name: values for name, values in wanted.items() if before.get(name) != values}
 
 
 def _frame_by_frame(result: xr.Dataset) -> xr.Dataset:

@@ -174,3 +174,30 @@ def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
     results = rv.open_results(tmp_path / "out")
     written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)]
     assert "sweep-thermal_conductance-histories.png" in written
+
+
+def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
+    """The second begins while the first computes: it is refused, and adds its own afterwards."""
+    from roughvisc.errors import InUseError
+    from roughvisc.study import observed
+
+    fields = 'fields = ["pressure", "gap"]\n'
+    one = read_cases(study(fields + LEAKAGE))
+    two = read_cases(study(fields + "[observe.conductance]\nresistivity = [1.0, 1.0]\n"))
+    rv.run(one[0], tmp_path / "out", progress=False)
+    plain, refused = observed.asked, []
+
+    def meanwhile(*given):
+        monkeypatch.setattr(observed, "asked", plain)
+        try:
+            rv.observe(two, tmp_path / "out")
+        except InUseError as error:
+            refused.append(error)
+        return plain(*given)
+
+    monkeypatch.setattr(observed, "asked", meanwhile)
+    (path,) = rv.observe(one, tmp_path / "out")
+    assert refused
+    rv.observe(two, tmp_path / "out")
+    with rv.open_result(path) as ds:
+        assert {"leak_rate", "thermal_conductance"} <= set(ds)

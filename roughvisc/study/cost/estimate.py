@@ -131,8 +131,8 @@ _STEPS_GROW, _WORK_GROWS = (1.0, 1.3), (1.0, 1.7)
 #: What an octave counts over the one before: grids that hold the shortest waves need hardly more iterations on finer
 #: cells. Measured with rough surfaces up to 1024 squared by the benchmark.
 _FADING = 0.7
-#: A coarse march ends after this number of convolutions or steps, which take three to six seconds. These limits are
-#: counts, not times, so that the plan does not depend on the load of the machine.
+#: A coarse march ends after this number of convolutions or steps, which take three to six seconds: counts, so that the
+#: estimate of a case does not depend on the load of the machine.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 20_000, 3_000
 #: Seconds for timing solves, in all and of one grid, which may be narrow and then takes a few milliseconds. [s, cells]
 _CALIBRATION, _ENOUGH, _NARROW = 2.0, (0.1, 0.5), 128**2

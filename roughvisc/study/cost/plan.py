@@ -52,6 +52,7 @@ from roughvisc.study.cost.full_contact import (
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.storage.files import existing_part
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
@@ -451,7 +452,7 @@ def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
 
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:
     """Totals, what is free, and why it cannot fit."""
-    place = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
+    place = existing_part(folder.absolute())
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]

@@ -18,7 +18,7 @@ from roughvisc.variables.axes import AXES
 
 Report = Callable[[str, float, float], None]
 #: Quantities that are compared, in the order of the results, beside the friction coefficient of a slide.
-QUANTITIES = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
+USUAL = ("pressure", "approach", "contact_area", "contact_area_counted", "mean_gap")
 #: Exponents of the time over the inverse tolerance: the number of steps follows its root; iterations hardly change.
 _BY_STEPS, _BY_ITERATIONS = 0.5, 0.1
 
@@ -29,7 +29,7 @@ _LITTLE = 0.05
 def quantities_of(case: Case) -> tuple[str, ...]:
     """Return the quantities that can be compared in the results of a case."""
     experiment = case.experiment()
-    names = (*QUANTITIES, "friction_coefficient") if experiment.largest_speed > 0 else QUANTITIES
+    names = (*USUAL, "friction_coefficient") if experiment.largest_speed > 0 else USUAL
     return tuple(name for name in names if name in AXES[experiment.axis].variables)
 
 

@@ -10,6 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
+from roughvisc.study.storage.store import NETCDF
 from roughvisc.units import quantity
 
 
@@ -28,7 +29,7 @@ def trade_folder(case: Case, out: str | Path | None) -> Path:
 
 
 def _read(path: str | Path) -> xr.Dataset:
-    with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+    with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
         return file.load()
 
 
@@ -56,7 +57,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
 def is_trade(path: str | Path) -> bool:
     """Whether a file is one that ``roughvisc trade`` wrote, as far as its variables tell."""
     try:
-        with xr.open_dataset(path, engine="netcdf4", decode_timedelta=False) as file:
+        with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
             return _holds_a_trade(file)
     except (OSError, ValueError, RuntimeError):
         return False
