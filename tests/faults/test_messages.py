@@ -75,7 +75,7 @@ def test_run__two_hundred_cases_that_fail(tmp_path, invoke, monkeypatch):
     assert (status, said) == (2, "")
     cases, last = err.rstrip("\n").rsplit("\n", 1)
     assert len(cases) <= LONGEST
-    assert cases.startswith("roughvisc: case 1 of 200: program.0.load: found 0.001, ")
+    assert cases.startswith("roughvisc: case 0: program.0.load: found 0.001, ")
     assert cases.endswith(f"all of it is in {out / 'sweep.log'}")
     assert last == "roughvisc: no case could be computed: the input is invalid"
     assert len(re.findall(r"found 0\.\d{3}, x{300}: expected less\n", (out / "sweep.log").read_text())) == 200
@@ -137,7 +137,7 @@ def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke)
     with lock_case(lock_path(out, first.key)):
         status, said, err = invoke("run", path, "--out", out, "--workers", "0")
         assert status == 1
-        assert err.startswith(f"roughvisc: case 1 of 2: {lock_path(out, first.key)}: {holder} is at work on this case")
+        assert err.startswith(f"roughvisc: case 0: {lock_path(out, first.key)}: {holder} is at work on this case")
         assert err.endswith("roughvisc: 1 of 2 cases are in use by another run: repeat the command when it has ended\n")
         assert "1 held by another run" in said
         assert re.search(r"^Locked by another run +1 *$", said, re.M)

@@ -1,7 +1,6 @@
 """What was varied labels every result file, in a way that xarray takes without this package."""
 
 import netCDF4
-import numpy as np
 import pytest
 import xarray as xr
 from support import BALL
@@ -10,7 +9,7 @@ import roughvisc as rv
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.experiments import FrictionSection
-from roughvisc.study.storage.parameters import identifier, labels_of_case
+from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES
 from roughvisc.variables.sliding import SLIDING
 
@@ -50,12 +49,6 @@ def test_file__of_a_varied_case_is_labelled(tmp_path):
         } == {"program_0_load program_1"}
 
 
-def test_file__of_a_plain_case_has_no_labels(tmp_path):
-    (tmp_path / "ball.toml").write_text(SMALL)
-    with rv.run(tmp_path / "ball.toml", tmp_path, progress=False) as ds:
-        assert [name for name, one in ds.coords.items() if not one.dims] == []
-
-
 _NEW = "use_new_combine_kwarg_defaults"
 
 
@@ -89,32 +82,12 @@ def test_open_results__names_each_parameter_once(folder):
     assert ds.sel(case=ds.program_0_load == 1e-3).sizes["case"] == 2
 
 
-def test_open_results__reads_files_without_labels(folder, tmp_path):
-    """As they were written before there were any."""
-    for path in folder.glob("*.nc"):
-        with xr.open_dataset(path) as ds:
-            ds.drop_vars([name for name, one in ds.coords.items() if not one.dims]).to_netcdf(tmp_path / path.name)
-    old, new = rv.open_results(tmp_path, cases="all"), rv.open_results(folder, cases="all")
-    assert old.program_0_load.values.tolist() == new.program_0_load.values.tolist()
-    xr.testing.assert_equal(old.load(), new.load())
-
-
 def test_labels__are_apart_from_all_variables():
     tables = {f"{name}_" for name in Study.model_fields if name != "friction"}
     names = {*VARIABLES, *SLIDING}
     assert not [name for name in names if any(name.startswith(table) for table in tables)]
     assert not names & {f"friction_{key}" for key in FrictionSection.model_fields}
     assert not {*VARIABLES} & {*Study.model_fields}
-
-
-def test_labels__of_one_case_are_numbers_or_text():
-    varied = {"a.1": 2, "b": 0.5, "c": "word", "d": True, "e": [1, 2], "f": None}
-    labels = labels_of_case({"varied": varied})
-    found = {name: values.item() for name, (_, values, _) in labels.items()}
-    assert all(name.isidentifier() for name in labels)
-    assert {name: found[name] for name in "bcde"} == {"b": 0.5, "c": "word", "d": "true", "e": "[1, 2]"}
-    assert found["a_1"] == 2
-    assert np.isnan(found["f"])
 
 
 def test_axes__are_found_by_cf_xarray(folder):

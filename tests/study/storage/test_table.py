@@ -2,7 +2,6 @@
 
 import csv
 
-import numpy as np
 import pandas as pd
 import pytest
 from support import BALL
@@ -96,14 +95,6 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
     assert written["status"].tolist() == ["converged", "not computed"]
     assert written["program.0.load [mN]"].tolist() == [1, 2]
     assert rv.to_table(tmp_path / "out")["status"].tolist() == ["converged", "not computed"]
-
-
-def test_results__are_frames_of_pandas(folder):
-    results = rv.open_results(folder)
-    frame = results[["force", "contact_area"]].to_dataframe().reset_index()
-    assert len(frame) == 2 * 3
-    assert np.array_equal(frame["force"], results.force.values.ravel())
-    assert np.array_equal(frame["program_0_load"].unique(), [5e-4, 1e-3])
 
 
 @pytest.mark.parametrize("sign", ["=", "+", "-", "@"])

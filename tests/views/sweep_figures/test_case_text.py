@@ -2,11 +2,6 @@
 
 import re
 
-import numpy as np
-from matplotlib.figure import Figure
-from PIL import Image
-
-from roughvisc.views.figures.files import write_figure
 from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 
 
@@ -49,19 +44,3 @@ def test_file_stems__are_safe_and_tell_cases_apart():
     assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,89}", stem) for stem in stems.values()), stems
     alone = file_stems({"a" * 16: cases["a" * 16]})
     assert alone["a" * 16] == stems["a" * 16], "whatever else lies in the folder"
-
-
-def test_write_figure__puts_a_title_above_and_moves_nothing(tmp_path):
-    def drawn(title):
-        figure = Figure(figsize=(2, 1.5), layout="constrained")
-        ax = figure.add_subplot()
-        ax.plot([0, 1], label="line")
-        figure.legend(loc="outside upper center")
-        with Image.open(write_figure(figure, tmp_path / "figure.png", 100, title)) as picture:
-            return np.array(picture.convert("L"))
-
-    plain, titled = drawn(""), drawn("Load 2 N, kelvin viscosity 1 kPa s, hold 5 s")
-    extra = len(titled) - len(plain)
-    assert np.array_equal(titled[extra:], plain), "the figure stands below its title as it was"
-    assert extra > 40, "two lines"
-    assert (titled[:extra] < 100).any(axis=1).sum() > 12

@@ -1,6 +1,5 @@
 """Figures of sweeps by their artists: what lies where, on which scale, and that any number of cases stays legible."""
 
-import io
 import itertools
 
 import numpy as np
@@ -13,16 +12,10 @@ from support import lines
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.views import plot
-from roughvisc.views.sweep_figures.case_text import material_words, readable_setting
 from roughvisc.views.sweep_figures.cases import cases_of
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
-MATERIALS = [
-    '{"model": "elastic", "shear_modulus": 1e6}',
-    '{"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5}',
-]
 LOADS = [0.01, 0.02, 0.04]
 DECADES = np.geomspace(1e-4, 1.0, 9).tolist()
 VISCOSITIES = [1e3, 1e4, 1e5, 1e6]
@@ -55,27 +48,11 @@ def by_load(values):
 
 SWEEPS = {
     "loads": product(program__0__load=LOADS),
-    "decades": product(program__0__load=DECADES),
     "hundred": product(program__0__load=np.geomspace(1e-3, 1, 100).tolist()),
     "two": product(program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES),
     "grid": product(program__0__load=DECADES, material__kelvin_viscosity=VISCOSITIES),
-    "materials": product(program__0__load=LOADS, material=MATERIALS),
-    "sheets": product(material__thickness=[1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, np.inf]),
-    "many sheets": product(material__thickness=[*np.geomspace(1e-5, 1e-2, 13), np.inf], program__0__load=LOADS[:2]),
-    "files": product(surface__file=[f"scans/steel_{i}.x3p" for i in range(12)]),
     "three": product(surface__seed=[1, 2, 3], program__0__load=LOADS, surface__hurst=[0.6, 0.8]),
 }
-DRAWN = {
-    "lines": lambda ds: plot.sweep(ds, kind="lines"),
-    "panels": lambda ds: plot.sweep(ds, times=[0.1, -1], kind="lines"),
-    "histories": plot.histories_of_cases,
-}
-
-
-@pytest.mark.parametrize("draw", DRAWN)
-@pytest.mark.parametrize("name", ["many sheets", "three"])
-def test_every_figure__is_drawn_without_a_warning(name, draw):
-    DRAWN[draw](stacked(SWEEPS[name], lambda values: 1e-6 * (2 + len(str(values)) % 3))).savefig(io.BytesIO(), dpi=40)
 
 
 def test_sweep__of_one_parameter_has_a_line_for_each_time():
@@ -90,35 +67,6 @@ def test_sweep__of_one_parameter_has_a_line_for_each_time():
         np.testing.assert_allclose(y, share * np.array(LOADS) ** 0.9)
     assert ax.get_xscale() == ax.get_yscale() == "linear"
     assert len(plot.sweep(ds).axes[0].lines) == 4, "all four times by default"
-
-
-def test_sweep__has_logarithmic_axes_where_values_span_decades():
-    (ax,) = plot.sweep(stacked(SWEEPS["decades"], by_load)).axes
-    assert ax.get_xscale() == ax.get_yscale() == "log"
-    (ax,) = plot.sweep(stacked(product(program__0__load=[-1.0, 1.0, 1000.0]))).axes
-    assert ax.get_xscale() == "linear"
-
-
-@pytest.mark.parametrize(
-    ("finite", "scale", "places"),
-    [
-        ([0.2, 0.4, 0.8, 1.6], "log", [0.2, 0.4, 0.8, 1.6, 3.2]),
-        ([1.0, 2.0, 3.0], "linear", [1, 2, 3, 4]),
-        ([3.0], "linear", [3, 4.5]),
-    ],
-)
-def test_sweep__has_the_half_space_a_step_beyond_the_sheets(finite, scale, places):
-    thickness = [1e-3 * value for value in finite]
-    ds = stacked(product(material__thickness=[np.inf, *thickness]), lambda v: min(v["material.thickness"], 5e-3) * 1e-3)
-    figure = plot.sweep(ds)
-    (ax,) = figure.axes
-    figure.draw_without_rendering()
-    assert ax.get_xlabel() == "Thickness [mm]"
-    assert ax.get_xscale() == scale
-    assert [label.get_text() for label in ax.get_xticklabels()] == [*(f"{value:g}" for value in finite), "half-space"]
-    x, y = lines(ax)["t = 10 s"].get_data()
-    np.testing.assert_allclose(x, [*places[:-1], np.nan, places[-1]])
-    np.testing.assert_allclose(y, [*finite, np.nan, 5.0])  # mm2; not joined to the last
 
 
 def test_sweep__of_two_parameters_is_a_map():
@@ -156,19 +104,6 @@ def test_sweep__of_two_parameters_as_a_family_of_lines():
             np.testing.assert_allclose(line.get_ydata(), share * power * np.array(LOADS) ** 0.9)
 
 
-def test_sweep__categories_are_named_by_what_tells_them_apart():
-    figure = plot.sweep(stacked(SWEEPS["materials"], by_load))
-    named = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert [name.split(",")[0] for name in named] == ["elastic", "zener"]
-    assert "shear modulus 3 MPa" in named[1]
-    (ax,) = plot.sweep(stacked(SWEEPS["files"])).axes
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == [f"steel_{i}.x3p" for i in range(12)]
-    assert {line.get_linestyle() for line in ax.lines} == {"None"}, "points of categories are not joined"
-    figure = plot.sweep(stacked(SWEEPS["three"], by_load))
-    assert figure.axes[0].get_xlabel() == "Load [mN]", "seeds are no numbers"
-    assert figure.legends[0].get_texts()[1].get_text() == "Seed 1, Hurst 0.8"
-
-
 def test_sweep__crosses_out_what_did_not_converge():
     ds = stacked(SWEEPS["loads"], by_load)
     ds["status"][1, -1] = 1
@@ -180,11 +115,6 @@ def test_sweep__what_follows_from_another_parameter_takes_no_axis():
     ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
     assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
     assert plot.sweep(ds).axes[0].get_xlabel() == "Load [mN]"
-
-
-def test_sweep__parameters_of_one_name_are_told_apart():
-    ds = stacked(product(program__0__load=LOADS, program__1__load=[1.0, 2.0]))
-    assert [one.label for one in cases_of(ds).parameters] == ["Load (program.0) [mN]", "Load (program.1) [N]"]
 
 
 def test_sweep__refuses_what_cannot_be_drawn():
@@ -221,18 +151,6 @@ def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
     assert not figure.legends
     assert figure.axes[1].get_yscale() == "log"
     assert figure.axes[1].get_ylabel() == "Load [mN]"
-
-
-def test_histories_of_cases__a_second_parameter_makes_panels():
-    figure = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load))
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "40 mN", "kept times"]
-    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes]
-    assert [title[:7] for title in titles] == ["elastic", "zener, "]
-    by_material = plot.histories_of_cases(stacked(SWEEPS["materials"], by_load), by="material")
-    titles = [ax.get_title(loc="left").partition("  ")[2] for ax in by_material.axes]
-    assert titles == ["Load 10 mN", "Load 20 mN", "Load 40 mN"]
-    crowd = product(program__0__load=LOADS, surface__seed=list(range(4)), solve__tolerance=[1e-2, 1e-3, 1e-4])
-    assert len(plot.histories_of_cases(stacked(crowd)).axes) == 3, "of twelve combinations the tolerances alone"
 
 
 def test_sweep__is_drawn_where_the_cases_differ():
@@ -340,20 +258,3 @@ def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures)
     assert len(names) == 6
     assert "load_5mN-hold_0.2s-history.png" in names
     assert (tmp_path / "sweep-area.png").stat().st_size > 5000
-
-
-def test_units__of_parameters_are_on_their_coordinates(folder):
-    results = results_of(folder)
-    assert (results["program_0_load"].attrs["units"], results["program_1_hold"].attrs["units"]) == ("N", "s")
-
-
-def test_unit_of__cycles_by_what_they_control():
-    case = {"program": [{"cycle": {}, "control": "load"}, {"cycle": {}, "control": "approach"}]}
-    assert [unit_of(f"program.{i}.cycle.mean", case) for i in range(3)] == ["N", "m", ""]
-    assert unit_of("program.0.cycle.period", case) == "s"
-    assert unit_of("surface.amplitude") == "m"
-
-
-def test_readable_setting__a_compliance_has_no_prefix():
-    assert readable_setting("material.glassy", 3e-7) == "3e-07 1/Pa"
-    assert material_words({"model": "power_law", "glassy": 3e-7, "time_scale": 60.0}).endswith("time scale 60 s")
