@@ -10,7 +10,7 @@ import roughvisc as rv
 PACKAGE = pathlib.Path(rv.__file__).parent
 #: Parts of each layer, lowest first. Files of one part may import each other.
 LAYERS = (
-    ("errors groups labels lazy notebook progress tables units variables",),
+    ("errors labels lazy notebook progress steps tables units variables",),
     ("mechanics", "topography"),
     ("experiment problem recorder settings solve",),
     ("observables",),
