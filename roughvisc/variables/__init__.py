@@ -92,7 +92,7 @@ VARIABLES: dict[str, Variable] = {
         "N",
         "normal force",
         "prescribed under load control, found under approach control",
-        ancillary=("force_error",),
+        ancillary=("force_error", "grid_error_force"),
         short="force",
         every_step=True,
         in_table="last",

@@ -10,6 +10,7 @@ from roughvisc.variables.entry import Variable
 #: Quantity -> variable that states its error.
 GRID_ERROR = {
     "pressure": "grid_error_pressure",
+    "force": "grid_error_force",
     "approach": "grid_error_approach",
     "mean_gap": "grid_error_gap",
     "contact_area": "grid_error_area",
@@ -21,6 +22,7 @@ _ERRORS = {
         "pressure",
         "its absolute values summed (L1) over the force, and from the force on cells at the contact's edge",
     ),
+    "grid_error_force": ("force", "zero where the force is prescribed"),
     "grid_error_approach": ("approach", "zero where the approach is prescribed; it counts from the highest point"),
     "grid_error_gap": ("mean gap", ""),
     "grid_error_area": ("contact area", "and from the number of faces at the contact's edge"),
