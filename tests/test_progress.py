@@ -8,7 +8,7 @@ from rich.console import Console
 
 import roughvisc as rv
 from roughvisc import progress
-from roughvisc.progress import Bar, reporting
+from roughvisc.progress import Bar
 
 
 @pytest.fixture
@@ -66,15 +66,8 @@ def test_time_left__follows_the_pace(pace, shown, monkeypatch):
             now[0] = 1000.0 + spent
             bar.reached(reached(spent), reached(100.0))
         left = bar._pace.left(reached(50.0), reached(100.0))
-        assert len(bar._pace._noted) < 180, "not every step"
         assert f", about {progress.clock(left)} left" in bar._line()
     assert 1 / factor < left / 50 < factor
-
-
-def test_time_left__of_steps_too_short_to_tell_is_finite(shown):
-    noted = [(0.0, 5.0), (1.0, np.nextafter(5.0, 6)), (2.0, np.nextafter(np.nextafter(5.0, 6), 6))]
-    assert 0 < progress.time_left(noted, 6.0) < np.inf
-    assert progress.time_left([(0.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 3.0) == 4.0, "it does not get on"
 
 
 def test_quiet__shows_nothing(shown):
@@ -83,24 +76,6 @@ def test_quiet__shows_nothing(shown):
         with Bar(console, "pressing") as bar:
             bar.reached(0.5, 2.0)
         assert console.file.getvalue() == ""
-
-
-def test_line__is_not_said_twice_in_a_row(shown):
-    console = shown(False)
-    with Bar(console, "pressing", lambda now, end: "half") as bar:
-        for _ in range(3):
-            bar.reached(0.0, 1.0)
-    assert console.file.getvalue() == "pressing: half, 0 s so far\n"
-
-
-def test_trade__says_each_setting_once(shown, monkeypatch):
-    console = shown(False)
-    monkeypatch.setattr(progress, "LINE_EVERY", 100.0)
-    with reporting(True, console=console) as report:
-        for label in ("coarse", "fine"):
-            report(label, 0.0, 1.0)
-            report(label, 0.5, 1.0)
-    assert console.file.getvalue() == "measuring coarse\nmeasuring fine\n"
 
 
 @pytest.mark.parametrize("wanted", [True, False])
