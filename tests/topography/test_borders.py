@@ -7,7 +7,6 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.topography.borders import boundary_of, is_periodic
 from roughvisc.topography.cards import boundary_after, boundary_of_card, condition, open_card
-from roughvisc.topography.synthesis import BOUNDARIES, RECIPES
 
 SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
 BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)
@@ -68,12 +67,6 @@ def test_boundary__is_the_one_that_a_surface_was_made_for(height, expected):
 )
 def test_boundary__of_what_was_changed_has_to_be_said(height):
     assert boundary_of(height) is None
-
-
-def test_boundaries__are_those_of_all_recipes():
-    assert BOUNDARIES.keys() == RECIPES.keys()
-    made = {"sphere": BALL, "cone": TIP, "flat_punch": PUNCH, "wavy": WAVES, "self_affine": ROUGH}
-    assert {name: boundary_of(height) for name, height in made.items()} == BOUNDARIES
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from strategies import examples, shapes
 
 from roughvisc.errors import InputError
-from roughvisc.topography.bandwidth import less_polynomial
 from roughvisc.topography.conditioning import (
     combine,
     crop,
@@ -152,13 +151,6 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
     np.testing.assert_array_equal(np.isnan(done.values), np.isnan(h.values) | hit)
     assert done.attrs["outliers"] == int((hit & np.isfinite(h.values)).sum())
     assert mask_outliers(h).attrs["outliers"] == 0
-
-
-def test_mask_outliers__keeps_a_flat_surface_and_a_step():
-    flat = from_array(np.full((21, 18), 0.1), CELL)
-    assert mask_outliers(flat).attrs["outliers"] == 0
-    step = flat + xr.where(flat.x > 2e-5, 1e-5, 0.0) + 1e-8 * rough((21, 18)).values / 1e-6
-    assert int(np.isnan(mask_outliers(step)).sum()) == 0
 
 
 @pytest.mark.skipif(not SCANS.exists(), reason="the real scans are not here")
@@ -360,11 +352,3 @@ def test_filled__of_either_face_stays_in_the_combination():
     assert both.attrs["fill_method"] == "harmonic, nearest"
     np.testing.assert_array_equal(combine(a.fillna(0), fill(b))["filled"], np.isnan(b))
     assert "filled" not in combine(a, b).coords
-
-
-@pytest.mark.parametrize("order", [0, 1, 2, 3])
-def test_less_polynomial__of_a_strip_is_that_of_a_line(order):
-    values = np.random.default_rng(order).normal(size=41)
-    rest = values - np.polynomial.Polynomial.fit(np.arange(41), values, order)(np.arange(41))
-    np.testing.assert_allclose(less_polynomial(values[:, None], order)[:, 0], rest, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(less_polynomial(values[None, :], order)[0], rest, rtol=0, atol=1e-12)

@@ -126,8 +126,3 @@ def test_door__gives_the_same_in_any_unit(door):
 @pytest.mark.parametrize("suffix", [".nc", ".x3p", ".sdf"])
 def test_file__holds_metres_whatever_the_unit_was(suffix, tmp_path):
     np.testing.assert_allclose(written(stated_in("um"), tmp_path, suffix), H, rtol=1e-9)
-
-
-def test_figure__of_a_surface_in_another_unit():
-    images = [rv.plot.surface(h).axes[0].get_images()[0].get_array() for h in (stated_in("um").T, H)]
-    np.testing.assert_allclose(*images, rtol=1e-9)

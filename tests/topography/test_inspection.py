@@ -2,11 +2,8 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from scan_files import CELL
 
 import roughvisc as rv
-from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.cards import condition
 from roughvisc.topography.inspection import inspect_scan
 from roughvisc.topography.readers import from_array
@@ -49,21 +46,6 @@ def test_tilt__and_form_by_their_coefficients():
     assert curved.steps["level"] == 2
     assert curved.form_share > 0.9
     assert curved.rms_flat == pytest.approx(float(rv.level(SMOOTH, 2).std()), rel=1e-9)
-
-
-def test_borders__of_a_surface_that_repeats_meet_and_of_a_part_do_not():
-    whole = border_mismatch(SMOOTH)
-    z = SMOOTH.values
-    across = [np.sqrt(np.mean((z[0] - z[-1]) ** 2)), np.sqrt(np.mean((z[:, 0] - z[:, -1]) ** 2))]
-    beside = [np.sqrt(np.mean((np.roll(z, 1, axis) - z)[1:] ** 2)) for axis in (0,)]
-    np.testing.assert_allclose(whole.of_rms, np.array(across) / z.std(), rtol=1e-12)
-    assert whole.of_neighbours[0] == pytest.approx(across[0] / beside[0], rel=1e-12)
-    assert not whole.jumps
-    part = with_values(z[:50, :41])
-    assert border_mismatch(part).jumps
-    assert inspect_scan(part).steps["mirror"] is True
-    assert not border_mismatch(rv.mirror(part)).jumps
-    assert border_mismatch(xr.zeros_like(part)).of_rms == (0.0, 0.0)
 
 
 def test_mirror__is_in_the_area_and_the_shape():
@@ -118,8 +100,3 @@ def test_noise__between_missing_points_is_found_and_overestimated_a_little(share
     assert 0.95 * 2e-9 < found.rms < (1 + off) * 2e-9
     none = inspect_scan(with_values(np.where(gaps, np.nan, SMOOTH.values))).noise
     assert not none.floor, "with as many gaps again the floor of filled points grows"
-
-
-def test_small_or_flat__has_no_spectrum():
-    assert inspect_scan(from_array(np.arange(12.0).reshape(4, 3) * 1e-6, CELL)).noise is None
-    assert inspect_scan(from_array(np.zeros((20, 20)), CELL)).noise is None

@@ -91,14 +91,6 @@ def test_real_scan__chosen_channel_is_named_and_others_listed():
 
 
 @real
-@pytest.mark.parametrize("name", ["di_corrupted.di", "nonsense_txt_file.txt"])
-def test_real_scan__bad_file_gives_one_clear_error(name):
-    message = refusal(SCANS / name)
-    assert "\n" not in message
-    assert len(message) < 500
-
-
-@real
 @pytest.mark.parametrize("name", ["opd-1.opd", "x3p-2.x3p", "gwyddion-export-english.txt"])
 def test_real_scan__is_detected_by_content(name, tmp_path):
     copy = tmp_path / "unknown.bin"
@@ -119,12 +111,6 @@ def test_round_trip__keeps_every_height_in_its_place(suffix, write, tmp_path):
     np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
     np.testing.assert_allclose(h.x, (np.arange(13) + 0.5) * 2e-6, rtol=1e-12)
     assert h.attrs["format"] == suffix
-
-
-def test_text_matrix__has_x_along_its_lines(tmp_path):
-    h = open_scan(write_text(tmp_path / "scan.asc"))
-    np.testing.assert_allclose(h, tilted(missing=False), rtol=1e-9)
-    np.testing.assert_allclose(spacing(h), CELL, rtol=1e-9)
 
 
 @pytest.mark.parametrize("order", [("x", "y"), ("y", "x")])
@@ -231,21 +217,6 @@ def test_refusal__implausible_spacing(cell, tmp_path):
     pytest.importorskip("x3pio").write(tmp_path / "s.x3p", tilted().T, x_scale=cell[0], y_scale=cell[1])
     assert "not plausible" in refusal(tmp_path / "s.x3p")
     np.testing.assert_allclose(spacing(open_scan(tmp_path / "s.x3p", spacing=CELL)), CELL)
-
-
-def test_refusal__options(tmp_path):
-    path = write_x3p(tmp_path / "s.x3p")
-    assert "states its unit as 'm'" in refusal(path, unit="um")
-    assert open_scan(path, unit="m").shape == SHAPE
-    for options, fragment in [
-        ({"unit": "parsec per"}, "unit"),
-        ({"unit": "s"}, "unit"),
-        ({"spacing": 0}, "spacing is 0"),
-        ({"spacing": (1, 2, 3)}, "spacing is (1, 2, 3)"),
-    ]:
-        with pytest.raises(InputError) as refused:
-            open_scan(path, **options)
-        assert fragment in str(refused.value)
 
 
 def test_supported_formats__names_those_of_all_libraries():

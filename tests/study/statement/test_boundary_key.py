@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from support import refused
 
@@ -104,12 +103,6 @@ def test_vary__to_another_surface_decides_anew(study):
     stated = read_study(study(BALL + BODY + '[solve]\nboundary = "free"\n'))
     assert vary(stated, {"surface": rough}).solving().boundary == "free"
     assert vary(Case.from_json(ball.to_json()), {"surface": rough}).solving().boundary == "free", "a result says it"
-
-
-def test_result__says_the_word(study):
-    ds = rv.run(read_study(study(ROUGH + BODY)), progress=False)
-    assert ds.attrs["boundary"] == "periodic"
-    assert np.isfinite(ds.pressure).all()
 
 
 def test_card__that_cannot_be_read_is_named(study, tmp_path):

@@ -195,13 +195,6 @@ def test_material__dynamic_from_csv(study, tmp_path, rows, keys):
     assert other is None or other.material() != material
 
 
-def test_material__relaxation_from_csv(study, tmp_path):
-    (tmp_path / "relaxation.csv").write_text("time [ms], modulus\n0, 3\n1000, 2\n2000, 1.5")
-    table = 'model = "relaxation_table"\nfile = "relaxation.csv"\nmodulus_unit = "MPa"\nkind = "tensile"'
-    material = read_study(study(with_material(table))).material()
-    assert material == materials.from_relaxation_table((0, 1, 2), (3e6, 2e6, 1.5e6), "tensile")
-
-
 def test_pair__is_varied_within(study):
     bodies = 'a = { model = "elastic", shear_modulus = 1 }\nb = { model = "tabulated", file = "creep.csv" }'
     path = study(with_material(f'model = "pair"\n{bodies}'))

@@ -104,30 +104,6 @@ def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_pa
             read(path)
 
 
-#: damage -> separator, decimal mark, and the last cell
-DAMAGE = {
-    "decimal commas between commas": (",", ",", None),
-    "two marks": (";", ",", "3.0625"),
-    "a word": (";", ",", "six"),
-    "two marks in one number": (";", ",", "1,5.25"),
-}
-
-
-@pytest.mark.parametrize(
-    ("reader", "damage"),
-    # a matrix with decimal commas between commas is the same text as one of twice as many whole numbers
-    [(r, d) for r in READERS for d in DAMAGE if "matrix" not in r or d != "decimal commas between commas"],
-)
-def test_text__that_is_ambiguous_or_damaged_is_refused(reader, damage, tmp_path):
-    suffix, rows, read, _ = READERS[reader]
-    separator, mark, last = DAMAGE[damage]
-    text = written(rows(separator), separator, mark).rstrip("\n")
-    path = tmp_path / f"numbers.{suffix}"
-    path.write_text(f"{text.rpartition(separator)[0]}{separator}{last}\n" if last else text)
-    with pytest.raises(InputError, match=r"numbers\.\w+"):
-        read(path)
-
-
 _ELASTIC, _LOAD = 'model = "elastic"\nshear_modulus = "1 MPa"', 'load = "1 mN"\nover = 0'
 
 
