@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -13,14 +12,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colorbar import Colorbar, make_axes
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
-from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked, leakage
@@ -51,8 +49,6 @@ _SHOWN, _SPIKE = 99.8, 1.2
 _EVEN = 0.5
 #: A map's short over its long side below which ticks along the short one would lie on each other.
 _THIN = 0.1
-#: Gap between a colour bar and its maps, and its width. [inch]
-_BAR_PAD, _BAR_WIDTH = 0.07, 0.1
 #: Length that every colour bar at the right has for its label. [inch]
 _LABELLED = 1.1
 
@@ -411,11 +407,7 @@ def colour_bar(
     x0, x1, y0, y1 = image.get_extent()
     flat = (y1 - y0) * len({ax.get_subplotspec().rowspan.start for ax in panels}) < 0.4 * (x1 - x0)
     location = location or ("bottom" if flat else "right")
-    # room is made for it by the layout; where in it the bar stands follows from its maps
-    axes, look = make_axes(panels, location=location, pad=0.02, fraction=0.06)
-    axes.set_axes_locator(partial(_along_maps, panels, location))
-    bar = figure.colorbar(image, cax=axes, extend=scale.extend, orientation=look["orientation"])
-    axes.set_axes_locator(partial(_of_any_aspect, axes.get_axes_locator()))
+    bar = figure.colorbar(image, ax=panels, location=location, pad=0.02, fraction=0.06, aspect=22, extend=scale.extend)
     said = unit.label(label or VARIABLES[scale.name].label)
     upright = location == "right"
     said = style.broken(said, _LABELLED) if upright else said
@@ -426,24 +418,6 @@ def colour_bar(
         bar.set_ticks([image.norm.vmin], labels=[f"{float(unit(scale.low)):.3g}"])
     bar.outline.set_linewidth(0.6)
     return bar
-
-
-def _along_maps(panels: Sequence[Axes], location: str, axes: Axes, renderer: Any) -> Bbox:
-    """Place of a colour bar: along maps as they lie when they are drawn, which the layout does not know."""
-    maps, room = Bbox.union([ax.get_position() for ax in panels]), axes.get_position(original=True)
-    width, height = axes.get_figure(root=True).get_size_inches()
-    if location == "right":
-        left = maps.x1 + _BAR_PAD / width
-        return Bbox.from_extents(left, maps.y0, left + _BAR_WIDTH / width, maps.y1)
-    middle, half = (room.y0 + room.y1) / 2, _BAR_WIDTH / height / 2
-    return Bbox.from_extents(maps.x0, middle - half, maps.x1, middle + half)
-
-
-def _of_any_aspect(place: Callable[[Axes, Any], Bbox], axes: Axes, renderer: Any) -> Bbox:
-    """The place that matplotlib gives a colour bar between its arrows, without the aspect that it sets with it."""
-    found = place(axes, renderer)
-    axes.set_box_aspect(None)
-    return found
 
 
 def _label_maps(axes: np.ndarray, dataset: xr.Dataset, titles: Sequence[str]) -> None:

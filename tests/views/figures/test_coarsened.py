@@ -7,8 +7,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc import recorder as chunks
 from roughvisc.study.storage import store
-from roughvisc.topography.grid import cell_edges
-from roughvisc.views.figures import coarsened, sections
+from roughvisc.views.figures import coarsened
 
 SHAPE, CELL = (50, 37), (2e-6, 3e-6)
 
@@ -75,12 +74,6 @@ def test_present__keeps_the_extremes_of_every_block(coarse):
         np.testing.assert_allclose(drawn["displacement"][i, j], block["displacement"].mean(), rtol=1e-12)
 
 
-def test_present__lies_where_the_cells_lie(coarse):
-    drawn, ds = coarsened.present(result(), "gap", 0), result()
-    for axis, count in zip(("x", "y"), SHAPE, strict=True):
-        np.testing.assert_allclose(cell_edges(drawn[axis])[: count // 4 + 1], cell_edges(ds[axis])[: count + 1 : 4])
-
-
 def test_maps__show_a_lone_spot_and_say_so(coarse):
     figure = rv.plot.maps(result(), times=[0.1, 0.2])
     images = [image for ax in figure.axes for image in ax.images if image.get_gid() == "pressure"]
@@ -108,25 +101,3 @@ def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(s
     assert contact.chunks
     assert max(int(np.prod(shape)) for shape in shapes) == SHAPE[0] * SHAPE[1], "a frame"
     xr.testing.assert_equal(contact.compute(), rv.observables.contact(loaded))
-
-
-def test_deformed_line__is_that_of_the_whole_surface(coarse):
-    ds = result(displacement=True)
-    for one in (ds, ds.drop_vars("gap"), ds.drop_vars("displacement")):
-        whole = sections.deformed_surface(one, 1)
-        np.testing.assert_allclose(sections.deformed_surface(one, 1, y=13), whole.isel(y=13), rtol=1e-12)
-    np.testing.assert_allclose(sections.deformed_surface(ds, 1), ds["height"] + ds["gap"].isel(time=1), atol=1e-15)
-
-
-def test_surface__of_many_points_tells_its_extremes(coarse):
-    height = result()["height"]
-    height.attrs["units"] = "m"
-    before = height.copy(deep=True)
-    height[3, 4] = np.nan
-    figure = rv.plot.surface(height)
-    assert figure.axes[0].images[0].get_array().shape == (10, 13)
-    told = figure.get_supxlabel().replace("\n", " ")
-    assert "4 × 4" in told
-    for end in (before.min(), before.max()):
-        assert f"{float(end) * 1e6:.3g} µm" in told
-    assert int(height.isnull().sum()) == 1, "the heights given stay as they are"

@@ -58,11 +58,6 @@ def test_friction__draws_the_theory():
         rv.plot.friction(curve().drop_vars("persson_contact_fraction"), persson=True)
 
 
-def test_friction__of_a_body_without_it_and_of_one_speed():
-    one = curve().isel(speed=[1]).assign(friction_coefficient=("speed", [0.0]))
-    assert rv.plot.friction(one).axes[0].get_ylim() == (0, 1)
-
-
 @pytest.mark.parametrize("other", [xr.Dataset(), 3, curve().rename(speed="time")])
 def test_friction__refuses_what_is_no_friction_result(other):
     with pytest.raises(rv.InputError, match="friction_coefficient"):
@@ -193,18 +188,3 @@ def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
     assert ax.get_xlabel() == "Sliding distance [µm]"
     with pytest.raises(rv.InputError, match="sliding_distance"):
         rv.plot.friction_against_distance(slid.drop_vars("sliding_distance"))
-
-
-def test_figures_of_rows__name_the_speeds():
-    """In the order of the speeds, whatever that of the rows."""
-    wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1)
-    rubber = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e3)
-    ds = rv.friction(wave, rubber, pressure=5e4, speeds=[0.1, 1e-3], fields=["pressure", "gap"], progress=False)
-    over_speed = rv.plot.history(ds)
-    assert [ax.get_xlabel() for ax in over_speed.axes if ax.get_xlabel()][-1] == "Speed [mm/s]"
-    (fraction,) = (ax for ax in over_speed.axes if ax.get_ylabel().startswith("Contact area"))
-    line = fraction.get_lines()[0]
-    assert line.get_xdata().tolist() == [1.0, 100.0]
-    assert (np.diff(line.get_ydata()) < 0).all() == (np.diff(ds.sortby("speed").contact_area) < 0).all()
-    assert rv.plot.section(ds, time=0.1).axes[0].get_title(loc="right").startswith("V = 100 mm/s")
-    assert rv.plot.maps(ds, times=[1e-3]).axes[0].get_title(loc="left").partition("  ")[2].startswith("→ V = 1 mm/s")

@@ -44,11 +44,6 @@ def test_figures__refuse_many_cases_and_other_things(draw):
 # ---------------------------------------------------------------------------------------------------- histories
 
 
-def test_time_axis__is_logarithmic_for_times_over_decades():
-    assert not rows.RowAxis.of(np.linspace(0, 5, 500)).logarithmic
-    assert rows.RowAxis.of(np.r_[0, np.geomspace(1e-3, 1e3, 30)]).logarithmic
-
-
 def test_frames__show_contact_and_its_largest_extent():
     time = np.linspace(0.0, 1.0, 21)
     area = np.where((time > 0.1) & (time < 0.8), 1.0, 0.0)
@@ -97,11 +92,6 @@ def test_history__crosses_out_steps_that_did_not_converge():
     (crossed,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
     np.testing.assert_allclose(crossed.get_xdata(), ds["time"][3])
     assert "not converged" in told(figure)
-
-
-def test_history__of_a_result_with_few_variables():
-    ds = made.hertz_creep()[["force", "approach", "height"]]
-    assert [ax.get_ylabel() for ax in plot.history(ds).axes] == ["Force [mN]", "Approach [µm]"]
 
 
 def test_area_against_load__one_line_per_case_and_the_low_load_line():
