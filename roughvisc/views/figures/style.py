@@ -115,7 +115,7 @@ def note_below(figure: Figure, *notes: str) -> None:
     """What a reader has to know besides, below all panels, in lines that are no longer than the figure is wide."""
     width = int((figure.get_figwidth() - 0.2) / _LETTER)
     if lines := [line for note in notes if note for line in textwrap.wrap(note, width)]:
-        figure.supxlabel("\n".join(lines), fontsize=SMALL)
+        figure.supxlabel("\n".join(["", *lines]), fontsize=SMALL)  # clear of the labels of the panels
 
 
 def marker_of(count: int) -> str:
