@@ -51,7 +51,7 @@ FIGURES = {
         "leakage": lambda ds: rv.plot.maps(ds, fields="flux"),
     },
     "friction": {
-        "curve": lambda ds: rv.plot.friction(ds, persson=True),
+        "curve": lambda ds: rv.plot.friction(ds.merge(rv.observables.persson(ds))),
         "maps": rv.plot.maps,
     },
     "stability_map": {},  # drawn by its script

@@ -28,7 +28,6 @@ from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, Slidi
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.operator import Boundary
-from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import SteadyState
 from roughvisc.mechanics.stepping.program import Direction
 from roughvisc.problem import Problem
@@ -207,9 +206,6 @@ class SlidingRows(Rows):
         found = self._face.slide(sliding, self._force, tolerance)
         row, fields = self._row(found)
         row["friction_force_across"] = sliding.force_across(on_rows(found.pressure, sliding))
-        theory = persson(sliding, on_rows(self._face.gap, sliding), row["nominal_pressure"])
-        row["persson_friction_coefficient"] = theory.friction_coefficient
-        row["persson_contact_fraction"] = theory.contact_fraction
         if self._coarser is not None:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
         row["convolutions"] = sliding.convolutions

@@ -19,6 +19,7 @@ from roughvisc.observables.area_theories import area_by_theory
 from roughvisc.observables.conductance import conductance
 from roughvisc.observables.cycles import cycle_work
 from roughvisc.observables.densities import gap_distribution, pressure_distribution
+from roughvisc.observables.friction_theory import persson
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.observables.response import history
@@ -35,6 +36,7 @@ __all__ = [
     "history",
     "incremental_stiffness",
     "leakage",
+    "persson",
     "pressure_distribution",
 ]
 

@@ -103,7 +103,7 @@ _TOLD = {
 
 
 @style.apply
-def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
+def friction(dataset: xr.Dataset) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
     Speeds whose iteration did not converge are drawn as open circles. Bands show the error of the grid, if the
@@ -112,9 +112,8 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.friction`, or of a study of friction.
-    persson : bool
-        Whether to draw Persson's theory of the same waves too, as dotted lines.
+        Of :func:`roughvisc.friction`, or of a study of friction. Merged with the result of
+        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines.
 
     Returns
     -------
@@ -125,7 +124,7 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     InputError
         If the Dataset is not one of friction over the speed.
     """
-    for name in [one for solved, theory, *_ in _DRAWN for one in (solved, theory)[: 1 + persson]]:
+    for name, *_ in _DRAWN:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
             raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")
     ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
@@ -134,7 +133,7 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     figure = style.new_figure(3.8, 3.0)
     ax = figure.add_subplot()
     for axes, names, colour in zip((ax, ax.twinx()), _DRAWN, (style.BLUE, style.CONTACT), strict=True):
-        told |= _draw(axes, ordered, names, across, colour, persson)
+        told |= _draw(axes, ordered, names, across, colour)
     if len(told) > 1:
         known = [name for name in _TOLD if name in told]
         figure.set_figheight(3.0 + 0.18 * len(known))
@@ -146,7 +145,7 @@ def friction(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
 
 
 def _draw(
-    axes: Axes, ordered: xr.Dataset, names: tuple[str, str, str], across: Unit, colour: str, persson: bool
+    axes: Axes, ordered: xr.Dataset, names: tuple[str, str, str], across: Unit, colour: str
 ) -> dict[str, Line2D | Patch]:
     """One quantity on its axis; entries of a legend for what is drawn beside the solution."""
     solved, theory, grid = names
@@ -162,7 +161,7 @@ def _draw(
         axes.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
         told["grid"] = Patch(color="0.3", alpha=0.25, lw=0)
         most.append((values + error)[np.isfinite(error)])
-    if persson:
+    if theory in ordered:
         axes.plot(speed, ordered[theory].values, ":", color=colour, label=SLIDING[theory].label)
         told["theory"] = Line2D([], [], color="0.3", ls=":")
         most.append(ordered[theory].values)

@@ -50,12 +50,10 @@ def test_friction__open_circles_where_not_converged():
 
 
 def test_friction__draws_the_theory():
-    figure = rv.plot.friction(curve(), persson=True)
+    figure = rv.plot.friction(curve())
     dotted = [line for ax in figure.axes for line in ax.lines if line.get_linestyle() == ":"]
     assert [line.get_ydata().tolist() for line in dotted] == [[0.02, 0.3, 0.5], [0.18, 0.09, 0.01]]
     assert figure.axes[0].get_ylim()[1] > 0.5
-    with pytest.raises(rv.InputError, match="persson_contact_fraction"):
-        rv.plot.friction(curve().drop_vars("persson_contact_fraction"), persson=True)
 
 
 @pytest.mark.parametrize("other", [xr.Dataset(), 3, curve().rename(speed="time")])
