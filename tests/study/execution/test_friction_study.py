@@ -183,31 +183,3 @@ def test_plan__counts_speeds_and_says_what_it_refuses(case):
     assert costs.attrs["refusal"] == ""
     fluid = vary(case(), {"material": {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}})
     assert "creeps without end" in rv.plan([fluid]).attrs["refusal"]
-
-
-def test_plan__expects_about_the_work_that_is_done(case, tmp_path):
-    ds = rv.run(case(), tmp_path, progress=False)
-    done = float(ds.convolutions.sum())
-    assert 0.5 * done < float(rv.plan([case()]).convolutions[0]) < 2 * done
-
-
-def test_command__runs_plots_and_reports(invoke, tmp_path, coarse_pictures):
-    (tmp_path / "slide.toml").write_text(with_beside())
-    status, out, err = invoke("run", "slide.toml")
-    assert (status, err) == (0, "")
-    for words in (
-        "4, from V = 2 mm/s to V = 2 m/s, along x",
-        "the largest",
-        "grid error of friction",
-    ):
-        assert words in " ".join(out.split())
-    drawn = {p.stem.rpartition("-")[2] for p in (tmp_path / "results" / "slide").glob("*.png")}
-    assert drawn == {"friction", "maps"}
-    status, out, _ = invoke("plan", "slide.toml")
-    assert (status, "Speeds per case" in out, "Steps per case" in out) == (0, True, False)
-    status, _, _ = invoke("report", "results/slide")
-    page = (tmp_path / "results" / "slide" / "report.html").read_text()
-    assert status == 0
-    for words in ("Largest friction coefficient", "4 speeds, 2 mm/s to 2 m/s, pressure 20 kPa, along x"):
-        assert words in page
-    assert invoke("verify", "results/slide")[0] == 0

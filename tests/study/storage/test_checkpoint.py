@@ -2,16 +2,12 @@
 
 import errno
 import logging
-import math
 import os
-import random
 import shutil
 import subprocess
 import sys
 import threading
 from contextlib import nullcontext
-from dataclasses import fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,30 +15,13 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InUseError
-from roughvisc.experiment.loading import Loading, LoadingState
-from roughvisc.mechanics.bodies.body import body_of
 from roughvisc.mechanics.bodies.transforms import transform_library
-from roughvisc.mechanics.hereditary.direct import Block, HistoryState
-from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.sparse import Sparse
-from roughvisc.mechanics.stepping.state import ControllerState, Instant, State
-from roughvisc.problem import Problem
-from roughvisc.recorder import Checkpoint, MemoryRecorder
-from roughvisc.settings import Settings
-from roughvisc.solve import solve
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
-from roughvisc.study.storage.checkpoint import CheckpointWriter, RowFile, load_checkpoint, save_checkpoint
 from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.store import open_result
-
-
-def loaded(path, key):
-    """How far a run through a program has come."""
-    return load_checkpoint(path, key, Loading.states)
-
 
 # Recovers after a jump down, holds the approach, and keeps times that no step would land on by itself.
 MODES = """
@@ -201,144 +180,8 @@ def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name,
         assert names(folder) == [path.name]
 
 
-@pytest.mark.parametrize("text", [GROWING, FOLLOWING])
-def test_growing__grows_before_and_after_the_cut(whole, tmp_path, text):
-    """Otherwise the test above would not test it."""
-    case, _, steps = whole(text)
-    growths = []
-    for cut in (1, steps // 2, steps):
-        folder = stopped(case, tmp_path / str(cut), cut)
-        growths.append(loaded(folder / "checkpoint.0", case.key).state.growths)
-    assert growths == sorted(growths)
-    assert 0 <= growths[0] < growths[-1]
-
-
-def test_direct__keeps_every_pressure(whole, tmp_path):
-    """Those of 32 instants are gathered into one block; the jump of the program has two instants and is one row."""
-    case, _, steps = whole(DIRECT)
-    folder = stopped(case, tmp_path, steps - 5)
-    instants = steps - 5 + 1
-    memory = loaded(folder / "checkpoint.0", case.key).state.march.memory
-    assert isinstance(memory, HistoryState)
-    assert instants > 32
-    assert [len(block.pressures) for block in memory.blocks] == [32] * (instants // 32) + [1] * (instants % 32)
-    assert len(memory.times) == instants
-    assert np.count_nonzero(np.diff(memory.times) == 0) == 1
-
-
-def test_checkpoint__holds_the_state_exactly(tmp_path):
-    strange = np.array([[0.1, -0.0, np.inf], [np.nan, 5e-324, 1 / 3]])
-    now = Instant(0.1 + 0.2, Sparse.of(strange.T), np.float64(1e-310), -0.0)
-    modes = ModesState(np.zeros((0, 2, 3)), strange, None, 1 / 3)
-    history = HistoryState((2, 3), np.array([0.0, 0.1]), (Block(np.zeros(0, np.intp), np.zeros((1, 0))),))
-    for memory in (modes, history):
-        state = State(now, strange, memory, before=None, pace=ControllerState(0.1, 0.5, True), convolutions=2**40)
-        reached = Checkpoint(LoadingState(state, (0.1, 2e-7), 3, 0.1), 0.1 + 0.2, 2, 1e-17)
-        save_checkpoint(tmp_path / "c", reached, "key")
-        back = loaded(tmp_path / "c", "key")
-        assert repr(replace(back, state=None)) == repr(replace(reached, state=None))
-        for field in fields(State):
-            if field.name not in ("now", "displacement", "memory"):
-                assert getattr(back.state.march, field.name) == getattr(state, field.name), field.name
-        assert repr(replace(back.state, march=None)) == repr(replace(reached.state, march=None))
-        assert back.state.march.before is None
-        assert (back.state.march.now.force, math.copysign(1, back.state.march.now.approach)) == (1e-310, -1)
-        assert back.state.march.now.pressure.flags.c_contiguous
-        assert back.state.march.now.pressure.tobytes() == strange.T.tobytes()
-        assert back.state.march.displacement.tobytes() == strange.tobytes()
-        assert type(back.state.march.memory) is type(memory)
-        for field in fields(memory):
-            one, other = getattr(back.state.march.memory, field.name), getattr(memory, field.name)
-            if isinstance(other, np.ndarray):
-                assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
-    assert back.state.march.memory.shape == (2, 3)
-    assert back.state.march.memory.blocks[0].cells.dtype == np.intp
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # what a crash leaves
-
-
-def after_steps(count):
-    """How far a run has come after so many steps of a second."""
-    nothing = np.zeros((3, 2))
-    at_rest = Sparse.of(nothing)
-    states = [State(Instant(float(n), at_rest, 0.0, 0.0), nothing, None) for n in range(1, count + 1)]
-    return [Checkpoint(LoadingState(state), done=state.now.time) for state in states]
-
-
-def last_saved(folder):
-    """Time of the latest checkpoint, zero if there is none. [s]"""
-    found = [loaded(folder / f"checkpoint.{n}", "key") for n in (0, 1)]
-    return max((reached.done for reached in found if reached is not None), default=0.0)
-
-
-def test_rows__are_counted_with_and_without_values():
-    """Under a given approach, steps of a soft material that are not kept leave no row."""
-    seen = []
-
-    class Noting(MemoryRecorder):
-        def update(self, reached):
-            seen.append((reached.rows, 4 + len(self.rows.plain), reached.done, reached.wall_time))
-
-    recorder = Noting()
-    recorder.latest = Checkpoint(rows=4, wall_time=1.0)
-    ball, soft = rv.sphere(1e-3, 3e-4, (9, 11)), rv.kelvin_voigt(1e6, 1e5)
-    press, settings = Loading(rv.Program().approach(1e-6, over=1.0)), Settings(times=3, tolerance=1e-2)
-    solve(Problem(ball, body_of(soft), settings), press, recorder)
-    counted, held, done, wall_times = (np.array(each) for each in zip(*seen, strict=True))
-    assert np.array_equal(counted, held)
-    assert set(np.diff(counted)) == {0, 1}
-    assert np.all(np.diff(done) > 0)
-    assert done[-1] == 1.0
-    assert np.all(np.diff([1.0, *wall_times]) > 0)
-
-
-def test_keeper__writes_a_checkpoint_after_so_many_steps(tmp_path):
-    keeper = CheckpointWriter(tmp_path / "run", "key", seconds=1e9, steps=3)
-    saved = []
-    for reached in after_steps(7):
-        keeper.update(reached)
-        saved.append(last_saved(tmp_path / "run"))
-    keeper.close()
-    assert saved == [0, 0, 3, 3, 3, 6, 6]
-
-
-def test_keeper__takes_no_more_than_a_twentieth_of_the_time(tmp_path, monkeypatch):
-    """A step takes 10 s and a checkpoint 4 s. The first is written after 30 s, the next ones after 80 s each."""
-    clock, write = [0.0], checkpoint_module.save_checkpoint
-    monkeypatch.setattr(checkpoint_module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-
-    def slowly(*given):
-        clock[0] += 4.0
-        write(*given)
-
-    monkeypatch.setattr(checkpoint_module, "save_checkpoint", slowly)
-    keeper = CheckpointWriter(tmp_path / "run", "key", seconds=30.0)
-    saved = []
-    for reached in after_steps(20):
-        clock[0] += 10.0
-        keeper.update(reached)
-        saved.append(last_saved(tmp_path / "run"))
-    keeper.close()
-    assert sorted(set(saved)) == [0, 3, 11, 19]
-
-
-def test_damaged_checkpoint__is_found_out_wherever_it_is_damaged(whole, tmp_path):
-    case, _, steps = whole(GROWING)
-    path = stopped(case, tmp_path, steps // 2) / "checkpoint.0"
-    sound = path.read_bytes()
-    state = loaded(path, case.key).state
-    draw = random.Random(1)
-    for where in [*range(0, 200, 7), *(draw.randrange(len(sound)) for _ in range(200))]:
-        path.write_bytes(sound[:where])
-        assert loaded(path, case.key) is None
-        path.write_bytes(sound[:where] + bytes([sound[where] ^ (1 << draw.randrange(8))]) + sound[where + 1 :])
-        assert loaded(path, case.key) is None
-        path.write_bytes(sound[:where] + bytes(len(sound) - where - 1) + b"x")  # length as it was, blocks not written
-        assert loaded(path, case.key) is None
-    path.write_bytes(sound)
-    assert loaded(path, case.key).state.march.now.time == state.march.now.time
 
 
 @pytest.mark.parametrize("damaged", [("checkpoint.0",), ("checkpoint.1",), ("checkpoint.0", "checkpoint.1"), ("rows",)])
@@ -581,31 +424,6 @@ def test_seed_method__begins_again(tmp_path):
     assert values(run_case(case, tmp_path / "out")) == expected
 
 
-@pytest.mark.parametrize("room", [0, 100_000])
-def test_memory__does_not_grow_with_kept_rows(room, whole, tmp_path, monkeypatch):
-    case, expected, _ = whole(MODES)
-    held_arrays = []
-    append = RowFile.append
-
-    def appended(self, plain, arrays):
-        append(self, plain, arrays)
-        held_arrays.append(sum(array.nbytes for array in arrays_in(list(vars(self).values()))))
-
-    monkeypatch.setattr(checkpoint_module, "_WAITING", room)
-    monkeypatch.setattr(RowFile, "append", appended)
-    assert values(run_case(case, tmp_path)) == expected
-    assert max(held_arrays) <= room
-    assert (max(held_arrays) > 0) == (room > 0)
-
-
-def arrays_in(value):
-    """Every array in nested lists and dictionaries."""
-    if isinstance(value, np.ndarray):
-        yield value
-    for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from arrays_in(part)
-
-
 def test_lock__of_a_process_that_is_being_cleared_away_is_waited_for(tmp_path):
     fcntl = pytest.importorskip("fcntl")
     path = tmp_path / "lock"
@@ -615,22 +433,3 @@ def test_lock__of_a_process_that_is_being_cleared_away_is_waited_for(tmp_path):
         with lock_case(path):
             assert path.exists()
     assert not path.exists()
-
-
-@pytest.mark.parametrize("name", ["modes", "sliding"])
-def test_checkpoint_of_the_former_format__is_not_gone_on_from(whole, tmp_path, caplog, name):
-    """Its rows have areas of another meaning: the run begins anew, and no row is left of them."""
-    case, expected, steps = whole(CASES[name])
-    unfinished = stopped(case, tmp_path, steps // 2)
-    for path in unfinished.glob("checkpoint.*"):
-        with open(path, "rb", buffering=0) as stream:
-            plain, arrays = checkpoint_module.read_record(stream)
-        del plain["result_format"]  # former versions state none
-        with open(path, "wb", buffering=0) as stream:
-            checkpoint_module.write_record(stream, plain, arrays)
-    stop = Stop()
-    with caplog.at_level(logging.WARNING, "roughvisc"):
-        path = run_case(case, tmp_path, stop=stop)
-    assert stop.asked == steps
-    assert "belongs to another case or revision and is not used" in caplog.text
-    assert values(path) == expected
