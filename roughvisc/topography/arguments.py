@@ -33,5 +33,5 @@ def _word(*words: str) -> Argument:
 ORDER = Argument("0 (mean), 1 (plane), 2 or 3", lambda value: _whole(value) and 0 <= value <= 3)
 WINDOW = Argument("an odd whole number of at least 3", lambda value: _whole(value) and value >= 3 and value % 2 == 1)
 TURNS = Argument("a whole number of quarter turns", _whole)
-FILL = _word("harmonic", "nearest", "linear")
+FILL = _word("harmonic", "nearest")
 KEEP = _word("long", "short")

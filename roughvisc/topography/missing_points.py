@@ -76,17 +76,16 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     return noted(like(h, np.where(outlier, np.nan, h.values)), line, outliers=count + h.attrs.get("outliers", 0))
 
 
-def fill(h: xr.DataArray, method: Literal["harmonic", "nearest", "linear"] = "harmonic") -> xr.DataArray:
+def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -> xr.DataArray:
     """Fill missing points, and mark them as filled.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
-    method : {"harmonic", "nearest", "linear"}, default "harmonic"
+    method : {"harmonic", "nearest"}, default "harmonic"
         "harmonic": a membrane over each hole (Laplace's equation, no flux through the border of the scan). "nearest":
-        the value of the nearest valid point. "linear": linear interpolation on triangles between valid points, and the
-        nearest value outside them.
+        the value of the nearest valid point.
 
     Returns
     -------
@@ -178,25 +177,7 @@ def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float
     return heights[nearest[0][missing], nearest[1][missing]]
 
 
-def _linear(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:
-    """Heights on the triangles between points present, of each missing point. [m]"""
-    from scipy.interpolate import LinearNDInterpolator
-    from scipy.spatial import QhullError
-
-    found = _nearest(heights, missing, sides)
-    # the points that border a hole are enough; all would be triangulated for minutes
-    rim = scipy.ndimage.binary_dilation(missing, np.ones((3, 3)), iterations=2) & ~missing
-    steps = np.array(sides)
-    try:
-        between = LinearNDInterpolator(np.argwhere(rim) * steps / steps.max(), heights[rim])
-    except QhullError:  # all on one line: the nearest are all there is
-        return found
-    inside = between(np.argwhere(missing) * steps / steps.max())
-    return np.where(np.isnan(inside), found, inside)
-
-
 _FILLS = {
     "harmonic": lambda heights, missing, sides: harmonic(heights, missing),
     "nearest": _nearest,
-    "linear": _linear,
 }
