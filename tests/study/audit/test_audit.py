@@ -139,9 +139,9 @@ def test_stickiness__of_a_wave_is_its_energy_of_full_contact():
 
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.4, "bonded"), (0.5, "bonded"), (0.3, "slipping")])
-@pytest.mark.parametrize("width", [0.5, *(pytest.param(one, marks=pytest.mark.long) for one in (0.1, 1.5))])
+@pytest.mark.parametrize("width", [0.5, *(pytest.param(one, marks=pytest.mark.long) for one in (0.1, 0.8))])
 def test_thickness__predicts_the_force_on_the_sheet(poisson, base, width):
-    """Run with and without the sheet, over contact radii of a tenth to one and a half thicknesses."""
+    """Run with and without the sheet, over contact radii of 0.1 to 0.8 thicknesses."""
     a = 2e-4
     load = 4 * 2e6 / (1 - poisson) * a**3 / (3 * RADIUS)
     heights, material = rv.sphere(RADIUS, 5.2e-4, 26), rv.elastic(1e6, poisson)
@@ -151,7 +151,9 @@ def test_thickness__predicts_the_force_on_the_sheet(poisson, base, width):
     found = rv.audit(half_space, thickness=a / width, base=base)["thickness"]
     assert found.number == pytest.approx(1 - float(half_space.force[-1] / sheet.force[-1]), rel=0.05)
     assert rv.audit(sheet)["thickness"].verdict == "holds"
-    assert rv.audit(sheet, thickness=a)["thickness"].verdict == "not known", "the result is for another sheet"
+    assert rv.audit(sheet, thickness=2 * a / width)["thickness"].verdict == "not known", (
+        "the result is for another sheet"
+    )
 
 
 @pytest.mark.parametrize("thickness", [3e-4, 1e-4])
