@@ -139,9 +139,11 @@ def test_scan_that_a_worker_cannot_read__fails_no_case(study, tmp_path):
     assert cases[0].key, "this process has read the scan"
     (tmp_path / "rough.nc").rename(tmp_path / "elsewhere.nc")
     with thread_workers(1) as client:
+        ((address, _),) = client.nthreads().items()
         (outcome,) = run_cases(cases, tmp_path / "out", watch=Monitor(), client=client).values()
     assert outcome.kind == "hindered"
     assert str(tmp_path / "rough.nc") in outcome.message
+    assert address in outcome.message
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
 

@@ -12,6 +12,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 import xarray as xr
+from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InUseError
@@ -354,7 +355,8 @@ def test_changed_study__does_not_use_what_is_not_its_own(whole, tmp_path, caplog
     assert "belongs to another case or revision and is not used" in caplog.text
     assert names(tmp_path) == sorted([unfinished.name, f"{other.key}.nc"])
     (tmp_path / f"{other.key}.nc").rename(tmp_path / f"{case.key}.nc")
-    assert values(run_case(case, tmp_path)) == whole(MODES)[1]
+    with refused(found=other.key):  # it is whole, and not damaged
+        run_case(case, tmp_path)
 
 
 @pytest.mark.parametrize("what", ["NUMERICS_REVISION", "RESULT_FORMAT", "_LAYOUT"])
