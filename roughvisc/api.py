@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
+from roughvisc.labels import warnings_of
 from roughvisc.mechanics.bodies.body import Body, body_of
 from roughvisc.mechanics.materials.models import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
@@ -64,8 +66,7 @@ def simulate(
     tolerance : float
         Relative tolerance on ``stated_error`` at each output time: the error of pressure (L1), force and approach from
         time steps, contact solver and exponential series, over the largest force and approach of the kept rows so far.
-        Rows that exceed it state their error, and the attribute ``warnings`` counts
-        them. The grid error is not included.
+        If rows exceed it, a ``UserWarning`` and the attribute ``warnings`` count them. The grid error is not included.
     times : int or sequence of float or str, optional
         Output times, reached exactly: a number of times (the corners of the program, and the others where the result
         changes most); a list; or None for all corners and every accepted step that meets the tolerance. [s]
@@ -129,7 +130,7 @@ def simulate(
         grid_error=grid_error,
     )
     problem = Problem(height, body_of(material), settings)
-    return solve(problem, Loading(program), progress=progress, threads=threads)
+    return _warned(solve(problem, Loading(program), progress=progress, threads=threads), 3)
 
 
 @quantities(speeds="m/s", load="N", pressure="Pa")
@@ -185,6 +186,11 @@ def friction(
     InputError
         If the input is invalid, or the material creeps without limit and the profile varies across the motion.
 
+    Warns
+    -----
+    UserWarning
+        If the contact at a speed is not solved. Its values are NaN and its ``status`` says so; the others are valid.
+
     Notes
     -----
     In the steady state the friction force times the speed equals the power dissipated in the material. The force is
@@ -212,7 +218,15 @@ def friction(
     )
     problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
-    return found.assign_attrs(title="Steady sliding")
+    return _warned(found.assign_attrs(title="Steady sliding"), 4)
+
+
+def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
+    """Return a result after one Python warning each of missed tolerances and unsolved speeds."""
+    stated = warnings_of(dataset.attrs)
+    for text in filter(None, (stated.get("tolerance"), stated.get("speeds"))):
+        warnings.warn(text, UserWarning, level)
+    return dataset
 
 
 def run(
@@ -259,7 +273,8 @@ def run(
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.
     ConvergenceError
-        If a step did not converge. The result is written nevertheless, and the message names the file.
+        If the contact of a step or at a speed is not solved. The result with the other speeds is written, and the
+        message names the file.
     """
     from roughvisc.study.execution.single import run_stated
     from roughvisc.study.statement.case import Case, read_study

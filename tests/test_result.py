@@ -173,6 +173,6 @@ def test_warnings__are_one_attribute_of_one_line_each(tmp_path):
     numerics = rv.Numerics(time_step=0.05)
     program = rv.Program().pressure(1e4, over=0.1)
     ds = rv.simulate(tilted, RUBBER, program, boundary="periodic", numerics=numerics, progress=False)
-    assert {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()} == {"accuracy", "border", "slope"}
+    assert {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()} == {"border", "slope", "tolerance"}
     ds.to_netcdf(tmp_path / "tilted.nc")
     assert rv.open_result(tmp_path / "tilted.nc").attrs["warnings"] == ds.attrs["warnings"]

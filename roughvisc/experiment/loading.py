@@ -21,6 +21,7 @@ from roughvisc.experiment.notes import (
     edge_note,
     slope_note,
     surface_stands_alone,
+    tolerance_note,
     wake_note,
 )
 from roughvisc.experiment.profile import Profile, quarter, unfold, uses_window
@@ -366,12 +367,13 @@ class LoadingRows(Rows):
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
+        stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
         # of what was pressed, a series or not; of layers those of the top one
         pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.final}
         return {
             "memory": choice.note,
             "series_error": choice.series_error,
-            "warnings": warnings_text({"accuracy": accuracy_note(scene, dataset), **warnings}),
+            "warnings": warnings_text(stated | warnings),
             **({} if isinstance(choice.memory, WaveMemory) else pressed),
         }
 

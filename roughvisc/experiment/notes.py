@@ -14,6 +14,7 @@ from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import grown
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import said
+from roughvisc.variables import NOT_CONVERGED
 
 Array = NDArray[np.float64]
 #: Part of all creep that is still to recover after a period, from which on a result says so. Friction of a sphere on a
@@ -103,30 +104,46 @@ LARGEST_SLOPE = 0.3
 _AT_ONCE = 0.1
 
 
-def accuracy_note(scene: Scene, dataset: xr.Dataset) -> str:
-    """Where the tolerance is not promised, or was not reached; empty if it is."""
-    notes = []
+def accuracy_note(scene: Scene) -> str:
+    """Say which errors may exceed the tolerance because hardly any compliance is instantaneous; empty otherwise."""
     at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
     if at_once == 0:
-        notes.append(NO_JUMP)
-    elif at_once < _AT_ONCE * final:
-        notes.append(
+        return NO_JUMP
+    if at_once < _AT_ONCE * final:
+        return (
             f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
             "approach, nearly jump in each cell that makes contact. The approach meets the tolerance; each row "
             "states its own error of pressure, force and work."
         )
+    return ""
+
+
+def tolerance_note(scene: Scene, dataset: xr.Dataset) -> str:
+    """Count the rows whose stated error exceeds the tolerance; empty if there are none."""
     errors = dataset["stated_error"].values
     missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
-    if missed.size:
-        fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
-        if scene.motions:
-            fixed += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
-        says = "states" if missed.size == 1 else "state"
-        notes.append(
-            f"{missed.size} of {errors.size} rows {says} an error above the tolerance, {errors[missed].max():.2g} at "
-            f"worst (stated_error).{fixed}"
-        )
-    return " ".join(notes)
+    if not missed.size:
+        return ""
+    fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
+    if scene.motions:
+        fixed += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
+    says = "states" if missed.size == 1 else "state"
+    return (
+        f"{missed.size} of {errors.size} rows {says} an error above the tolerance {scene.tolerance:g}, "
+        f"{errors[missed].max():.2g} at worst (stated_error).{fixed}"
+    )
+
+
+def speeds_note(dataset: xr.Dataset) -> str:
+    """Name the speeds whose contact is not solved; empty if there are none."""
+    missing = dataset["speed"].values[dataset["status"].values == NOT_CONVERGED]
+    if not missing.size:
+        return ""
+    which = ", ".join(said(speed, "m/s") for speed in missing)
+    return (
+        f"{missing.size} of {dataset.sizes['speed']} speeds are not solved and missing: {which}. Try a looser "
+        "tolerance, a coarser grid, or layers whose moduli differ less."
+    )
 
 
 def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:

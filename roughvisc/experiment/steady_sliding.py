@@ -18,6 +18,7 @@ from roughvisc.experiment.notes import (
     contact_stands_alone,
     creep_left,
     slope_note,
+    speeds_note,
     surface_stands_alone,
     wake_note,
 )
@@ -43,6 +44,8 @@ Array = NDArray[np.float64]
 #: Speeds of a plan's coarse curves: of more, evenly spread ones.
 _FEW = 7
 
+#: What a row states of a speed whose contact is not solved; the rest is missing.
+_OF_UNSOLVED = ("force", "nominal_pressure", "pressure_residual", "friction_residual", "iterations", "status")
 #: Fields that a row may have.
 _FIELDS = ("pressure", "gap")
 
@@ -208,8 +211,11 @@ class SlidingRows(Rows):
         row["friction_force_across"] = sliding.force_across(on_rows(found.pressure, sliding))
         if self._coarser is not None:
             row |= self._coarser.errors(found, speed, law, self._force, tolerance)
+        if not found.converged:
+            row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
+            fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
         row["convolutions"] = sliding.convolutions
-        facts = {"number": number, "creep_left": self._creep(found, speed, law)}
+        facts = {"number": number, "creep_left": self._creep(found, speed, law) if found.converged else 0.0}
         return Row(speed, row, fields, state=done, facts=facts, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
@@ -264,5 +270,5 @@ class SlidingRows(Rows):
             log.warning("%s", note)
         return {
             "direction": self._curve.direction,
-            "warnings": warnings_text(warnings),
+            "warnings": warnings_text({"speeds": speeds_note(dataset), **warnings}),
         }

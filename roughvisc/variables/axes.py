@@ -32,7 +32,7 @@ class Axis:
     symbol : str
         Of a place on it, as ``t`` in ``t = 50 ms``.
     advice : str
-        What to try where a row did not converge.
+        What to try if a row did not converge.
     model : str
         What was computed, as a sentence.
     telling : str
@@ -61,7 +61,8 @@ class Axis:
 
     def telling_row(self, histories: Mapping[str, Any]) -> int:
         """Number of the row that stands for a result in a table."""
-        return int(np.argmax(np.asarray(histories[self.telling]))) if self.telling else -1
+        found = np.asarray(histories[self.telling]) if self.telling else np.zeros(0)
+        return int(np.nanargmax(found)) if np.isfinite(found).any() else -1
 
     def in_table(self, which: str) -> list[str]:
         """Variables of which the table of a sweep has the value in the ``last`` row, or the ``largest``."""

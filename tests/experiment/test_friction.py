@@ -244,3 +244,26 @@ def test_convolutions__are_all_pairs_of_transforms(monkeypatch):
     ds = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2])
     assert int(ds.convolutions.sum()) == len(forward)
     assert (ds.convolutions > 2 * ds.iterations).all()
+
+
+def test_unsolved_speed__is_missing_and_the_others_stand(curve, monkeypatch):
+    """No curve is known on which the iteration stops early: the middle speed is declared unsolved."""
+    solve = steady.steady_state
+    states = []
+
+    def one_unsolved(*given, **settings):
+        states.append(solve(*given, **settings))
+        return replace(states[-1], converged=len(states) != 2)
+
+    monkeypatch.setattr("roughvisc.experiment.sliding_grid.steady_state", one_unsolved)
+    with pytest.warns(UserWarning, match="20") as warned:
+        found = rv.friction(ROUGH, RUBBER, **PRESS | {"speeds": [0.2, 20.0, 2000.0]}, fields=("pressure",))
+    assert len(warned) == 1
+    assert [STATUS_MEANINGS[status] for status in found.status.values] == ["converged", "not_converged", "converged"]
+    for name in ("friction_coefficient", "friction_force", "contact_area", "approach"):
+        assert np.isfinite(found[name].values).tolist() == [True, False, True], name
+        assert found[name].values[0] == pytest.approx(curve[name].values[0], rel=1e-6)
+    assert np.isnan(found.pressure[1]).all()
+    assert "speeds: " in found.attrs["warnings"]
+    assert rv.audit(found) is not None
+    assert rv.plot.friction(found) is not None

@@ -34,8 +34,8 @@ def test_accuracy__counts_the_rows_that_state_more_than_the_tolerance():
     errors = ds.stated_error.values
     missed = np.count_nonzero(errors > 1e-2)
     assert missed
-    assert warnings_of(ds.attrs)["accuracy"].startswith(f"{missed} of 3 rows")
-    assert f"{errors.max():.2g}" in warnings_of(ds.attrs)["accuracy"]
+    assert warnings_of(ds.attrs)["tolerance"].startswith(f"{missed} of 3 rows")
+    assert f"{errors.max():.2g}" in warnings_of(ds.attrs)["tolerance"]
 
 
 def test_unconverged__counts_rows_and_names_the_first():

@@ -1,5 +1,7 @@
 """Stated errors, kept times and unsolved contacts, seen through ``rv.simulate``."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -65,3 +67,26 @@ def test_stated_error__covers_rows_after_a_jump_that_is_not_kept():
     error = np.abs(ds.force.values - expected) / np.maximum.accumulate(expected)
     assert error.max() > 1e-3
     assert (error <= ds.stated_error.values).all()
+
+
+def test_missed_tolerance__gives_one_warning_and_an_attribute():
+    """Fixed steps of a tenth of the ramp miss the tolerance; of an elastic body they do not."""
+    program = rv.Program().load(5e-3, over=0.1).hold(1.0)
+    settings = {"times": 8, "fields": (), "numerics": rv.Numerics(time_step=0.01), "progress": False}
+    with pytest.warns(UserWarning, match="tolerance") as warned:
+        ds = rv.simulate(BALL, rv.zener(3e6, 1e6, 1e5), program, **settings)
+    assert ds.stated_error.max() > ds.attrs["tolerance"]
+    assert len(warned) == 1
+    assert "tolerance: " in ds.attrs["warnings"]
+    ds = rv.simulate(BALL, rv.elastic(3e6), program, **settings)
+    assert ds.stated_error.max() <= ds.attrs["tolerance"]
+    assert "tolerance: " not in ds.attrs.get("warnings", "")
+
+
+def test_power_law__meets_the_tolerance_or_warns():
+    """2.3 % of the compliance is instantaneous: cells that enter carry a jump of pressure."""
+    program, ball = rv.Program().load(5e-3, over=0.1).hold(1.0), rv.sphere(10e-3, 1e-3, 65)
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        ds = rv.simulate(ball, rv.PowerLaw(1e-8, 4e-7, 0.5), program, times=8, fields=(), progress=False)
+    assert len(warned) == int(ds.stated_error.max() > ds.attrs["tolerance"])

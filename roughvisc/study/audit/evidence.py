@@ -79,7 +79,7 @@ def contact_of(dataset: xr.Dataset, row: xr.Dataset) -> Contact | None:
         The same in that row.
     """
     pressures = dataset["pressure"].transpose(..., "x", "y")
-    peak = max(float(np.nanmax(frame.values)) for frame in pressures)
+    peak = max(float(np.nan_to_num(frame.values).max()) for frame in pressures)
     pressure = np.nan_to_num(row["pressure"].transpose("x", "y").values)
     touching = pressure > 0
     if not touching.any():
@@ -212,7 +212,8 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     contact = contact_of(dataset, row) if has_pressure else None
     rubbed, spots = row, contact
     if "speed" in dataset.dims and "friction_force" in dataset:
-        rubbed = dataset.isel(speed=int((dataset["friction_force"] * dataset["speed"]).values.argmax()))
+        power = np.nan_to_num((dataset["friction_force"] * dataset["speed"]).values)  # missing where not solved
+        rubbed = dataset.isel(speed=int(power.argmax()))
         spots = contact_of(dataset, rubbed) if has_pressure else None
     thickness = float(attrs.get("thickness", math.inf))
     poisson = attrs.get("poisson", 0.5)
@@ -250,6 +251,7 @@ def _fullest(dataset: xr.Dataset) -> int:
     force = dataset["force"].values
     most = force >= force.max() * (1 - 1e-9)
     area = np.where(most, dataset["contact_area"].values, -1.0) if "contact_area" in dataset else most.astype(float)
+    area = np.nan_to_num(area, nan=-1.0)  # of a speed whose contact is not solved
     return int(np.flatnonzero(area >= area.max() * (1 - 1e-9))[-1])
 
 

@@ -26,7 +26,7 @@ from roughvisc.errors import (
     TransientError,
     UnusableFileError,
 )
-from roughvisc.labels import annotate
+from roughvisc.labels import annotate, warnings_of
 from roughvisc.mechanics.bodies.transforms import transform_library
 from roughvisc.problem import Problem
 from roughvisc.solve import solve
@@ -306,8 +306,7 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
     path = write_result(dataset, result_path(folder, case.key), precision=case.settings.keep.precision)
     dataset.encoding["source"] = str(path)
-    complaint = unconverged(dataset)
-    if complaint:
+    for complaint in filter(None, (unconverged(dataset), warnings_of(dataset.attrs).get("tolerance"))):
         log.warning("%s: %s", path, complaint)
     return path
 

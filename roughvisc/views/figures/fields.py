@@ -194,7 +194,7 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
     over = axis_of(dataset.variables)
     rows, telling = rows_of(dataset).values, AXES[over].telling
     if times is None and telling in dataset:
-        chosen = {int(rows.argmin()), int(np.nanargmax(dataset[telling].values)), int(rows.argmax())}
+        chosen = {int(rows.argmin()), AXES[over].telling_row(dataset) % rows.size, int(rows.argmax())}
         return sorted(chosen, key=lambda row: float(rows[row]))
     if times is None:
         return telling_frames(dataset, 4)

@@ -12,10 +12,9 @@ from matplotlib.patches import Patch
 from roughvisc.errors import InputError
 from roughvisc.observables import history
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables import VARIABLES
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures import style
-from roughvisc.views.figures.histories import failed_frames
 from roughvisc.views.figures.rows import require
 
 _PANELS = (("friction_coefficient", style.BLUE), ("contact_area", style.CONTACT))
@@ -26,7 +25,7 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
     """Friction coefficient and contact area against the distance slid, at every accepted step.
 
     Strokes are lines; what happens at a stop lies at one distance, and is dotted. Friction is counted against the
-    motion: after a reversal it begins below zero. Steps that did not converge are crossed out.
+    motion: after a reversal it begins below zero.
 
     Parameters
     ----------
@@ -49,12 +48,10 @@ def friction_against_distance(dataset: xr.Dataset) -> Figure:
     panels = [panel for panel in _PANELS if panel[0] in steps]
     figure = style.new_figure(4.6, 1.3 + 1.5 * len(panels))
     axes = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0])
-    failed = failed_frames(steps)
     for ax, (name, colour) in zip(axes, panels, strict=True):
         unit = unit_for(steps[name].values, VARIABLES[name].units)
         values = unit(steps[name].values)
         _draw_against_distance(ax, distance, values, colour)
-        ax.plot(distance[failed], values[failed], "x", color="k", ms=5, mew=1.2)
         style.leave_room(ax, values[_shown(distance)])
         ax.set_ylabel(unit.label(VARIABLES[name].label))
         ax.grid(color="0.9", lw=0.5)
@@ -106,8 +103,7 @@ _TOLD = {
 def friction(dataset: xr.Dataset) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
-    Speeds whose iteration did not converge are drawn as open circles. Bands show the error of the grid, if the
-    result states it.
+    Speeds whose contact is not solved are missing. Bands show the error of the grid, if the result states it.
 
     Parameters
     ----------
@@ -149,13 +145,11 @@ def _draw(
 ) -> dict[str, Line2D | Patch]:
     """One quantity on its axis; entries of a legend for what is drawn beside the solution."""
     solved, theory, grid = names
-    speed, settled = across(ordered["speed"].values), ordered["status"].values != NOT_CONVERGED
+    speed = across(ordered["speed"].values)
     values = ordered[solved].values
     told: dict[str, Line2D | Patch] = {}
     most = [values]
-    axes.plot(speed, values, "-", color=colour, label=SLIDING[solved].label)
-    axes.plot(speed[settled], values[settled], "o", ms=3, color=colour)
-    axes.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)
+    axes.plot(speed, values, "o-", ms=3, color=colour, label=SLIDING[solved].label)
     if grid in ordered and np.isfinite(ordered[grid]).any():
         error = ordered[grid].values * values
         axes.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
@@ -167,5 +161,5 @@ def _draw(
         most.append(ordered[theory].values)
     axes.set_ylabel(SLIDING[solved].label, color=colour)
     axes.tick_params(axis="y", colors=colour)
-    axes.set_ylim(0, 1.08 * float(np.max(np.concatenate(most))) or 1.0)
+    axes.set_ylim(0, 1.08 * float(np.nanmax(np.concatenate(most), initial=0.0)) or 1.0)
     return told

@@ -20,7 +20,7 @@ from roughvisc.observables.area_theories import asperity_fraction, nominal_area_
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities, unit_for
-from roughvisc.variables import NOT_CONVERGED, VARIABLES
+from roughvisc.variables import VARIABLES
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.rows import RowAxis, require, rows_of, spans_decades
@@ -49,13 +49,6 @@ _SPANS = 30.0
 _ONE_COLUMN = 3
 
 
-def failed_frames(dataset: xr.Dataset) -> np.ndarray:
-    """Frames whose step did not converge."""
-    if "status" not in dataset:
-        return np.zeros(rows_of(dataset).size, dtype=bool)
-    return dataset["status"].values == NOT_CONVERGED
-
-
 def steps_of(dataset: xr.Dataset) -> xr.Dataset:
     """Histories of every time step over the axis of a result; its rows if it holds no steps."""
     return over_steps(dataset) if axis_of(dataset.variables) == "time" else dataset
@@ -76,8 +69,6 @@ def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Datase
         ax.plot(kept, unit(shown), ls="", marker=marker, color=colour)
     else:
         ax.plot(kept, np.zeros(len(kept)), "|", color="0.4", ms=5, mew=0.4, transform=ax.get_xaxis_transform())
-    failed = failed_frames(on)
-    ax.plot(times[failed], unit(values[failed]), "x", color="k", ms=5, mew=1.2, zorder=5)
     for other, said, shade, dashes in beside:
         ax.plot(times, unit(on[other]), color=shade, ls=dashes, lw=0.9, label=said)
     if spans:
@@ -91,15 +82,13 @@ def _draw_history(ax: Axes, axis: RowAxis, dataset: xr.Dataset, steps: xr.Datase
 
 
 def marks_of_rows(dataset: xr.Dataset, steps: xr.Dataset) -> dict[str, Line2D]:
-    """Legend of lines and marks of histories: time steps, kept times or speeds, and steps that did not converge."""
+    """Legend of lines and marks of histories: time steps, kept times or speeds."""
     rows, named = AXES[axis_of(dataset.variables)].rows, {}
     count = rows_of(dataset).size
     if rows_of(steps).size > count:
         named["time steps"] = Line2D([], [], color="0.3")
     look = {"marker": style.marker_of(count)} if style.marker_of(count) else {"marker": "|", "mew": 0.4, "ms": 5}
     named[rows] = Line2D([], [], color="0.3", ls="", **look)
-    if failed_frames(steps).any():
-        named["not converged"] = Line2D([], [], color="k", ls="", marker="x", ms=5, mew=1.2)
     return named
 
 
@@ -124,7 +113,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
 
     Lines are drawn through every time step, dots at the kept times; if the dots would touch, strokes at the axis mark
     the kept times. Friction is drawn for a program that slides; leak rate and conductance are drawn if the result holds
-    them, a leak rate over decades on a logarithmic axis. Steps that did not converge are crossed out.
+    them, a leak rate over decades on a logarithmic axis.
 
     Parameters
     ----------

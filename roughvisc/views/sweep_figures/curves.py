@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES
 from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures import style
@@ -179,8 +178,8 @@ _FRICTION = ("friction_coefficient", "contact_fraction")
 def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one of every case, against the logarithm of the speed.
 
-    Lines are coloured by what was varied. Speeds that did not converge are open circles. Of realisations the mean is
-    drawn with the 95 % prediction interval of a single one and, of a scan, the measured scan.
+    Lines are coloured by what was varied. Of realisations the mean is drawn with the 95 % prediction interval of a
+    single one and, of a scan, the measured scan.
 
     Parameters
     ----------
@@ -210,10 +209,8 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     named = colouring.legend() if len(colouring.parameter.levels) > 1 else {}
     figure = style.new_figure(6.6, 2.9 + 0.12 * len(named))
     panels = figure.subplots(1, 2)
-    settled = [
+    for member, band, place in zip(cases.members, cases.bands, colouring.parameter.places, strict=True):
         _draw_friction(panels, member, band, over, across, colouring.colour(int(place)))
-        for member, band, place in zip(cases.members, cases.bands, colouring.parameter.places, strict=True)
-    ]
     for ax, name in zip(panels, _FRICTION, strict=True):
         ax.set_xscale("log")
         ax.set_ylim(bottom=0)
@@ -223,8 +220,6 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     style.letter_panels(list(panels))
     title = colouring.parameter.name if named else ""
     named |= band_legend(cases.bands)
-    if not all(settled):
-        named["not converged"] = Line2D([], [], color="0.3", marker="o", mfc="w", ls="", ms=4)
     style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(panels))
     return figure
@@ -232,10 +227,10 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
 
 def _draw_friction(
     panels: list[Axes], member: xr.Dataset, band: Band | None, over: str, across: Any, colour: Any
-) -> bool:
-    """One case in both panels; whether all of it converged."""
+) -> None:
+    """Draw one case in both panels."""
     ordered = member.sortby("speed")
-    speed, settled = across(ordered[over].values), ordered["status"].values != NOT_CONVERGED
+    speed = across(ordered[over].values)
     for ax, name in zip(panels, _FRICTION, strict=True):
         values = ordered[name].values
         if band is not None:
@@ -244,7 +239,4 @@ def _draw_friction(
         if band is not None and band.itself is not None:
             itself = band.itself.sortby("speed")
             ax.plot(across(itself[over].values), itself[name].values, color=colour, **ITSELF_STYLE)
-        ax.plot(speed, values, "-", color=colour)
-        ax.plot(speed[settled], values[settled], "o", ms=2.5, color=colour)
-        ax.plot(speed[~settled], values[~settled], "o", ms=4, mfc="w", color=colour)
-    return bool(settled.all())
+        ax.plot(speed, values, "o-", ms=2.5, color=colour)

@@ -14,12 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 from roughvisc.errors import InputError
 from roughvisc.units import Quantity, Unit, quantities
-from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views.figures import style
 from roughvisc.views.figures.rows import RowAxis, frame_at, frames_at, rows_of, spread_frames
 from roughvisc.views.sweep_figures.case_text import ENDLESS
@@ -55,7 +53,7 @@ def sweep(
     """Draw a quantity against the swept parameters: lines, or a map of two parameters.
 
     Numbers lie on linear axes, or on logarithmic ones where they span decades; anything else, such as materials,
-    files and seeds, makes categories. Points that did not converge are crossed out. Of realisations the mean is drawn
+    files and seeds, makes categories. Of realisations the mean is drawn
     with the 95 % prediction interval of a single one and, of a scan, the measured scan; a map has the mean.
 
     Parameters
@@ -104,7 +102,6 @@ def sweep(
         titles,
         _at_frames(cases.members, quantity, frames),
         [_at_frames(datasets, quantity, frames) for datasets in ends],
-        np.array([_failed(cases, row) for row in frames]),
     )
     if as_map:
         return _draw_maps(drawn, *across[:2])
@@ -131,8 +128,6 @@ class _Drawn:
         [SI]
     bands : list of ndarray
         The same of both ends of a band and of the measured surface itself; missing where there is none.
-    failed : ndarray of bool, shape (times, cases)
-        Whether a value is of a step that did not converge.
     """
 
     cases: Cases
@@ -140,7 +135,6 @@ class _Drawn:
     titles: list[str]
     values: np.ndarray
     bands: list[np.ndarray]
-    failed: np.ndarray
 
     @property
     def unit(self) -> Unit:
@@ -225,11 +219,6 @@ def telling_frames_of(cases: Cases, quantity: str) -> list[int]:
     return [frame_at(clock, common[spread.argmax()]) for clock in clocks]
 
 
-def _failed(cases: Cases, frames: list[int]) -> np.ndarray:
-    pairs = zip(cases.members, frames, strict=True)
-    return np.array(["status" in m and int(m["status"][f]) == NOT_CONVERGED for m, f in pairs])
-
-
 # ------------------------------------------------------------------------------------------------------- lines
 
 
@@ -262,21 +251,15 @@ def _families(drawn: _Drawn, across: Parameter) -> Figure:
         ax.set_xlabel(across.label)
     title = family.name if named else ""
     named |= band_legend(drawn.cases.bands)
-    if drawn.failed.any():
-        named["not converged"] = Line2D([], [], **_CROSS)
     style.legend_above(figure, named, title)
     colouring.draw_bar(figure, list(axes))
     style.letter_panels(axes, drawn.titles)
     return figure
 
 
-#: How a value is marked whose step did not converge.
-_CROSS: dict[str, Any] = {"color": "k", "marker": "x", "ls": "", "ms": 5}
-
-
 def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: Any, **look) -> None:
     """A line over the parameter, and its band; points of categories are not joined, nor that of an infinite value."""
-    place, failed = positions(across)[across.places[members]], drawn.failed[time][members]
+    place = positions(across)[across.places[members]]
     shown, *ends = (drawn.unit(one[time][members]) for one in (drawn.values, *drawn.bands))
     order = np.argsort(place, kind="stable")
     look |= {"marker": "o" if len(place) <= 40 else "", "ls": "-" if across.numeric else ""}
@@ -291,8 +274,6 @@ def _draw_line(ax: Axes, drawn: _Drawn, across: Parameter, time: int, members: A
     if np.isfinite(itself).any():
         of_itself = ITSELF_STYLE if across.numeric else {"ls": ""}
         ax.plot(x, itself, marker="D", mfc="w", ms=4, color=look["color"], **of_itself)
-    if failed.any():
-        ax.plot(place[failed], shown[failed], **_CROSS, mew=1.2, zorder=5, label="not converged")
 
 
 def _finish(ax: Axes, drawn: _Drawn, across: Parameter) -> None:

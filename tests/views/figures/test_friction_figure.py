@@ -7,20 +7,19 @@ from support import lines
 
 import roughvisc as rv
 from roughvisc.labels import annotate
-from roughvisc.variables import NOT_CONVERGED
 from roughvisc.views import plot
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
 
 
 def curve():
-    """Three speeds, not in order, of which the last in order did not converge."""
+    """Three speeds, not in order."""
     values = {
         "friction_coefficient": [0.3, 0.01, 0.2],
         "contact_fraction": [0.02, 0.2, 0.1],
         "persson_friction_coefficient": [0.5, 0.02, 0.3],
         "persson_contact_fraction": [0.01, 0.18, 0.09],
-        "status": [NOT_CONVERGED, 0, 0],
+        "status": [0, 0, 0],
     }
     return annotate(xr.Dataset({n: ("speed", v) for n, v in values.items()}, coords={"speed": SPEEDS}))
 
@@ -41,12 +40,12 @@ def test_friction__draws_both_in_the_order_of_the_speed():
     assert left.get_xscale() == "log"
 
 
-def test_friction__open_circles_where_not_converged():
-    for ax in rv.plot.friction(curve()).axes:
-        full, hollow = (line for line in ax.lines if line.get_marker() == "o")
-        np.testing.assert_allclose(full.get_xdata(), [0.02, 0.2])
-        np.testing.assert_allclose(hollow.get_xdata(), [2.0])
-        assert hollow.get_markerfacecolor() == "w"
+def test_friction__leaves_out_a_speed_that_is_not_solved():
+    missing = curve()
+    missing["friction_coefficient"][0] = np.nan
+    (left, _) = rv.plot.friction(missing).axes
+    assert np.isfinite(lines(left)["Friction coefficient"].get_ydata()).tolist() == [True, True, False]
+    assert left.get_ylim()[1] > 0.2
 
 
 def test_friction__draws_the_theory():
@@ -129,7 +128,7 @@ def test_friction_of_cases__has_a_line_a_case_and_a_legend():
     friction, area = figure.axes
     full = [line for line in friction.lines if line.get_linestyle() == "-"]
     assert [line.get_ydata().tolist() for line in full] == [[0.01, 0.2, 0.3]] * 2
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["293 K", "313 K", "not converged"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["293 K", "313 K"]
     assert (friction.get_xlabel(), friction.get_ylabel()) == ("Speed [µm/s]", "Friction coefficient")
     assert (friction.get_xscale(), friction.get_ylim()[0], area.get_ylim()[0]) == ("log", 0, 0)
 
@@ -173,7 +172,7 @@ FRICTION = [np.nan, 0.0, 0.2, 0.3, 0.3, 0.1, 0.05, -0.02, 0.28]
 
 def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
     series = {"friction_coefficient": np.array(FRICTION), "sliding_distance": 1e-6 * np.array(DISTANCE)}
-    series |= {"force": np.ones(9), "approach": np.ones(9), "status": (np.arange(9) == 3).astype(int)}
+    series |= {"force": np.ones(9), "approach": np.ones(9)}
     coords = {"time": np.arange(9.0)}
     slid = annotate(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
     (ax,) = rv.plot.friction_against_distance(slid).axes
@@ -181,8 +180,6 @@ def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
     assert drawn[0] == [[0, 0.0], [10, 0.2], [20, 0.3], [30, 0.3]]
     assert drawn[1] == [[30, 0.3], [30, 0.1], [30, 0.05]]
     assert drawn[2] == [[30, 0.05], [40, -0.02], [50, 0.28]]
-    (crossed,) = [line for line in ax.lines if line.get_marker() == "x"]
-    assert crossed.get_xdata().tolist() == [20]
     assert ax.get_xlabel() == "Sliding distance [µm]"
     with pytest.raises(rv.InputError, match="sliding_distance"):
         rv.plot.friction_against_distance(slid.drop_vars("sliding_distance"))

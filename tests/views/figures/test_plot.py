@@ -9,7 +9,7 @@ import sample_results as made
 import xarray as xr
 from matplotlib.colors import to_rgba
 from PIL import Image
-from support import lines, refused, told
+from support import lines, refused
 
 import roughvisc as rv
 from roughvisc import observables, plot
@@ -84,14 +84,6 @@ def test_history__of_rates():
     np.testing.assert_allclose(drawn[:11] / drawn[0], rate[:11] / rate[0])
     assert np.isnan(drawn[-1]), "zero has no place on a logarithmic axis"
     assert np.isnan(conductance.lines[0].get_ydata()[-1]), "full contact conducts without end"
-
-
-def test_history__crosses_out_steps_that_did_not_converge():
-    ds = made.rough_creep()
-    figure = plot.history(ds)
-    (crossed,) = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
-    np.testing.assert_allclose(crossed.get_xdata(), ds["time"][3])
-    assert "not converged" in told(figure)
 
 
 def test_area_against_load__one_line_per_case_and_the_low_load_line():

@@ -104,13 +104,6 @@ def test_sweep__of_two_parameters_as_a_family_of_lines():
             np.testing.assert_allclose(line.get_ydata(), share * power * np.array(LOADS) ** 0.9)
 
 
-def test_sweep__crosses_out_what_did_not_converge():
-    ds = stacked(SWEEPS["loads"], by_load)
-    ds["status"][1, -1] = 1
-    (ax,) = plot.sweep(ds, times=-1).axes
-    np.testing.assert_allclose(lines(ax)["not converged"].get_xdata(), [20])
-
-
 def test_sweep__what_follows_from_another_parameter_takes_no_axis():
     ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
     assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
