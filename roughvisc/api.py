@@ -222,9 +222,9 @@ def friction(
 
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
-    """Return a result after one Python warning each of missed tolerances and unsolved speeds."""
+    """Return a result after one Python warning each of missed tolerances, unsolved speeds and sparse tables."""
     stated = warnings_of(dataset.attrs)
-    for text in filter(None, (stated.get("tolerance"), stated.get("speeds"))):
+    for text in filter(None, map(stated.get, ("tolerance", "speeds", "material"))):
         warnings.warn(text, UserWarning, level)
     return dataset
 

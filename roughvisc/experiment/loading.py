@@ -21,6 +21,7 @@ from roughvisc.experiment.notes import (
     edge_note,
     slope_note,
     surface_stands_alone,
+    table_note,
     tolerance_note,
     wake_note,
 )
@@ -368,6 +369,7 @@ class LoadingRows(Rows):
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
+        stated["material"] = table_note(self._problem.body.materials)
         # of what was pressed, a series or not; of layers those of the top one
         pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.final}
         return {

@@ -20,6 +20,7 @@ from roughvisc.experiment.notes import (
     slope_note,
     speeds_note,
     surface_stands_alone,
+    table_note,
     wake_note,
 )
 from roughvisc.experiment.profile import Profile
@@ -268,7 +269,8 @@ class SlidingRows(Rows):
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
+        stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
         return {
             "direction": self._curve.direction,
-            "warnings": warnings_text({"speeds": speeds_note(dataset), **warnings}),
+            "warnings": warnings_text(stated | warnings),
         }

@@ -306,7 +306,8 @@ def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
     path = write_result(dataset, result_path(folder, case.key), precision=case.settings.keep.precision)
     dataset.encoding["source"] = str(path)
-    for complaint in filter(None, (unconverged(dataset), warnings_of(dataset.attrs).get("tolerance"))):
+    stated = warnings_of(dataset.attrs)
+    for complaint in filter(None, (unconverged(dataset), stated.get("tolerance"), stated.get("material"))):
         log.warning("%s: %s", path, complaint)
     return path
 
