@@ -8,7 +8,6 @@ import threading
 import time
 from contextlib import contextmanager
 
-import dask
 import pytest
 import xarray as xr
 from distributed import Client, LocalCluster
@@ -78,32 +77,6 @@ class Ear(Monitor):
 
     def wait_until(self, condition):
         wait_for(lambda: condition(self.heard))
-
-
-@pytest.mark.long
-def test_killed_worker__with_all_cases_in_its_queue(study, tmp_path):
-    """A scheduler that forgives no death, and gives all cases to one worker at once: as bad as it can be."""
-    cases = study(LONG + LOADS)
-    settings = {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": "inf"}
-    with dask.config.set(settings), bare_cluster() as client, worker_process(client):
-        client.wait_for_workers(1, timeout=60)
-        killed = kill_working(client, times=1)
-        outcomes = run_cases(cases, tmp_path / "out", watch=Ear(), client=client)
-        killed.join()
-        assert killed.victims
-    assert [o.kind for o in outcomes.values()] == ["done"] * 4
-
-
-@pytest.mark.long
-def test_lifetime__of_each_worker_is_shorter_than_the_sweep(study, tmp_path):
-    cases = study(LONG.replace('hold = "0.2 s"', 'hold = "0.4 s"').replace(', "200 ms"', "") + LOADS)
-    lifetime = ["--lifetime", "5s", "--lifetime-stagger", "1s", "--lifetime-restart"]
-    with bare_cluster() as client, worker_process(client, *lifetime), worker_process(client, *lifetime):
-        outcomes = run_cases(cases, tmp_path / "out", watch=(ear := Ear()), client=client)
-    assert [o.kind for o in outcomes.values()] == ["done"] * 4
-    assert sum(end == 0 for _, _, end in ear.heard) > 4, "some were begun again"
-    run_cases(cases, tmp_path / "calm", watch=Monitor(), workers=0)
-    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
 
 
 @contextmanager
@@ -222,7 +195,7 @@ def wait_for(condition):
 # workers that are lost
 
 
-@pytest.mark.long
+@pytest.mark.thorough
 def test_sweep__goes_on_when_a_worker_is_killed(study, tmp_path, by_hand):
     cases = study(LONG + LOADS)
     wanted = {}

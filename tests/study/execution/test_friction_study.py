@@ -6,15 +6,11 @@ import logging
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, assert_same, numbers
+from support import assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.study.execution.cluster import connect
-from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.statement.case import read_cases, read_study, vary
-from roughvisc.study.storage.results import open_results
+from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage.store import open_result
 
 pytestmark = pytest.mark.filterwarnings(
@@ -128,33 +124,6 @@ def test_sweep__opens_as_one_and_as_a_table(tmp_path):
     assert (tmp_path / "one.csv").read_text().startswith("speed [m/s],")
 
 
-@pytest.mark.thorough
-def test_sweep__on_a_cluster_ends_with_the_same_bits(tmp_path, by_hand):
-    (tmp_path / "slide.toml").write_text(FRICTION + PRESSURES + '"friction.direction" = ["x", "-y"]\n')
-    cases = read_cases(tmp_path / "slide.toml")
-    with connect(file=by_hand) as client:
-        outcomes = run_cases(cases, tmp_path / "there", watch=Monitor(), client=client)
-    assert [one.kind for one in outcomes.values()] == ["done"] * 4
-    run_cases(cases, tmp_path / "here", watch=Monitor(), workers=0)
-    assert_same(numbers(tmp_path / "there"), numbers(tmp_path / "here"))
-
-
-def test_results__over_time_and_over_speed_are_not_put_into_one(case, tmp_path):
-    (tmp_path / "ball.toml").write_text(BALL)
-    cases = [case(), read_study(tmp_path / "ball.toml")]
-    for one in cases:
-        run_case(one, tmp_path / "out")
-    with pytest.raises(rv.InputError) as caught:
-        open_results(tmp_path / "out", cases=cases)
-    assert caught.value.key == "cases"
-    table = rv.to_table(tmp_path / "out")
-    assert table["friction_coefficient"].notna().sum() == table["time [s]"].notna().sum() == 1
-    curve = open_result(tmp_path / "out" / f"{cases[0].key}.nc")
-    for derive in (rv.observables.history, rv.observables.cycle_work):
-        with pytest.raises(rv.InputError, match="lies over speed: expected a history over time"):
-            derive(curve)
-
-
 def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
     """At 40 degrees the curve of 20 degrees lies at a speed that is larger by the shift factor."""
     reference = rv.run(case(TEMPERATURES), tmp_path, progress=False)
@@ -172,14 +141,3 @@ def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
 def test_unconverged_speed__is_told_by_its_speed(case, tmp_path, stubborn):
     with pytest.raises(rv.ConvergenceError, match=r"1 of 4 speeds did not converge, first at V = 20 mm/s"):
         rv.run(case(), tmp_path, progress=False)
-
-
-def test_plan__counts_speeds_and_says_what_it_refuses(case):
-    costs = rv.plan([case(), vary(case(), {"friction.speeds": ["1 mm/s", "1 m/s"]})])
-    assert costs.speeds.values.tolist() == [4, 2]
-    assert np.isnan(costs.steps).all()
-    assert (costs.convolutions > 50).all()
-    assert (costs.wall_time > 0).all()
-    assert costs.attrs["refusal"] == ""
-    fluid = vary(case(), {"material": {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}})
-    assert "creeps without end" in rv.plan([fluid]).attrs["refusal"]

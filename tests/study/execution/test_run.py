@@ -1,7 +1,5 @@
 """One case to one file: what the file says of itself, and what happens when something goes wrong."""
 
-import importlib.metadata
-import json
 import logging
 
 import pytest
@@ -12,7 +10,7 @@ import roughvisc as rv
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.statement.case import Case, read_cases, read_study, vary
+from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.storage.store import open_result
 
 
@@ -45,15 +43,6 @@ def test_run__keeps_a_file_that_is_whole_in_itself(study):
     )
 
 
-def test_finished_case__is_reused_by_another_commit(study, monkeypatch, solved_on):
-    rv.run(study, progress=False)
-    solved = len(solved_on)
-    monkeypatch.setattr(importlib.metadata, "version", lambda name: "0.1.dev999+gabcdef0")
-    assert rv.__version__ == "0.1.dev999+gabcdef0"
-    rv.run(study, progress=False)
-    assert len(solved_on) == solved > 0
-
-
 def test_run__equals_simulate(study):
     ds = rv.run(study, progress=False)
     direct = rv.simulate(
@@ -75,14 +64,6 @@ def test_run__reports_progress(study):
     assert reached[-1] == (0.2, 0.2)
 
 
-def test_run__says_what_was_varied(study):
-    study.write_text(BALL + '[sweep]\n"program.0.load" = ["5 mN", "6 mN"]')
-    ds = rv.run(read_cases(study)[1], progress=False)
-    assert ds.attrs["title"] == "A ball, program.0.load = 0.006"
-    assert json.loads(ds.attrs["case"])["varied"] == {"program.0.load": 0.006}
-    assert float(ds.force[-1]) == pytest.approx(6e-3, rel=1e-8)
-
-
 def test_run__writes_nothing_where_the_input_is_wrong(study):
     case = vary(read_study(study), {"program.0.load": 50.0})
     with pytest.raises(EdgeContactError, match=r"ball\.toml: .*periodic"):
@@ -99,20 +80,6 @@ def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):
     assert "did not converge" in caplog.text
     with open_result(path) as ds:
         assert list(ds.status.values) == [0, 1, 0]
-
-
-def test_run__rounds_the_fields_as_the_study_says(study):
-    exact = rv.run(study, progress=False)
-    study.write_text(BALL + "precision = 1e-3\n")
-    rounded = rv.run(study, progress=False)
-    assert rounded.attrs["case_key"] != exact.attrs["case_key"]
-    assert rounded.pressure.attrs["relative_precision"] == 1e-3
-    assert not rounded.pressure.equals(exact.pressure)
-    xr.testing.assert_allclose(rounded.pressure, exact.pressure, rtol=1e-3, atol=0)
-    xr.testing.assert_equal(rounded.approach, exact.approach)
-    study.write_text(BALL + "precision = 1\n")
-    with pytest.raises(InputError, match=r"keep\.precision: found 1: expected a number"):
-        read_study(study)
 
 
 def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):

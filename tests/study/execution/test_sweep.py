@@ -15,7 +15,6 @@ import xarray as xr
 from rich.console import Console
 from support import BALL, LONG, assert_same, numbers
 
-import roughvisc as rv
 from roughvisc.errors import DiskFullError, InputError, InUseError, RoughviscError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import task as task_module
@@ -79,18 +78,6 @@ def test_sweep__same_bits_here_and_on_workers_and_on_a_cluster(study, tmp_path, 
         assert leftovers(tmp_path / name) == []
 
 
-def test_sweep__on_two_threads_gives_the_bits_of_one(study, tmp_path):
-    (case,) = study(BALL.replace("[24, 21]", "[96, 90]"))
-    found = []
-    for threads in (1, 2):
-        outcome = task_module.run_case_safely(
-            case, tmp_path / str(threads), progress=lambda now, end: None, stop=None, threads=threads
-        )
-        assert outcome.kind == "done"
-        found.append(numbers(tmp_path / str(threads)))
-    assert_same(*found)
-
-
 def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     study()
     command = [*RUN, "ball.toml", "--scheduler-file", by_hand]
@@ -145,14 +132,6 @@ def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_p
     assert all(o.reused for o in outcomes.values())
     run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0, retry_failed=True)
     assert computed == [4e-3, 50.0, 5e-3, 50.0]
-
-
-def test_sweep__what_another_version_failed_at_is_tried_again(study, tmp_path):
-    cases = study(BALL + POISON)
-    run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
-    path = record_path(tmp_path / "out", cases[1].key)
-    path.write_text(path.read_text().replace('"source": "roughvisc', '"source": "roughvisc 0'))
-    assert not run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)[cases[1].key].reused
 
 
 def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_path, monkeypatch):
@@ -262,20 +241,6 @@ def test_run__ctrl_c_is_status_130(study, tmp_path):
     assert not left, "no worker outlives the sweep"
     assert len([p for p in folder.glob("*.nc") if not p.name.startswith(".")]) == 1
     assert "interrupted" in (folder / "sweep.log").read_text()
-
-
-@pytest.mark.long
-def test_run__two_sweeps_on_one_folder(study, tmp_path):
-    cases = study()
-    command = [*RUN, "ball.toml", "--workers", "1", "--out", "shared"]
-    both = [subprocess.Popen(command, cwd=tmp_path, stdout=-1, stderr=-1, text=True) for _ in range(2)]
-    said = [process.communicate(timeout=120) for process in both]
-    for process, (_, err) in zip(both, said, strict=True):
-        assert process.returncode in (0, 1)
-        assert process.returncode == 0 or "at work" in err
-    sweep(cases, tmp_path / "calm", workers=0, progress=False)
-    assert_same(numbers(tmp_path / "shared"), numbers(tmp_path / "calm"))
-    assert rv.open_results(tmp_path / "shared").sizes["case"] == 4
 
 
 def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
