@@ -194,8 +194,8 @@ def friction(
     Notes
     -----
     In the steady state the friction force times the speed equals the power dissipated in the material. The force is
-    computed from this power, which on a grid converges much faster than the sum of pressure times slope. The force
-    across the motion, ``friction_force_across``, is the same sum with the slope across the motion.
+    computed from this power. At low speed the sum of pressure times slope is the difference of two large forces. The
+    force across the motion, ``friction_force_across``, is computed in the same way.
 
     References
     ----------

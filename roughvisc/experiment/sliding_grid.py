@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.grid_error import counting_error, grid_uncertainties
+from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
+from roughvisc.mechanics.stepping.tangential import slope
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.variables.grid_errors import GRID_ERROR
 
@@ -134,6 +135,9 @@ log = logging.getLogger("roughvisc")
 #: the stated error of the area is then 0.8 of the true one or more, and 4.8 times that in the median; with 1 and the
 #: powers of an area at rest it was less than 0.8 in 15 of these 216.
 _COUNTING_CAUTION = 1.5
+#: The friction force by the slope is meaningful if it differs by no more than this part from that by the power. At low
+#: speed on a rough surface it is the difference of two large forces.
+_MEANINGFUL = 0.1
 #: What is compared of one grid and another.
 _QUANTITIES = ("friction_force", "contact_area", "approach", "mean_gap")
 
@@ -179,10 +183,28 @@ class CoarserFaces:
         if len(self.faces) == 0 or not runs[0]["friction_force"] > 0:
             return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
         errors = {name: float(one) for name, one in grid_uncertainties(runs, self._ratio, moving=True).items()}
+        hidden_area, hidden_gap = hidden_opening(found.pressure, -self._face.gap, True)
+        if hidden_gap > 0:
+            hidden_gap /= max(runs[0]["mean_gap"], hidden_gap)
+        errors["mean_gap"] = float(np.maximum(errors["mean_gap"], hidden_gap))
+        errors["contact_area"] = float(np.maximum(errors["contact_area"], hidden_area))
+        apart = abs(_slope_force(found, self._face) / found.power_force - 1)
+        if apart <= _MEANINGFUL:
+            errors["friction_force"] = float(np.maximum(errors["friction_force"], apart))
         contact = found.pressure > 0
         counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
         errors["contact_area"] = float(np.maximum(errors["contact_area"], counting))  # NaN stays
         return {GRID_ERROR[name]: error for name, error in errors.items()}
+
+
+def _slope_force(state: SteadyState, face: SlidingGrid) -> float:
+    """Friction force by pressure times slope of the profile. [N]
+
+    It differs from that by the power because the surface follows the profile at the centres of the cells in contact
+    and not at the edges of contact: an error of the grid.
+    """
+    inclined = slope(face.gap, face.spacing[0], 0)
+    return float(np.sum(state.pressure * inclined)) * face.spacing[0] * face.spacing[1]
 
 
 def _numbers(state: SteadyState, face: SlidingGrid) -> dict[str, float]:

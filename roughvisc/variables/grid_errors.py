@@ -24,9 +24,15 @@ _ERRORS = {
     ),
     "grid_error_force": ("force", "zero where the force is prescribed"),
     "grid_error_approach": ("approach", "zero where the approach is prescribed; it counts from the highest point"),
-    "grid_error_gap": ("mean gap", ""),
-    "grid_error_area": ("contact area", "and from the number of faces at the contact's edge"),
-    "grid_error_friction": ("friction", ""),
+    "grid_error_gap": ("mean gap", "and of an opening that full contact may hide"),
+    "grid_error_area": (
+        "contact area",
+        "and from the number of faces at the contact's edge, or an opening that full contact may hide",
+    ),
+    "grid_error_friction": (
+        "friction",
+        "in steady sliding at least the difference from pressure times slope, if at most 10 %",
+    ),
 }
 
 

@@ -46,6 +46,20 @@ def test_grid_error__bounds_the_true_one_of_a_rough_surface(hurst, seed, pressur
         assert np.median(stated / true.clip(NOISE)) < MIDDLE
 
 
+@pytest.mark.parametrize(("ratio", "pressure", "cells"), [(30, 1414, 64), (200, 5657, 64), (1500, 1000, 128)])
+def test_grid_error__bounds_the_true_one_of_slow_sliding(ratio, pressure, cells):
+    """By the difference of power and pressure times slope; the coarser grids agree with this one by chance."""
+
+    def rubbed(count, **more):
+        wave = rv.wavy(1e-6, 1e-3, (1e-3, 4e-3 / count), (count, 4), waves=1)
+        material = rv.zener(1e6 * ratio, 1e6, 1e3)
+        return rv.friction(wave, material, pressure=pressure, speeds=1e-6, tolerance=1e-6, progress=False, **more)
+
+    found = rubbed(cells, grid_error=True)
+    true = abs(float(found.friction_coefficient[0] / rubbed(2048).friction_coefficient[0]) - 1)
+    assert 0.7 * true < float(found.grid_error_friction[0]) < 0.1
+
+
 def test_grid_error__falls_with_the_grid_and_is_labelled():
     surface = {"hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 2e-4, "seed": 1}
     found = [

@@ -296,3 +296,25 @@ def test_pressure_distance__counts_what_lies_outside_the_other_grid():
     small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
     assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]
     assert pressure_distance(large, small).tolist() == [20.0]
+
+
+@pytest.mark.parametrize(("cells", "offset"), [(64, 0.5), (32, 0.45)])
+def test_grid_error__holds_an_opening_that_full_contact_hides(cells, offset):
+    """Westergaard: at 0.999 of the pressure of full contact 2 % of a wave are open, between two cells."""
+    side, amplitude, modulus = 1e-3, 1e-6, 1e6
+    x = (np.arange(cells) + offset) / cells
+    wave = rv.from_array(amplitude * np.cos(2 * np.pi * x)[:, None] * np.ones((1, 4)), side / cells)
+    full = np.pi * 4 * modulus * amplitude / side
+
+    def pressed(part):
+        program = rv.Program().pressure(part * full, over=0)
+        return rv.simulate(
+            wave, rv.elastic(modulus), program, boundary="periodic", grid_error=True, times=1, progress=False
+        )
+
+    nearly, well = pressed(0.999), pressed(1.5)
+    closed = 2 / np.pi * np.arcsin(np.sqrt(0.999))
+    assert float(nearly.contact_fraction[0]) == 1.0
+    assert 1 - closed <= float(nearly.grid_error_area[0]) <= 5 * (1 - closed)
+    assert float(nearly.grid_error_gap[0]) > 0
+    assert float(well.grid_error_area[0]) < 1e-6

@@ -208,3 +208,12 @@ def test_plan__counts_the_cells(study):
     assert found.rows.item() == 9
     refused = rv.plan([vary(read_study(study), {"program.2.slide": 1e-5})]).refusal.item()
     assert "program.2: a slide of 10 µm is less than half a cell" in refused
+
+
+def test_friction_error__of_a_stroke_of_one_cell_is_the_whole_force():
+    """The companion takes the same step, and its difference tells nothing."""
+    stroke = SIDE / 24
+    coarse, fine = (slid(PRESS.slide(stroke, speed=0.1), wave(cells), times=1) for cells in (24, 24 * 8))
+    error = abs(float(coarse.friction_force[-1] - fine.friction_force[-1]))
+    assert error > 0.05 * float(fine.friction_force[-1])
+    assert error <= float(coarse.friction_force_error[-1])

@@ -36,6 +36,7 @@ from roughvisc.mechanics.stepping.state import (
     Uncertainty,
 )
 from roughvisc.mechanics.stepping.step import accept, restarted, start_segment, step_of, trial_step
+from roughvisc.mechanics.stepping.tangential import tangential_force
 
 # Of the contact solver's tolerance elsewhere. A slow slide changes the pressure by less than that in a step, and its
 # friction is a small part of it.
@@ -99,6 +100,9 @@ def _further(scene: Scene, state: State, segment: Segment, arrival: float, lengt
     entered = Sparse.of(_rolled(earlier.now.pressure, segment.slide, state.behind + 1))
     step = with_error_estimate(scene, step, companion_trial, entered, wants_area)
     step = replace(step, state=replace(step.state, slid=_sharpened(step, state.uncertainty)))
+    if scene.is_viscoelastic and segment.slide.cells(scene.operator.spacing) == 1:  # no step twice as long is known
+        force = abs(tangential_force(scene.operator, step.shown.pressure, step.displacement, segment.slide))
+        step = with_uncertainty(step, replace(step.uncertainty, friction=force))
     # after a single step the companion knows no more than before
     return step if state.behind else with_uncertainty(step, step.uncertainty.or_worse(state.uncertainty, 0.0))
 
