@@ -117,15 +117,21 @@ class _Dispatch:
         self.book.watch.reached(report["key"], report["now"], report["end"])
 
     def take(self, going_on: bool) -> None:
-        """Take up what has ended; submit anew, if the sweep goes on, what a lost worker has left behind."""
+        """Record finished cases; submit those again, if the sweep goes on, that a lost worker has left behind."""
+        full: DiskFullError | None = None
         for future, result in self.finished.next_batch(block=False):
             key = self.futures.pop(future)
             outcome = _outcome(key, result, self.courses[key], self.client)
             if outcome.kind != "interrupted":
-                self.book.ended(outcome)
+                try:
+                    self.book.ended(outcome)
+                except DiskFullError as error:  # after the others, which have ended too
+                    full = error
             elif going_on:
                 log.info("%s: resumes on another worker", key)
                 self.waiting.append(key)
+        if full is not None:
+            raise full
 
 
 def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads: int | None, link: str) -> None:
