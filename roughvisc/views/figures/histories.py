@@ -139,7 +139,7 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     if persson:
         theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
         steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
-    panels = [panel for panel in _PANELS if panel[0] in steps or panel[0] in dataset]
+    panels = [panel for panel in _PANELS if panel[0] in dataset]
     if not panels:
         names = ", ".join(name for name, _ in _PANELS)
         raise InputError(f"the result holds none of {names}: nothing to draw over {over}")
