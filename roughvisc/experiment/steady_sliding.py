@@ -90,12 +90,12 @@ class SteadySliding(Experiment):
     def __post_init__(self) -> None:
         object.__setattr__(self, "speeds", _speeds(self.speeds))
         if self.direction not in DIRECTIONS:
-            raise InputError(f"direction is {self.direction!r}: expected {' or '.join(map(repr, DIRECTIONS))}")
+            raise InputError(key="direction", found=self.direction, expected=" or ".join(map(repr, DIRECTIONS)))
         if (self.load is None) == (self.pressure is None):
-            raise InputError(f"load is {self.load!r} and pressure is {self.pressure!r}: expected one of them")
+            raise InputError(key="load", found=self.load, expected=f"either this or the pressure ({self.pressure!r})")
         for name, value, unit in (("load", self.load, "N"), ("pressure", self.pressure, "Pa")):
             if value is not None and not (isinstance(value, int | float) and 0 < value < math.inf):
-                raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
+                raise InputError(key=name, found=value, expected=f"a positive number [{unit}]")
 
     def __repr__(self) -> str:
         ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.asked), max(self.asked))))
@@ -164,7 +164,7 @@ def _speeds(speeds: Any) -> tuple[float, ...]:
     except (TypeError, ValueError):
         found = np.array([])
     if found.ndim != 1 or not found.size or not (np.isfinite(found) & (found > 0)).all():
-        raise InputError(f"speeds is {speeds!r}: expected positive numbers [m/s]")
+        raise InputError(key="speeds", found=speeds, expected="positive numbers [m/s]")
     return tuple(found.tolist())
 
 

@@ -13,12 +13,6 @@ STEEL = rv.elastic(1e6)
 ROUGH = rv.self_affine(1e-3, (16, 18), hurst=0.8, rms_slope=0.05, seed=1)
 BALL = rv.sphere(1e-2, 1e-3, (16, 18))
 SCAN = rv.from_array(ROUGH.values, (1e-3 / 16, 1e-3 / 18))
-ANSWER = """\
-: boundary is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
-  a nominally flat scan that stands for a larger surface: boundary="periodic"; if opposite borders differ much, mirror \
-it first (rv.mirror)
-  an indenter or a single bump whose contact stays inside: boundary="free"
-  a scan that is itself the whole body: boundary="free" with edge="accept\""""
 
 
 def pressed(height, **settings):
@@ -31,18 +25,6 @@ def test_auto__is_what_the_surface_was_made_for(height, word):
     assert found.attrs["boundary"] == word
     xr.testing.assert_equal(found.drop_vars("wall_time", errors="ignore").pressure, said.pressure)
     assert pressed(height.to_dataset(name="height").chunk()).attrs["boundary"] == word, "also of what is read late"
-
-
-def test_auto__asks_of_anything_else_and_nothing_is_computed(monkeypatch):
-    monkeypatch.setattr("roughvisc.solve._solve_once", lambda *_: pytest.fail("something is computed"))
-    for height, name in (
-        (SCAN, "height"),
-        (SCAN.assign_attrs(source_file="ground.x3p"), "ground.x3p"),
-        (BALL + ROUGH, "height"),
-    ):
-        with pytest.raises(rv.InputError) as asked:
-            pressed(height)
-        assert str(asked.value) == name + ANSWER
 
 
 def test_auto__with_an_accepted_edge_is_free(caplog):
@@ -71,14 +53,6 @@ def test_known_boundary__takes_what_is_said_then_the_experiment_then_the_edge_th
     stated, edge, only, made, expected
 ):
     assert known_boundary(Settings(boundary=stated, edge=edge), only, lambda: made) == expected
-
-
-def test_known_boundary__looks_at_the_surface_only_where_it_must():
-    def looked():
-        raise AssertionError("the heights are made again")
-
-    for settings, only in ((Settings(boundary="free"), None), (Settings(edge="accept"), None), (Settings(), "free")):
-        assert known_boundary(settings, only, looked) == "free"
 
 
 def test_auto__is_no_boundary_of_a_grid():

@@ -1,23 +1,17 @@
 """``rv.friction``: labels, directions, bodies, and what is refused."""
 
-import io
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from rich.console import Console
+from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.transforms import transforms
-from roughvisc.mechanics.materials import frequency
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding import steady
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.variables.sliding import SLIDING
-from roughvisc.views.console.result_tables import result_table
-from roughvisc.views.console.tables import readable
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
@@ -103,27 +97,6 @@ def test_force_across__is_to_the_left_of_the_motion(direction, across):
     assert (found.friction_force > 0).all()
 
 
-def test_summary__tells_a_force_across_that_is_sizeable(curve):
-    """Of the speed of the largest friction; beyond a twentieth of it."""
-
-    def told(across):
-        changed = curve.assign(friction_force_across=across * curve.friction_force)
-        return next((text for label, text in _summary(changed) if label == "Force across the motion"), "")
-
-    largest = float(curve.friction_force.max())
-    assert told(-0.5).startswith(f"{readable(largest / 2, 'N')} to the right at V = ")
-    assert "left" in told(0.06)
-    assert told(0.04) == ""
-    assert not [label for label, _ in _summary(curve.drop_vars("friction_force_across")) if "across" in label]
-
-
-def _summary(dataset):
-    console = Console(width=500, record=True, file=io.StringIO())
-    console.print(result_table(dataset))
-    rows = (re.split(r"\s{2,}", line.strip(), maxsplit=1) for line in console.export_text().splitlines())
-    return [tuple(row) for row in rows if len(row) == 2]
-
-
 def test_temperature__shifts_the_speed(curve):
     warm = rv.friction(ROUGH, rv.shifted(RUBBER, 0.01), pressure=2e4, speeds=20.0)
     assert float(warm.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
@@ -157,37 +130,25 @@ def test_measured_material__by_its_series(curve):
     np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
 
 
-def test_measured_material__is_fitted_once_a_speed(monkeypatch):
-    fitted, fit = [], frequency.series_of
-    monkeypatch.setattr(frequency, "series_of", lambda *asked: fitted.append(asked) or fit(*asked))
-    t = np.geomspace(1e-7, 1e3, 60)
-    table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
-    rv.friction(ROUGH, table, pressure=2e4, speeds=[0.1, 0.2], tolerance=1e-2)
-    assert len(fitted) == 2
-
-
 def test_seam__is_told():
     tilted = ROUGH.copy(data=ROUGH.values + 1e-4 * np.arange(40)[:, None] / 40)
     assert "repeats with a step" in rv.friction(tilted, RUBBER, pressure=2e3, speeds=1e-2).attrs["warnings"]
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
+    ("settings", "key", "found"),
     [
-        ({"speeds": []}, r"speeds is \[\]: expected positive numbers"),
-        ({"speeds": [1.0, -1.0]}, "speeds is"),
-        ({"speeds": "fast"}, "speeds is 'fast'"),
-        ({"pressure": None}, "load is None and pressure is None: expected one of them"),
-        ({"load": 1.0}, "expected one of them"),
-        ({"pressure": 0.0}, r"pressure is 0\.0: expected a positive number"),
-        ({"direction": "z"}, "direction is 'z': expected 'x' or '-x' or 'y' or '-y'"),
-        ({"fields": ("displacement",)}, "fields is 'displacement': of steady sliding expected some of pressure, gap"),
-        ({"tolerance": 2.0}, r"tolerance is 2\.0"),
+        ({"speeds": []}, "speeds", []),
+        ({"speeds": [1.0, -1.0]}, "speeds", [1.0, -1.0]),
+        ({"pressure": None}, "load", None),
+        ({"load": 1.0}, "load", 1.0),
+        ({"pressure": 0.0}, "pressure", 0.0),
+        ({"direction": "z"}, "direction", "z"),
     ],
 )
-def test_friction__refuses(settings, message):
-    with pytest.raises(rv.InputError, match=message):
-        rv.friction(ROUGH, RUBBER, **{**PRESS, **settings})
+def test_friction__refuses(settings, key, found):
+    with refused(key, found):
+        rv.friction(ROUGH, RUBBER, **PRESS | settings)
 
 
 def test_missing_points_and_fluids__are_refused():
@@ -230,20 +191,6 @@ def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion()
     rough = rv.self_affine((1e-3, 1e-3), (15, 11), hurst=0.8, rms_slope=0.1, seed=1)
     with pytest.raises(InputError, match="creeps without end"):
         rv.friction(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
-
-
-def test_convolutions__are_all_pairs_of_transforms(monkeypatch):
-    """Of the solution and of its forces."""
-    forward, plain = [], transforms(mirrored=False)
-
-    def counted(*given, **named):
-        forward.append(1)
-        return plain.of_field(*given, **named)
-
-    monkeypatch.setattr(steady, "transforms", lambda mirrored: replace(plain, of_field=counted))
-    ds = rv.friction(ROUGH, RUBBER, pressure=2e4, speeds=[2e-3, 0.2])
-    assert int(ds.convolutions.sum()) == len(forward)
-    assert (ds.convolutions > 2 * ds.iterations).all()
 
 
 def test_unsolved_speed__is_missing_and_the_others_stand(curve, monkeypatch):

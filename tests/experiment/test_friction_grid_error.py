@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.sliding_grid import AxisTransform, SlidingGrid
 from roughvisc.variables.sliding import SLIDING
 
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
@@ -79,15 +77,3 @@ def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
     assert np.isnan(rv.friction(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
     few = rv.from_array(1e-6 * np.array([[0.0, 1.0], [2.0, 0.5]]), 1e-3)
     assert np.isnan(rv.friction(few, RUBBER, **asked).grid_error_area).all()
-
-
-def test_coarser_face__has_the_same_waves_where_its_cells_can_hold_them():
-    x = (np.arange(48) + 0.5) / 48
-    height = rv.from_array(1e-6 * np.cos(2 * np.pi * x)[:, None] * np.cos(4 * np.pi * x), 1e-3 / 48)
-    face = SlidingGrid.of(Profile(height), AxisTransform.of("x"))
-    half = face.coarser(2.0)
-    assert half.gap.shape == (24, 24)
-    np.testing.assert_allclose(half.spacing, 2e-3 / 48)
-    at = (np.arange(24) * 2 + 0.5) / 48  # the transform keeps the first point
-    wave = 1e-6 * np.cos(2 * np.pi * at)[:, None] * np.cos(4 * np.pi * at)
-    np.testing.assert_allclose(half.gap - half.gap.mean(), -(wave - wave.mean()), atol=1e-18)

@@ -7,7 +7,6 @@ from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment import grid_error
 from roughvisc.experiment.coarser import block_means, coarser, pressure_distance
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.topography.grid import cell_edges
@@ -98,116 +97,6 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     approach = abs(float(ds.approach[0]) / exact.approach - 1)
     assert float(ds.grid_error[0]) > max(force, approach)
     assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area[0]) / np.pi - 1)
-
-
-@pytest.mark.parametrize(
-    ("at", "falls", "higher"),
-    [((5, 3), ((2, 1), (3, 4)), (2 + 4) / 2), ((0, 5), ((9, 6), (3, 2)), (6 + 3) / 2), ((6, 0), ((2, 9), (9, 1)), 1.5)],
-)
-def test_peak__is_half_of_the_way_to_the_lower_neighbour_along_each_axis(at, falls, higher):
-    """Heights fall by so much from cell to cell, on both sides along each axis; at a border one side is not there."""
-    sides = [np.arange(n) - i for n, i in zip((7, 6), at, strict=True)]
-    x, y = (np.where(side < 0, -low * side, high * side) for side, (low, high) in zip(sides, falls, strict=True))
-    assert grid_error._peak(rv.from_array(-1.0 * (x[:, None] + y), 0.5)) == higher
-
-
-def pressed_by_hand(approach=(1.0, 2.0)):
-    """Contact of six of 6 x 5 cells at two instants, the second at twice the pressure."""
-    pressure = np.zeros((6, 5))
-    pressure[1:4, 1:3] = [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]
-    histories = {"approach": list(approach), "force": [21.0, 42.0]}
-    histories |= {"contact_area": [5.0, 4.0], "contact_area_counted": [6.0, 5.5]}
-    return xr.Dataset(
-        {"height": (("x", "y"), np.zeros((6, 5))), "pressure": (("time", "x", "y"), np.stack([pressure, 2 * pressure]))}
-        | {name: ("time", values) for name, values in histories.items()},
-        coords={"time": [0.0, 1.0], "x": np.arange(6) + 0.5, "y": np.arange(5) + 0.5},
-        attrs={"boundary": "free"},
-    )
-
-
-def test_edge__of_a_contact_beside_absent_cells_by_hand():
-    """One cell lies beside absent ones alone, one beside both; the other four beside open ones."""
-    ds = pressed_by_hand()
-    for cell in ((0, 2), (1, 3), (3, 0)):
-        ds.height[cell] = np.nan
-    share, alone = 19 / 21, 2 / 21
-    faces = 2 + 1 + 1 + 1 + 2
-    hidden = 0.45 * share / (1 - 0.55 * share) + 0.9 * alone
-    counted, outline = 0.5 * np.sqrt(faces) / 6, 0.5 * np.sqrt(3) / 6
-    for time, (force, area) in enumerate([(1 / 2, 6 / 5), (1.0, 5.5 / 5)]):
-        assert grid_error._left_open(ds, time) == pytest.approx((hidden * force, counted * area, outline), rel=1e-12)
-
-
-@pytest.mark.parametrize("given", [True, False], ids=["approach", "load"])
-def test_peak_between_the_cells__errs_in_the_approach_or_in_force_and_area(given, monkeypatch):
-    """Where nothing else is left open: the grids agree, and the edge hides nothing."""
-    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0, 0.0))
-    ds, height = pressed_by_hand(), rv.from_array(-np.hypot(np.arange(6)[:, None] - 2, np.arange(5) - 1.0), 1.0)
-    other = ds if given else pressed_by_hand((1.0 + 1e-9, 2.0 - 1e-9))
-    found = grid_error.with_grid_error(ds, height, lambda *_: other)
-    # the peak is one cell above its neighbours: it may be higher by half of one along each axis
-    if given:
-        expected, area = 2 * 1.0 / np.array([1, 2]) * [21 / 42, 42 / 42], 2 * 1.0 / np.array([1, 2]) * [5 / 5, 4 / 5]
-    else:
-        expected, area = [1.0 / 2] * 2, [0.0, 0.0]
-    assert found.grid_error.values == pytest.approx(expected, rel=1e-9)
-    assert found.grid_error_area.values == pytest.approx(area, rel=1e-9)
-
-
-@pytest.mark.parametrize(("slides", "order"), [(False, 1.5), (True, 1.0)])
-def test_grid_error__of_an_area_that_slides_vanishes_more_slowly(slides, order, monkeypatch):
-    monkeypatch.setattr(grid_error, "_left_open", lambda *_: (0.0, 0.0, 0.0))
-    ds, height = pressed_by_hand(), rv.from_array(-np.hypot(np.arange(6)[:, None] - 2, np.arange(5) - 1.0), 1.0)
-    if slides:
-        ds = ds.assign(friction_force=("time", [1.0, 1.0]))
-    other = ds.assign(contact_area=ds.contact_area * 1.1, approach=ds.approach + 1e-3)
-    found = grid_error.with_grid_error(ds, height, lambda *_: other)
-    ratio = np.sqrt(30 / coarser(height, 2, "free").size)
-    assert found.grid_error_area[0] == pytest.approx(1.25 * 0.1 / (ratio**order - 1), rel=1e-6)
-
-
-def test_grid_error__takes_no_grid_for_another(monkeypatch):
-    """The fewest cells have no coarser ones; where a third grid is missing the two that are there count for less."""
-    for shape, missing in ((2, True), (3, True), (4, False)):
-        ds = pressed(shape, edge="accept")
-        assert bool(np.isnan(ds.grid_error).all()) is missing
-        assert np.isfinite(ds.pressure.values).all()
-    three = pressed((33, 31))
-    sound, asked = grid_error.coarser, []
-
-    def refused(height, factor, boundary):
-        asked.append(factor)
-        if factor > 2:
-            raise rv.InputError("no third grid")
-        return sound(height, factor, boundary)
-
-    monkeypatch.setattr(grid_error, "coarser", refused)
-    two = pressed((33, 31))
-    assert asked == [2.0, 4.0]
-    assert (two.grid_error_area >= three.grid_error_area).all()
-    assert (two.grid_error > three.grid_error).any()
-
-
-def test_grid_error__counts_faces_as_the_corrected_area_does():
-    """Cell by cell, on random contacts with absent cells."""
-    rng = np.random.default_rng(4)
-    for periodic in (False, True):
-        present = rng.random((7, 6)) < 0.8
-        contact = present & (rng.random((7, 6)) < 0.6)
-        at_edge, at_end, faces, ends = grid_error._edge(contact, present & ~contact, periodic)
-        counted = absent = 0
-        for i, j in np.argwhere(contact):
-            near = [(i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)]
-            if periodic:
-                near = [(k % 7, m % 6) for k, m in near]
-            there = [0 <= k < 7 and 0 <= m < 6 and present[k, m] for k, m in near]
-            open_ = [here and not contact[cell] for here, cell in zip(there, near, strict=True)]
-            counted += sum(open_)
-            absent += 4 - sum(there)
-            assert at_edge[i, j] == any(open_)
-            assert at_end[i, j] == (not all(there))
-        assert (faces, ends) == (counted, absent)
-        assert not (at_edge | at_end)[~contact].any()
 
 
 def test_grid_error__is_missing_unless_asked_for_and_leaves_the_rest_alone():

@@ -111,12 +111,6 @@ def no_half_space(monkeypatch):
         monkeypatch.setattr(Love, name, refuse)
 
 
-@pytest.mark.parametrize("path", PATHS)
-def test_another_kernel__is_used_everywhere(path, no_half_space):
-    found = pressed(path, Screened(5e4))
-    assert (found.status == 0).any() or (found.force > 0).any()
-
-
 def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
     kernel, n = Screened(0.05), 256
     x = np.arange(n) - n / 2
@@ -193,9 +187,3 @@ def test_a_kernel_with_a_mean__has_an_approach_under_uniform_pressure(control):
     assert float(ds.approach[0]) == pytest.approx(full, rel=1e-3)
     assert float(ds.force[0]) == pytest.approx(load, rel=1e-3)
     assert float(ds.contact_fraction[0]) == 1
-
-
-def test_kernel__with_an_older_name_is_refused():
-    """It would count as one that raises the surface, and lose its window without a word."""
-    with pytest.raises(rv.InputError, match="Mattress: bulges is now raises_surface"):
-        type("Mattress", (Kernel,), {"bulges": False})

@@ -5,7 +5,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment import loading
-from roughvisc.experiment.profile import Profile, is_mirrored, quarter, unfold
+from roughvisc.experiment.profile import Profile
 from roughvisc.variables import FIELDS
 
 ZENER = rv.zener(1.0, 1.0, 1.0)
@@ -73,61 +73,6 @@ def test_quarter__gives_what_the_whole_surface_gives(name, profiles, monkeypatch
         np.testing.assert_allclose(found[figure], whole[figure], rtol=0, atol=1e-6 * scale, err_msg=figure)
     for axis in (1, 2):
         assert np.array_equal(found.pressure, np.flip(found.pressure, axis))
-
-
-def test_quarter__is_all_that_is_solved(solved_on):
-    settings = {"times": 2, "tolerance": 1e-2, "progress": False, "boundary": "periodic"}
-    rv.simulate(rv.mirror(SCAN), ZENER, rv.Program().load(0.01, over=0.1), **settings)
-    assert set(solved_on) == {(22, 17)}, "a scan mirrored to be periodic costs no more than itself"
-    solved_on.clear()
-    rv.simulate(SCAN, ZENER, rv.Program().load(0.01, over=0.1), **settings)
-    assert set(solved_on) == {(22, 17)}
-    solved_on.clear()
-    rv.simulate(rv.sphere(1.0, 1.0, (24, 21)), ZENER, rv.Program().load(0.01, over=0), edge="accept", progress=False)
-    assert set(solved_on) == {(24, 21)}, "the middle of 21 cells is a cell"
-
-
-def test_border__of_a_quarter_is_that_of_the_surface():
-    """Its inner sides are not."""
-    ball = rv.from_array(rv.sphere(1.0, 0.2, (20, 24)).values, 0.01)
-    with pytest.raises(rv.EdgeContactError, match="20 x 24 cells"):
-        rv.simulate(ball, ZENER, LOADED_TWICE, boundary="free", progress=False)
-
-
-def test_seed_method__solves_all_of_it(profiles):
-    numerics = rv.Numerics(method="seed", time_step=0.1)
-    settings = {"numerics": numerics, "edge": "accept", "tolerance": 1e-2, "progress": False}
-    rv.simulate(rv.sphere(1.0, 1.0, 12), rv.maxwell(1.0, 1.0), rv.Program().load(0.05, over=0).hold(0.2), **settings)
-    assert not profiles[0].mirrored
-
-
-@pytest.mark.parametrize(
-    ("height", "expected"),
-    [
-        (rv.sphere(1.0, 1.0, (8, 6)), True),
-        (1e3 + rv.sphere(1.0, 1.0, (8, 6)), True),
-        (rv.flat_punch(0.3, 1.0, (8, 6)), True),
-        (rv.sphere(1.0, 1.0, (7, 6)), False),
-        (rv.sphere(1.0, 1.0, (6, 7)), False),
-        (rv.self_affine(1.0, (8, 6), hurst=0.5, rms_slope=0.1, seed=0), False),
-        (rv.from_array(np.repeat([[0.0, 1.0, 1.0, 0.0]], 4, axis=0), 1.0), True),
-        (rv.from_array(np.repeat([[0.0, 1.0, 2.0, 0.0]], 4, axis=0), 1.0), False),
-        (rv.from_array(np.repeat([[0.0, 1.0, 2.0, 0.0]], 4, axis=0).T, 1.0), False),
-        (rv.from_array(np.array([[np.nan, 1.0], [1.0, 1.0]]), 1.0), False),
-        (rv.from_array(np.array([[1.0, 1.0 + 1e-13], [1.0, 1.0]]), 1.0), False),
-    ],
-)
-def test_is_mirrored__in_both_axes_to_rounding(height, expected):
-    assert is_mirrored(height.values) is expected
-
-
-@pytest.mark.parametrize("shape", [(8, 6), (2, 4), (2, 2)])
-def test_unfold__fills_the_other_three_quarters(shape):
-    field = np.random.default_rng(0).random(shape)
-    corner = field[quarter(shape)].copy()
-    unfold(field)
-    assert is_mirrored(field)
-    assert np.array_equal(field[quarter(shape)], corner)
 
 
 def test_checkpoint__goes_on_with_a_quarter(tmp_path):

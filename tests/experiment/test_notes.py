@@ -2,13 +2,10 @@
 
 import re
 
-import numpy as np
 import pytest
 
 import roughvisc as rv
 from roughvisc.labels import warnings_of
-from roughvisc.study.execution.run import unconverged
-from roughvisc.views.figures.sections import cut_position
 
 BALL = rv.sphere(1e-3, 2e-4, 16)
 PRESS = rv.Program().load(1e-4, over=0.05).hold(0.1)
@@ -27,25 +24,6 @@ def test_accuracy__is_no_warning_if_every_row_keeps_the_tolerance():
 @pytest.mark.parametrize("material", [rv.kelvin_voigt(1e6, 1e5), rv.zener(1e8, 1e6, 1e5)])
 def test_accuracy__warns_of_materials_with_little_instantaneous_compliance(material):
     assert "instantaneous" in warnings_of(press(material).attrs)["accuracy"]
-
-
-def test_accuracy__counts_the_rows_that_state_more_than_the_tolerance():
-    ds = press(rv.zener(3e6, 1e6, 1e5), numerics=rv.Numerics(time_step=0.05))
-    errors = ds.stated_error.values
-    missed = np.count_nonzero(errors > 1e-2)
-    assert missed
-    assert warnings_of(ds.attrs)["tolerance"].startswith(f"{missed} of 3 rows")
-    assert f"{errors.max():.2g}" in warnings_of(ds.attrs)["tolerance"]
-
-
-def test_unconverged__counts_rows_and_names_the_first():
-    histories = {"status": np.array([0, 1]), "time": np.array([0.0, 0.5]), "residual": np.array([0.0, 0.02])}
-    found = unconverged(histories)
-    assert found.startswith("1 of 2 kept times")
-    assert "t = 500 ms" in found
-    assert "0.02" in found
-    assert "nan" not in unconverged(histories | {"residual": np.array([0.0, np.nan])})
-    assert unconverged(histories | {"status": np.array([0, 0])}) == ""
 
 
 ROUGH = rv.self_affine((64e-6, 48e-6), (64, 48), hurst=0.8, rms_slope=0.1, rolloff=3e-5, shortcut=8e-6, seed=1)
@@ -88,12 +66,3 @@ def test_edge__states_when_contact_reached_the_border(caplog):
     assert warning in caplog.text
     assert "edge" not in warnings_of(ball_pressed(0.2 * depth, edge="accept").attrs)
     assert "edge" not in warnings_of(ball_pressed(0.05 * depth, edge="accept", boundary="periodic").attrs)
-
-
-def test_section__is_not_cut_along_the_seam():
-    part = ROUGH.isel(x=slice(0, 33), y=slice(0, 25))
-    part = part.where(part.y > part.y[1], part + 1e-6)  # a ridge along one border
-    ds = pressed(part)
-    assert "border" in warnings_of(ds.attrs)
-    assert int(ds.pressure[-1].sum("x").values.argmax()) < 2
-    assert 2 <= cut_position(ds, 0, "y") < 23

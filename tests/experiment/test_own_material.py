@@ -1,6 +1,5 @@
 """Materials of the user's own: any creep compliance and its integral, by a series or by its whole past."""
 
-import json
 import math
 from dataclasses import dataclass
 
@@ -13,9 +12,8 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import lee_radok_step
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.materials.protocol import Completed, complete, mean_of
+from roughvisc.mechanics.materials.protocol import mean_of
 from roughvisc.mechanics.materials.series import series_of
-from roughvisc.study.statement.case import Case
 
 
 @dataclass(frozen=True)
@@ -128,16 +126,6 @@ def test_no_compliance_at_once__has_a_series_too():
     assert series.error <= 1e-4
 
 
-def test_what_is_left_out__is_filled_in():
-    assert complete(rv.elastic(1e6)) == rv.elastic(1e6)
-    material = complete(Stretched())
-    assert (material.poisson, material.note) == (0.5, "")
-    assert complete(Logarithmic()).note == "logarithmic creep"
-    assert complete(material) is material
-    assert complete(material) == Completed(Stretched())
-    assert Inherited().mean_contact_compliance(0.1, 0.2) == pytest.approx(material.mean_contact_compliance(0.1, 0.2))
-
-
 @pytest.mark.parametrize("s", [0.0, 1e-9, 0.3, 1e6])
 def test_means__keep_their_digits(s):
     known = rv.zener(1e6, 5e5, 1e5)
@@ -155,26 +143,6 @@ def test_a_pair__takes_one():
     choice = choose_memory(both, 2.0, 1e-3)
     assert choice.series_error <= 1e-4
     assert choice.material.contact_compliance(t) == pytest.approx(both.contact_compliance(t), rel=1e-4)
-
-
-def test_a_plan__takes_one(monkeypatch, tmp_path):
-    monkeypatch.setattr(Case, "material", lambda self: Stretched())
-    monkeypatch.setattr(Case, "body", lambda self: rv.Body(Stretched()))
-    case = Case.from_json(
-        json.dumps(
-            {
-                "surface": {"generate": "sphere", "radius": 1e-3, "size": 2e-4, "shape": 45},
-                "material": {"model": "elastic", "shear_modulus": 3e6},
-                "program": [{"load": 1e-3, "over": 0.1}],
-                "keep": {"times": 2},
-            }
-        )
-    )
-    planned = rv.plan([case], tmp_path)
-    assert planned.attrs["refusal"] == ""
-    assert int(planned.exponentials[0]) > 3
-    ds = rv.run(case, tmp_path, progress=False)
-    assert ds.attrs["memory"] == str(planned.memory_model.values[0])
 
 
 def test_a_compliance_of_no_passive_material__is_said_to_be_none():

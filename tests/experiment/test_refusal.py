@@ -4,9 +4,7 @@ import resource
 import subprocess
 import sys
 import threading
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from scipy import fft
 
@@ -14,11 +12,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError, TooLargeError, TransientError
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.resources import PROCESS, Available, cores, curve_bytes, memory_available, threads_for
-from roughvisc.experiment.steady_sliding import SlidingRows
+from roughvisc.experiment.resources import Available, cores, threads_for
 from roughvisc.mechanics import arrays as threads_module
-from roughvisc.problem import Problem
-from roughvisc.settings import Settings
 from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases, read_study, vary
@@ -96,24 +91,6 @@ def test_simulate__refuses_what_cannot_fit_and_says_what_would(limited):
     assert "rv.run, which keeps the fields in a file" in str(found.value)
 
 
-def test_small_case__is_not_asked_about(monkeypatch):
-    monkeypatch.setattr(resources, "memory_available", lambda: pytest.fail("the memory was looked at"))
-    height = rv.sphere(1e-2, 1e-3, (24, 21))
-    rv.simulate(height, rv.elastic(1e6), rv.Program().load(1e-3, over=0), progress=False)
-
-
-def test_mirrored_and_followed_surfaces__are_judged_by_what_they_take(limited):
-    ball = rv.sphere(1e-2, 1e-3, (600, 600))
-    problem = Problem(ball, rv.Body(RUBBER), Settings(boundary="periodic", times=2))
-    fields = 8.0 * ball.size
-    limited(12 * fields)
-    resources.require_memory(problem, PRESS, in_memory=False)
-    off = problem.on(ball + 1e-6 * np.arange(600))
-    with pytest.raises(TooLargeError):
-        resources.require_memory(off, PRESS, in_memory=False)
-    resources.require_memory(off.on(off.height, boundary="free"), PRESS, in_memory=False)
-
-
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
     path = study(ROUGH.replace("times = 5", "times = 2") + '[sweep]\n"surface.shape" = [[600, 512], [24, 20]]\n')
     limited(40e6)
@@ -126,31 +103,6 @@ def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
     limited(500e6)
     assert side_module.side_by_side([cases[0]] * 4, 4) == 1
     assert side_module.threads_each(1) == cores()
-
-
-def test_curves_of_friction__run_side_by_side_as_memory_allows(study, limited):
-    """A curve has no program that could be marched."""
-    head = ROUGH.partition("[[program]]")[0]
-    curve = '[friction]\npressure = "20 kPa"\nspeeds = ["1 mm/s"]\n'
-    sizes = '[solve]\nboundary = "periodic"\n[sweep]\n"surface.shape" = [[600, 512], [512, 600]]\n'
-    cases = read_cases(study(head + curve + sizes))
-    each = PROCESS + curve_bytes(cases[0].solving(), 600 * 512)
-    limited(2.1 * each / resources.PART)
-    assert side_module.side_by_side(cases, 2) == 2
-    limited(1.9 * each / resources.PART)
-    assert side_module.side_by_side(cases, 2) == 1
-
-
-def test_curve_of_friction__is_refused_where_it_cannot_fit(study, limited, tmp_path, monkeypatch, invoke):
-    monkeypatch.setattr(SlidingRows, "_at", lambda *_: pytest.fail("a speed was solved"))
-    head = ROUGH.partition("[[program]]")[0]
-    path = study(head + '[friction]\npressure = "20 kPa"\nspeeds = ["1 mm/s"]\n[solve]\nboundary = "periodic"\n')
-    limited(40e6)
-    status, _, wrong = invoke("run", str(path), "--no-plots")
-    assert status == 2
-    assert "study.toml: 600 x 512 cells need about" in wrong.replace("\n", " ")
-    assert "what would fit: 300 x 256 cells" in wrong.replace("\n", " ")
-    assert not list(tmp_path.glob("results/**/*.nc")), "nothing is kept of it"
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -198,12 +150,6 @@ def test_limit_of_the_address_space__counts():
     assert 0 < int(said[0]) < limit
     assert "ulimit -v" in said[1]
     assert resource.getrlimit(resource.RLIMIT_AS)[0] != limit
-
-
-def test_limit_of_a_dask_worker__counts(monkeypatch):
-    worker = SimpleNamespace(memory_manager=SimpleNamespace(memory_limit=10**6))
-    monkeypatch.setattr(resources, "_dask_worker", lambda: worker)
-    assert memory_available().words == "left of the Dask worker's memory limit"
 
 
 def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatch):

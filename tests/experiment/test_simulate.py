@@ -9,9 +9,7 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment import profile
 from roughvisc.experiment.scene import kept_times
-from roughvisc.labels import annotate
 from roughvisc.mechanics import arrays as threads_module
-from roughvisc.recorder import RowsInMemory
 from roughvisc.variables import FIELDS, VARIABLES
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
@@ -212,13 +210,6 @@ def test_progress__is_reported_to_a_function():
     assert seen == sorted(seen)
 
 
-def test_annotate__refuses_what_is_not_declared():
-    with pytest.raises(KeyError, match="stress"):
-        annotate(xr.Dataset({"stress": ("time", [1.0])}))
-    with pytest.raises(ValueError, match="declared are"):
-        annotate(xr.Dataset({"force": ("x", [1.0])}))
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # the window follows the contact
 
@@ -271,24 +262,9 @@ def test_window__changes_nothing_but_cost(name, solved_on, monkeypatch):
     assert (np.abs(followed.contact_area - whole.contact_area) <= 0.02 * whole.contact_area.max()).all()
 
 
-def test_window__finds_the_contact_on_the_second_hill(solved_on):
-    ds = simulate(two_hills(), *FOLLOWED["loading and unloading"], boundary="free")
-    assert ds.pressure[1].where(ds.x > 1.7e-4).max() > 0
-
-
 def test_window__stops_at_the_border_of_a_scan():
     with pytest.raises(rv.EdgeContactError, match="151 x 133"):
         simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5), boundary="free")
-
-
-def test_window__is_not_for_what_has_absent_cells_or_no_end(solved_on):
-    bored = two_hills()
-    bored[40:50, 40:50] = np.nan
-    press = rv.Program().load(1e-4, over=0)
-    simulate(bored, ZENER, press, missing="absent", boundary="free")
-    simulate(two_hills(), ZENER, press, edge="accept", boundary="free")
-    simulate(two_hills(), ZENER, press, boundary="periodic")
-    assert set(solved_on) == {(151, 133)}
 
 
 def test_threads__change_no_bit(monkeypatch):
@@ -304,33 +280,7 @@ def test_threads__change_no_bit(monkeypatch):
             assert ds[name].values.tobytes() == found[0][name].values.tobytes(), name
 
 
-def test_window__after_a_jump_is_foreseen(solved_on):
-    """One coarse grid to foresee it, and one window from then on."""
-    ball = rv.sphere(1e-3, size=1.2e-3, shape=(301, 297))
-    ds = simulate(ball, rv.elastic(1e6), rv.Program().load(2e-2, over=0).hold(1.0))
-    assert len(solved_on) == 2
-    assert solved_on[1] < (301, 297)
-    assert float(ds.force[-1]) == 2e-2
-
-
 def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on):
     with pytest.raises(rv.InputError, match="expected at most 1e\\+100 N"):
         simulate(two_hills(), program=rv.Program().load(1e200, over=0), boundary="free")
     assert not solved_on
-
-
-@pytest.mark.parametrize("size", [1.2e-3, 0.3e-3], ids=["window", "whole"])
-def test_kept_rows__hold_nothing_but_what_they_keep(size, monkeypatch):
-    """A field that is a part of a larger array would keep all of that in memory."""
-    kept = []
-    append = RowsInMemory.append
-
-    def appended(self, plain, arrays):
-        kept.extend(arrays.values())
-        append(self, plain, arrays)
-
-    monkeypatch.setattr(RowsInMemory, "append", appended)
-    ball = rv.sphere(1e-3, size=size, shape=(101, 97))
-    simulate(ball, ZENER, rv.Program().load(1e-4, over=0).hold(1.0), times=3, fields=FIELDS)
-    assert kept
-    assert all(array.base is None for array in kept)

@@ -9,7 +9,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.scene import kept_times, snap_to_cells
-from roughvisc.study.statement.case import Case, read_study, vary
+from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words
 
@@ -167,47 +167,6 @@ def test_study__states_the_same_program(study):
     words = program_words(json.loads(case.to_json())["program"])
     assert words[2] == "slide 1 mm, speed 100 mm/s, direction x"
     assert unit_of("program.2.speed") == "m/s"
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("program.2.slide", 2e-3), ("program.2.speed", 0.2), ("program.2.direction", "y"), ("program.4.over", 1e-3)],
-)
-def test_key_of_a_case__counts_all_of_a_slide(study, key, value):
-    case = read_study(study)
-    assert vary(case, {key: value}).key != case.key
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('speed = "0.1 m/s"', "", "program.2: a slide has either a speed or a duration: found neither"),
-        (
-            'speed = "0.1 m/s"',
-            "speed = 1\nover = 1",
-            "program.2: a slide has either a speed or a duration: found both, expected one",
-        ),
-        ('speed = "0.1 m/s"', 'speed = "1 m"', "program.2.speed: found '1 m'"),
-        ('slide = "1 mm"', "slide = 0", "program.2.slide: found 0: expected"),
-        ('direction = "-x"', 'direction = "z"', "program.4.direction: found 'z': expected"),
-        ('slide = "1 mm"', 'slide = "1 mm"\ncontrol = "load"', "program.2.control: unknown key"),
-    ],
-)
-def test_study__refuses_in_plain_words(tmp_path, old, new, message):
-    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
-    with pytest.raises(InputError, match=message):
-        read_study(tmp_path / "study.toml")
-
-
-def test_plan__counts_the_cells(study):
-    found = rv.plan([read_study(study)]).isel(case=0)
-    ds = rv.simulate(wave(), RUBBER, read_study(study).program(), boundary="periodic", times=9, progress=False)
-    assert found.refusal.item() == ""
-    assert "36 of one cell in slides" in found.scheme.item()
-    assert found.steps.item() == pytest.approx(rv.observables.history(ds).sizes["time"], rel=0.4)
-    assert found.rows.item() == 9
-    refused = rv.plan([vary(read_study(study), {"program.2.slide": 1e-5})]).refusal.item()
-    assert "program.2: a slide of 10 µm is less than half a cell" in refused
 
 
 def test_friction_error__of_a_stroke_of_one_cell_is_the_whole_force():

@@ -51,13 +51,6 @@ def test_histories__follow_the_closed_form(result):
         assert abs(approach - exact) < (1e-3 + 0.1 * (CELL**2 / (RADIUS * exact))) * exact
 
 
-def test_histories__are_stored_and_read_by_the_same_names(result, tmp_path):
-    from roughvisc.study.storage.store import open_result, write_result
-
-    with open_result(write_result(result, tmp_path / "result.nc")) as found:
-        xr.testing.assert_identical(rv.observables.history(found).load(), rv.observables.history(result).load())
-
-
 def test_histories__where_every_step_is_kept_are_the_result():
     ds = rv.simulate(BALL, RUBBER, PROGRAM, tolerance=1e-2, progress=False)
     xr.testing.assert_equal(rv.observables.history(ds).force, ds.force)

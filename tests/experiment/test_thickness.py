@@ -1,6 +1,5 @@
 """A sheet on a rigid base, from the study to the result: against the integral equation, and what is refused."""
 
-import json
 import math
 from types import SimpleNamespace
 
@@ -12,13 +11,10 @@ from scipy.interpolate import CubicSpline
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
-from roughvisc.mechanics.contact import solve_contact
-from roughvisc.study.statement.case import Case, read_cases, vary
+from roughvisc.study.statement.case import Case, read_cases
 
 RADIUS, THICKNESS = 1e-3, 1e-4
 WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
@@ -124,20 +120,6 @@ def test_thick_sheet__tends_to_the_half_space(boundary):
     assert "thickness" not in endless.attrs
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-@pytest.mark.parametrize(("poisson", "base"), [(0.5, "bonded"), (0.3, "bonded"), (0.5, "slipping")])
-def test_iterations__are_about_those_on_a_half_space(boundary, poisson, base):
-    rough = rv.self_affine(1.0, (63, 64), hurst=0.8, rms_slope=0.2, rolloff=0.3, seed=3).values
-    gap, cell = rough.max() - rough, (1 / 63, 1 / 64)
-    for load in (0.002, 0.02, 0.05):
-        half = solve_contact(Operator((63, 64), cell, boundary), gap, load=load * gap.size, tolerance=1e-8)
-        for thickness in (0.1, 0.3, 1.0):
-            body = Operator((63, 64), cell, boundary, kernel=Sheet(thickness, poisson, base))
-            found = solve_contact(body, gap, load=load * gap.size, tolerance=1e-8)
-            assert found.converged
-            assert found.iterations <= 1.3 * half.iterations + 1
-
-
 def test_both_memories_and_the_grid_that_grows__agree():
     """The history of pressures, which survives a change of grid, and that of displacements."""
     rubber, load = rv.zener(1e6, 3e5, 1e5), rv.Program().load(2e-3, over=0.1).hold(1.0).load(1e-3, over=0.1)
@@ -217,19 +199,6 @@ def test_study__presses_the_sheet_that_it_states(case, tmp_path):
     assert Case.from_json(ds.attrs["case"]).body() == case.body()
 
 
-def test_key__knows_the_sheet_and_leaves_half_spaces_as_they_were(case):
-    bare = vary(case, {"material.thickness": math.inf})
-    assert bare.body().kernel == HALF_SPACE
-    sheets = [{"material.thickness": h, "material.base": b} for h in (1e-4, 2e-4) for b in ("bonded", "slipping")]
-    keys = [vary(case, changes).key for changes in sheets]
-    assert len({*keys, bare.key}) == 5
-    assert case.key == keys[1]
-    without = json.loads(case.to_json())
-    for key in ("thickness", "base"):
-        without["material"].pop(key)
-    assert bare.key == Case.from_json(json.dumps(without)).key
-
-
 def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
     path = tmp_path / "sweep.toml"
     path.write_text(STUDY + '[sweep]\n"material.thickness" = ["50 um", "0.2 mm", inf]\n')
@@ -240,21 +209,6 @@ def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
     assert len(set(approach)) == 3
     again = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
     assert again.approach.identical(results.approach)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"material.thickness": "-1 mm"}, "material.thickness: found '-1 mm': expected a number in m"),
-        ({"material.thickness": "2 s"}, "material.thickness: found '2 s'"),
-        ({"material.base": "glued"}, "material.base: found 'glued': expected 'bonded' or 'slipping'"),
-        ({"material.poisson": -0.2}, "material.thickness: Poisson's ratio of a sheet is -0.2: expected 0 to 1/2"),
-        ({"material.bulk_modulus": "2 GPa"}, "Poisson ratio changes in time: expected one body"),
-    ],
-)
-def test_study__refuses(case, change, message):
-    with pytest.raises(rv.InputError, match=message):
-        vary(case, change)
 
 
 def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path):
@@ -272,24 +226,6 @@ def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tm
         assert done.exit_code == 2, done.output
         assert "51 times the thickness" in " ".join((done.output + done.stderr).split())
     assert not list(tmp_path.glob("out/*.nc"))
-
-
-def test_study__refuses_a_base_without_thickness_and_sheets_in_a_pair(tmp_path):
-    study = tmp_path / "s.toml"
-    study.write_text(STUDY.replace('thickness = "0.1 mm"\n', ""))
-    done = CliRunner().invoke(main, ["run", str(study)])
-    assert done.exit_code == 2
-    assert "material.base: base is 'slipping' without a thickness: expected both, or neither" in done.stderr
-    body = '{ model = "elastic", shear_modulus = "1 MPa"%s }'
-    pair = 'model = "pair"\na = ' + body + "\nb = " + body
-    start, end = STUDY.index('model = "zener"'), STUDY.index("[[program]]")
-    for one, other, below, message in (
-        (', thickness = "1 mm"', "", "", "material.a: found a thickness: expected none"),
-        ("", "", '\nthickness = "1 mm"', "the material is a pair of bodies: expected one body"),
-    ):
-        study.write_text(STUDY[:start] + pair % (one, other) + below + "\n" + STUDY[end:])
-        with pytest.raises(rv.InputError, match=message):
-            read_cases(study)
 
 
 def test_python__refuses(case):

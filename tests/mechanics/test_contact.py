@@ -1,7 +1,5 @@
 """The instantaneous contact problem: optimality, oracles, an independent program, degenerate cases."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,7 +10,6 @@ from strategies import boundaries, examples, shapes
 from support import direct, rough_gap
 
 import roughvisc as rv
-from roughvisc.mechanics import arrays as passes
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact, solver
@@ -396,22 +393,6 @@ def test_error__is_honestly_estimated():
     assert np.mean(ratios < 10) > 0.95
 
 
-@pytest.mark.parametrize("known", [{"load": 20.0}, {"approach": 2.0}], ids=["load", "approach"])
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_error__costs_nothing_unless_asked_for(boundary, known):
-    operator, gap = Operator((31, 28), (1.0, 1.0), boundary), rough_gap((31, 28))
-    plain = solve_contact(operator, gap, tolerance=1e-4, **known)
-    asked = solve_contact(operator, gap, tolerance=1e-4, estimate_error=True, **known)
-    assert np.isnan(plain.error)
-    assert 0 < asked.error < 1e-2
-    assert asked.pressure.tobytes() == plain.pressure.tobytes()
-    singular = boundary == "periodic" and "approach" in known
-    assert asked.convolutions - plain.convolutions == (2 if singular else 0)
-    again = solve_contact(operator, gap, tolerance=1e-4, start=asked.pressure, estimate_error=True, **known)
-    assert again.iterations == 0
-    assert 0 < again.error < 1e-2
-
-
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_error__has_no_unit(boundary):
     errors = []
@@ -486,22 +467,6 @@ def test_unconverged_state__has_its_own_displacement():
     assert not state.converged
     expected = operator.displacement(state.pressure)
     assert np.abs(state.displacement - expected).max() < 1e-13 * expected.max()
-
-
-@pytest.mark.parametrize(("mean", "fields"), [(0.3, 10.8), (3.0, 12.5)], ids=["half", "full"])
-def test_memory__is_that_of_a_few_fields(monkeypatch, mean, fields):
-    """What a step needs is freed when it is taken, and the displacement of the last before the next is convolved."""
-    monkeypatch.setattr(passes, "_BLOCK", 1000)
-    gap = rough_gap((128, 125))
-    operator = Operator(gap.shape, (1.0, 1.0))
-    solve_contact(operator, gap, load=mean * gap.size, tolerance=0.1)  # kernels and transforms are there already
-    tracemalloc.start()
-    try:
-        solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-4, overwrite=True)
-        largest = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert largest < fields * gap.nbytes
 
 
 def test_first_guess__of_a_quarter_knows_its_mirror_images():

@@ -25,41 +25,6 @@ def test_first_guess__is_the_pressure_of_hertz(shape, spacing):
     assert np.abs(centre) == pytest.approx(0, abs=0.01 * width)
 
 
-@pytest.mark.parametrize("shape", [(256, 302), (257, 301)])
-def test_first_guess__is_the_solution_on_blocks_of_two_by_two_cells(shape, monkeypatch):
-    """Of a profile that is uniform over each block, on cells of a grid of the same period."""
-    monkeypatch.setattr(solver, "_COARSE_TOLERANCE", 1e-10)
-    random, spacing = np.random.default_rng(3), (0.3, 0.2)
-    of_blocks = tuple(n // 2 for n in shape)
-    profile = random.random(of_blocks)
-    within = [np.arange(n) * m // n for n, m in zip(shape, of_blocks, strict=True)]
-    gap = profile[np.ix_(*within)]
-    load = 0.05 * gap.size
-    guess = solver.coarse_guess(Operator(shape, spacing, "periodic"), gap, load)
-    wide = tuple(d * n / m for d, n, m in zip(spacing, shape, of_blocks, strict=True))
-    of_them = load * profile.size / gap.size
-    found = solver.solve_contact(Operator(of_blocks, wide, "periodic"), profile, load=of_them, tolerance=1e-10)
-    assert 0.01 < np.mean(found.pressure > 0) < 0.5
-    np.testing.assert_allclose(guess, found.pressure[np.ix_(*within)], atol=1e-4 * found.pressure.max())
-
-
-def test_first_guess__is_of_means_over_blocks():
-    """A profile that rises in one cell of each pair by what it falls in the other is flat to it."""
-    random, shape = np.random.default_rng(5), (258, 256)
-    rises = [np.kron(random.random(n // 2), [1.0, -1.0]) for n in shape]
-    gap = 3.0 + rises[0][:, None] + rises[1]
-    guess = solver.coarse_guess(Operator(shape, (1.0, 1.0), "periodic"), gap, 5.0)
-    np.testing.assert_allclose(guess, 5.0 / guess.size, rtol=1e-9)
-
-
-def test_first_guess__is_for_large_grids():
-    x, y = np.indices((256, 255)) - 127.3
-    gap = x**2 + y**2
-    assert solver.coarse_guess(Operator((256, 255), (1.0, 1.0)), gap, 1.0) is None
-    wide = np.pad(gap, ((0, 0), (0, 1)), mode="edge")
-    assert all(solver.coarse_guess(Operator((256, 256), (1.0, 1.0)), wide, load) is not None for load in (1.0, 1e9))
-
-
 def test_contact__asks_for_a_load_or_an_approach():
     operator, gap = Operator((3, 4), (1.0, 1.0)), np.zeros((3, 4))
     for known in ({}, {"load": 1.0, "approach": 1.0}):

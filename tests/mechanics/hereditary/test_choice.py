@@ -116,11 +116,6 @@ def test_direct_history__is_refused_where_nothing_gives_way_at_once():
         assert isinstance(choose_memory(material, 0.0, 1e-3, kind="direct").memory, History)
 
 
-def test_unknown_kind_of_memory__is_refused():
-    with pytest.raises(rv.InputError, match="memory is 'recursive': expected 'auto' or 'direct'"):
-        choose_memory(rv.elastic(1.0), 1.0, 1e-3, kind="recursive")
-
-
 class Dented:
     """A compliance of one that falls to a half for good at some age: no creep compliance."""
 
@@ -151,17 +146,6 @@ def test_jumps_alone__ask_for_the_instantaneous_compliance_only():
         choice = choose_memory(material, 0.0, 1e-3)
         assert isinstance(choice.memory, History)
         assert (choice.series_error, choice.note) == (0.0, f"{note} compliance")
-
-
-@pytest.mark.parametrize(
-    ("count", "fluidity", "form"),
-    [(1, 0.0, "both"), (3, 0.0, "both"), (2, 0.5, "both"), (3, 0.5, "pressure"), (4, 0.0, "pressure")],
-)
-def test_few_exponentials__are_remembered_as_pressures_and_as_displacements(count, fluidity, form):
-    """Up to three fields, a fluidity among them, and only where the grid may change."""
-    series = rv.Prony(1.0, fluidity, (1.0,) * count, tuple(10.0**i for i in range(count)))
-    assert choose_memory(series, 10.0, 1e-3, "pressure").memory.acts_on == form
-    assert choose_memory(series, 10.0, 1e-3).memory.acts_on == "displacement"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from strategies import examples, seeds, series
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.direct import _BLOCK, History, history_bytes
+from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 
 SHAPE = (3, 4)
@@ -58,24 +58,6 @@ def test_direct_history__is_exact_for_linear_pressure(material):
         assert q == pytest.approx(np.full(SHAPE, exact), rel=1e-12)
 
 
-def test_state__keeps_cells_in_contact_only():
-    field = np.zeros(SHAPE)
-    field[1, 2] = 3.0
-    _, state = run(History(rv.maxwell(1.0, 1.0)), [0.1] * 100, [field] * 100)
-    assert sum(block.pressures.size for block in state.blocks) <= 101  # one for the state at rest
-
-
-def test_state__gathers_its_steps_into_blocks():
-    """One block a step would cost an array operation for each past step, at every step."""
-    memory = History(rv.zener(1.0, 1.0, 1.0))
-    state, steps = memory.start((4, 3)), 5 * _BLOCK + 7
-    for number in range(steps):
-        state = memory.advance(state, 0.1, "linear", np.full((4, 3), 1.0 + number))
-    lengths = [len(block.pressures) for block in state.blocks]
-    assert sum(lengths) == steps + 1  # one for the state at rest
-    assert len(lengths) <= 5 + _BLOCK
-
-
 def test_enlarged__is_the_same_history_on_a_larger_grid():
     rng = np.random.default_rng(2)
     steps, fields = [0.2] * 40, [rng.random(SHAPE) for _ in range(40)]
@@ -87,19 +69,6 @@ def test_enlarged__is_the_same_history_on_a_larger_grid():
         assert alpha_moved == alpha
         assert np.array_equal(carried_moved[2:5, 3:7], carried)
         assert np.count_nonzero(carried_moved) == carried.size
-
-
-def test_unknown_rule__is_refused():
-    memory = History(rv.maxwell(1.0, 1.0))
-    with pytest.raises(ValueError, match="no rule 'bdf2'"):
-        memory.predict(memory.start(SHAPE), 0.1, "bdf2")
-
-
-def test_memory_needed__is_that_of_the_pressures_kept():
-    field = np.zeros(SHAPE)
-    field[:, 1:] = 2.0
-    _, state = run(History(rv.maxwell(1.0, 1.0)), [0.1] * 70, [field] * 70)
-    assert history_bytes(9, 71) == sum(block.pressures.nbytes for block in state.blocks)  # and the state at rest
 
 
 def test_constant_pressure__by_the_rule_of_a_jump_at_the_start_of_the_step():

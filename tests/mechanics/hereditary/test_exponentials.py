@@ -9,7 +9,7 @@ from support import direct as displaced
 
 import roughvisc as rv
 from roughvisc.mechanics.hereditary.exponentials import Modes, padded
-from roughvisc.mechanics.hereditary.memory import mean_compliance, old_weight, stiff_ratio
+from roughvisc.mechanics.hereditary.memory import mean_compliance, stiff_ratio
 
 CELL = (1, 1)
 
@@ -48,23 +48,6 @@ def histories(draw):
     pressures = draw(st.lists(st.floats(0, 1e3), min_size=times.size, max_size=times.size))
     material = draw(series(st.floats(0.01, 10), st.floats(0.01, 10), st.floats(1e-2, 1e2), (0.0, 0.3)))
     return material, times, np.array(pressures)
-
-
-@pytest.mark.parametrize("fluidity", [0.0, 0.2])
-def test_coefficients__are_those_of_their_own_step_and_cannot_be_changed(fluidity):
-    """They are remembered for the next one who asks: for what is asked next they are others."""
-    memory = Modes(rv.Prony(1.0, fluidity, (0.5, 0.25), (0.1, 3.0)))
-    state = memory.start(CELL)
-    twice = [
-        memory.coefficients(state, step, rule) for _ in range(2) for step in (0.1, 0.2) for rule in ("linear", "right")
-    ]
-    for first, again in zip(twice[:4], twice[4:], strict=True):
-        assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
-    assert len({found[3].tobytes() for found in twice}) == 4
-    own = [1.0] if fluidity else []
-    np.testing.assert_allclose(twice[1][0], [np.exp(-0.1 / 0.1), np.exp(-0.1 / 3.0), *own], rtol=1e-15)
-    with pytest.raises(ValueError, match="read-only"):
-        twice[0][3][0] = 1.0
 
 
 @given(histories())
@@ -111,16 +94,6 @@ def test_coefficients__keep_a_constant_at_any_step(rule, x):
     assert float(alpha + carried[0, 0]) == pytest.approx(0.5, rel=1e-8)
 
 
-def test_two_step_rule__needs_two_states():
-    memory = Modes(rv.maxwell(1.0, 1.0))
-    with pytest.raises(ValueError, match="two states"):
-        memory.predict(memory.restart(memory.start(CELL)), 0.1, "bdf2")
-
-
-def test_elastic_material__keeps_no_field():
-    assert Modes(rv.elastic(1.0)).start((3, 4)).modes.size == 0
-
-
 def test_stiff_ratio__tells_what_a_linear_step_does():
     assert stiff_ratio(rv.elastic(1.0), 1.0) == pytest.approx(0, abs=1e-15)
     assert stiff_ratio(rv.kelvin_voigt(1.0, 1.0), 1e-6) == pytest.approx(1, rel=1e-5)
@@ -142,27 +115,6 @@ def test_jump__changes_the_field_and_nothing_of_what_is_remembered():
     held = memory.factor * float(memory.material.creep_compliance(0.1))
     past = memory.predict(memory.advance(before, 0.0, "linear", np.zeros((3, 2))), 0.1, "linear")[1]
     np.testing.assert_allclose(carried + alpha * field, past + held * field, rtol=1e-12)
-
-
-def test_weight_of_the_old_pressure__is_unbounded_where_nothing_has_crept():
-    assert old_weight(0.0, 0.0) == np.inf
-    assert old_weight(3.0, 2.0) == pytest.approx(0.5)
-    assert old_weight(3e-300, 1e-300) == pytest.approx(2.0)
-
-
-def test_products__with_a_pressure_are_those_with_what_each_exponential_displaces():
-    """``p K z`` by a dense kernel, whatever the fields are; a fluidity, which stores nothing, has none."""
-    shape, spacing = (5, 4), (1.0, 0.7)
-    rng = np.random.default_rng(3)
-    z = rng.random((3, *shape))
-    pressure = rng.random(shape) * (rng.random(shape) < 0.6)
-    expected = [np.sum(pressure * displaced(mode, spacing)) for mode in z[:2]]
-    v_of_it, cells = displaced(pressure, spacing), np.flatnonzero(pressure)
-    series = rv.Prony(1.0, 0.5, (1.0, 2.0), (0.3, 3.0))
-    v = np.array([displaced(mode, spacing) for mode in z])
-    for acts_on, fields in (("pressure", z), ("displacement", v), ("both", np.stack((z, v), axis=1))):
-        found = Modes(series, acts_on).products(fields, v_of_it, cells, pressure.ravel()[cells])
-        assert found == pytest.approx(expected, rel=1e-12)
 
 
 def test_larger_grid__holds_what_the_smaller_displaces():

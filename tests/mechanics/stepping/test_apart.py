@@ -6,17 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from strategies import examples
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping import march as marching
-from roughvisc.mechanics.stepping.march import _first_crossing, closing_time, march
+from roughvisc.mechanics.stepping.march import closing_time, march
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.mechanics.stepping.step import initial_state
 
 MATERIAL = rv.zener(1.0, 1.0, 0.05)
 
@@ -114,18 +109,6 @@ def test_recovery__overtakes_an_approach(end):
         assert found_again(steps, pulled) - pulled == pytest.approx(times[np.argmax(above)], abs=over / 4000)
 
 
-def test_what_never_touches__is_seen_at_a_glance(monkeypatch):
-    """A hundred thousand cycles: no look at each of them where no one of them can reach the surface."""
-    calls = []
-    counted = marching._touched
-    monkeypatch.setattr(marching, "_touched", lambda *given: calls.append(1) or counted(*given))
-    outside = rv.Program.cycle(-2.0, 1.0, 1.0, 1e5, control="approach")
-    steps = list(march(sphere(outside, times=(outside.duration,))))
-    assert contacts(steps) == 0
-    assert len(steps) < 5
-    assert len(calls) < 10
-
-
 def test_load_that_is_zero_for_an_instant__is_no_gap_in_the_contact():
     program = rv.Program.cycle(0.01, 0.01, 1.0, 3)
     scene = sphere(program, times=(0.75, 1.75, 2.75, 3.0), tolerance=1e-2)
@@ -163,60 +146,3 @@ def test_contact_at_the_very_first_instant__is_not_put_off(lead):
 
 # ----------------------------------------------------------------------------------------------------------------
 # the search alone
-
-heights = st.floats(-1.0, 1.0)
-
-
-@examples(200)
-@given(
-    values=st.lists(heights, min_size=2, max_size=6),
-    rates=st.lists(st.floats(0.01, 20.0), min_size=1, max_size=3),
-    scales=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
-    floor=heights,
-)
-def test_first_crossing__is_that_of_dense_samples(values, rates, scales, floor):
-    """Linear between corners, against a floor to which exponentials decay."""
-    corners = np.arange(len(values), dtype=float)
-
-    def prescribed(time):
-        return np.interp(time, corners, values)
-
-    def limit(time):
-        return floor + sum(a * np.exp(-r * time) for a, r in zip(scales, rates, strict=False))
-
-    shortest = 1e-9 * corners[-1]
-    found = None
-    for begin, end in pairwise(corners.tolist()):
-        found = _first_crossing(prescribed, limit, begin, end, shortest)
-        if found is not None:
-            break
-    samples = np.linspace(0.0, corners[-1], 200 * (len(values) - 1) + 1)
-    above = prescribed(samples) > limit(samples) + 100 * shortest  # no slope is steeper
-    if found is None:
-        assert not above.any()
-        return
-    assert prescribed(found) <= limit(found) + 100 * shortest or found == 0
-    assert not above[samples < found].any()
-    ahead = np.linspace(found, found + 2 * shortest, 50)
-    assert np.any(prescribed(ahead) > limit(ahead) - 100 * shortest)
-
-
-def test_turns_of_a_cycle__bound_the_search():
-    """Peaks far narrower than the way to the event: the first that reaches the surface is the one that counts."""
-    program = rv.Program.cycle(-0.9999, 1.0, 1.0, 500, control="approach")
-    scene = sphere(program)
-    state = next(iter(march(scene))).state
-    segment, peak = program.segments[1], 0.25
-    half = math.acos(0.9999) / (2 * math.pi)
-    lifted = 40  # periods until the surface has come down to the peaks
-    found = closing_time(scene, state, segment, 500.0, lambda time: 0.0 if time > lifted else 1.0)
-    assert found == pytest.approx(lifted + peak - half, abs=1e-5)
-    assert closing_time(scene, state, segment, 500.0, lambda _: 1.0) == 500.0
-
-
-@pytest.mark.parametrize(("part", "apart_till"), [(1e-7, 0.0), (1e-4, 1e-4)], ids=["at_once", "later"])
-def test_surfaces_that_touch_within_a_millionth_of_the_way__are_in_contact_now(part, apart_till):
-    program = rv.Program().approach(1.0, over=1.0)
-    scene = sphere(program)
-    found = closing_time(scene, initial_state(scene), program.segments[0], 1.0, lambda _: part)
-    assert found == pytest.approx(apart_till, rel=1e-4, abs=0.0)

@@ -10,12 +10,9 @@ from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.sparse import Sparse, Sum
-from roughvisc.mechanics.stepping import companion
 from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.mechanics.stepping.state import ControllerState, Instant, State, Step, Uncertainty
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {
@@ -107,23 +104,6 @@ def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     assert np.mean(true <= TOLERANCE) >= 0.98
 
 
-def test_jump_that_the_material_cannot_follow__is_judged_from_its_first_step_on(monkeypatch):
-    """Nothing is there at once, and creep takes all times: the first short step stands for the jump."""
-    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)
-    soft = rv.Prony(0.0, 0.0, tuple(0.3 * 10.0 ** (0.3 * np.arange(-6, 1))), tuple(10.0 ** np.arange(-6, 1)))
-    program = rv.Program().load(0.01, over=0).hold(2.0)
-    found = kept(sphere(soft, program, tolerance=TOLERANCE))
-    exact = kept(sphere(soft, program, times=tuple(found), tolerance=TOLERANCE / SHARPER))
-    rows = [
-        (step.uncertainty.approach, abs(step.shown.approach - exact[time].shown.approach))
-        for time, step in found.items()
-    ]
-    stated, true = np.array(rows[1:]).T
-    assert true.size > 20
-    assert stated[0] > 0.25 * true[0]
-    assert np.mean(stated >= 0.8 * true) >= 0.95, np.sort(stated / true)
-
-
 @pytest.mark.thorough
 def test_force_error__is_nothing_where_the_load_is_given(matrix):
     for (_, what, _), (found, _) in matrix.items():
@@ -184,33 +164,6 @@ def test_work_error__of_a_direct_history_covers_the_true_one():
     assert np.all(said <= 3e-2 * exact[2.0].work)
 
 
-def test_area_in_doubt__is_counted_cell_by_cell():
-    """In contact where both differ by no less than is there; out of it where the companion touches, or might have."""
-    program = rv.Program().load(1.0, over=1.0)
-    operator, nothing = Operator((3, 4), (1.0, 1.0)), np.zeros((3, 4))
-    material = MATERIALS["zener"]
-    gap = np.array([[0.0] * 4, [0.0] * 4, [0.1, 0.1, 0.3, 0.1]])
-    present = np.array([[True] * 4, [True] * 4, [True, True, True, False]])
-    scene = Scene(operator, gap, material, Modes(material), program, present=present)
-    # the first two rows are in contact, but for the last cell of the second one
-    fine = np.array([[4.0, 4.0, 4.0, 4.0], [4.0, 4.0, 4.0, 0.0], [0.0] * 4])
-    coarse = np.array([[4.0, 3.0, 0.0, 7.9], [8.1, 4.0, 0.0, 0.5], [0.0] * 4])
-    level, moved = 0.05, np.array([[0.0] * 4, [0.0] * 4, [0.02, 0.06, 0.2, 0.06]])
-    state = State(Instant(1.0, Sparse.whole(fine), 1.0, level, nothing), nothing, None)
-    step = Step(state.now, Sum.whole(nothing), None, level, "load", True, 0.0, 0.0, Uncertainty(), True, scene, state)
-    other = Instant(1.0, Sparse.whole(coarse), 1.0, level + 0.01)
-    found = companion._undecided(scene, step, other, Sum.whole(0.01 - moved))
-    # in contact, doubtful: nothing is left (0, 2) and (1, 2), more than twice as much (1, 0)
-    # out of it: the companion touches (1, 3); as near as both differ (2, 1), not so (2, 0) and (2, 2); absent (2, 3)
-    assert found == (3, 2)
-
-
-def test_elastic__has_no_companion_and_nothing_unknown():
-    steps = list(march(sphere(rv.elastic(1.0), PROGRAMS["triangle"], times=TIMES)))
-    assert all(step.state.companion is None for step in steps)
-    assert all(step.uncertainty.relative(1.0, 1.0) == 0 for step in steps)
-
-
 def test_row_right_after_a_corner__is_judged():
     """The program of docs/howto/indentation.md: pulled back from a hold, and asked a fifth of the way."""
     times = (0.1, 0.3, 0.5, 0.6)
@@ -235,42 +188,3 @@ def test_material_that_relaxes_at_once__takes_the_steps_of_an_elastic_one(what):
     for name in ("force", "approach"):
         one, other = (np.array([getattr(rows[t], name) for t in TIMES]) for rows in (found, exact))
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-3 * other.max())
-
-
-def test_cell_that_may_enter__puts_the_mean_pressure_in_doubt_where_it_jumps(monkeypatch):
-    """It jumps on a solid that hardly gives way at once, and rises by and by on one that does."""
-    program, found = rv.Program().load(0.03, over=1.0), {}
-    for cells in (0, 2):
-        monkeypatch.setattr(companion, "_undecided", lambda *asked, cells=cells: (0, cells))
-        for name, material in (("jumps", rv.zener(1.0, 0.01, 0.01)), ("gentle", MATERIALS["zener"])):
-            steps = march(sphere(material, program, times=(1.0,), tolerance=TOLERANCE))
-            found[name, cells] = [step for step in steps if step.shown.time == 1.0][-1]
-    mean = found["jumps", 0].shown.force / found["jumps", 0].state.now.contact.count
-    more = found["jumps", 2].uncertainty.pressure - found["jumps", 0].uncertainty.pressure
-    assert more == pytest.approx(2.5 * 2 * mean, rel=1e-9)
-    assert more < found["jumps", 0].shown.force
-    assert found["gentle", 2].uncertainty.pressure == found["gentle", 0].uncertainty.pressure
-
-
-def test_work_in_doubt__shortens_steps_that_are_not_shown_too():
-    *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
-    scene, state = last.scene, replace(last.state, pace=ControllerState())
-
-    def doubtful(part):
-        return Uncertainty(work=part * TOLERANCE * state.largest_work)
-
-    def sharpness(part, ahead):
-        before = replace(state, uncertainty=doubtful(0.5))
-        return companion.adapt_tolerance_share(scene, before, state, ahead, 0.01, doubtful(part)).sharpness
-
-    assert sharpness(4.0, 1.0) == 0.5
-    assert sharpness(1.0, 1.0) == 1.0
-    assert sharpness(4.0, 2.0) == 1.0
-
-
-def test_what_fades__shortens_steps_where_it_is_shown():
-    *_, last = march(sphere(MATERIALS["zener"], PROGRAMS["triangle"], times=(2.0,), tolerance=TOLERANCE))
-    state = replace(last.state, pace=ControllerState())
-    far_off = Uncertainty(pressure=2 * TOLERANCE * state.largest_force)
-    for left, sharpness in ((1.0, 0.5), (0.01, 1.0)):
-        assert companion.adapt_tolerance_share(last.scene, state, state, 1.0, left, far_off).sharpness == sharpness

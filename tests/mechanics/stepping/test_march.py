@@ -1,16 +1,12 @@
 """The march through time: order, tolerance, events, contact lost and found, going on from a state."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import references
 from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, scene
 
 import roughvisc as rv
-from roughvisc.mechanics import closed_forms, sparse
-from roughvisc.mechanics.bodies.operator import Operator
-from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.stepping.march import march
 
 
@@ -66,18 +62,6 @@ def test_chosen_steps__keep_the_tolerance(name, tolerance):
         assert np.abs(found.pressure - exact.pressure).sum() < tolerance * exact.pressure.sum()
 
 
-def test_rows_of_a_step__are_those_of_its_fields(monkeypatch):
-    """Of a pressure held by its cells, and of a displacement that is added up where it is asked for."""
-    monkeypatch.setattr(sparse, "_ABOVE", 10)
-    kinds = set()
-    for step in march(scene(MATERIALS["zener"], TRIANGLE, tolerance=1e-2)):
-        kinds.add((step.shown.contact.cells is not None, step.displaced.is_whole))
-        for rows in (slice(0, 3), slice(4, 9), slice(0, step.scene.gap.shape[0])):
-            np.testing.assert_array_equal(step.on_rows(step.shown.contact, rows), step.shown.pressure[rows])
-            np.testing.assert_array_equal(step.on_rows(step.displaced, rows), step.displacement[rows])
-    assert (True, False) in kinds
-
-
 def test_forms_of_memory__give_the_same_numbers():
     forms = ("displacement", "pressure", "both")
     found = [
@@ -93,39 +77,6 @@ def test_forms_of_memory__give_the_same_numbers():
     assert spent["displacement"] == spent["both"] == spent["pressure"] - (steps + steps // 2)  # and the companion's
     for pressures, both in zip(found[1], found[2], strict=True):
         assert np.abs(both.effective - pressures.effective).max() <= 1e-6 * pressures.effective.max()
-
-
-@pytest.mark.parametrize("rule", ["linear", "bdf2"])
-def test_memory_of_both__outlives_a_change_of_the_grid(rule):
-    """On the larger grid, what is carried displaces it as the carried pressure does."""
-    small, large, offset = Operator((9, 7), (0.1, 0.1)), Operator((14, 11), (0.1, 0.1)), (3, 2)
-    memory = Modes(MATERIALS["two_branches"], "both")
-    state, rng = memory.start(small.shape), np.random.default_rng(1)
-    for _ in range(3):
-        pressure = rng.random(small.shape)
-        state = memory.advance(state, 0.3, "linear", np.stack([pressure, small.displacement(pressure)]))
-    moved = memory.enlarged(state, large.shape, offset, large.displacement)
-    before, after = memory.predict(state, 0.2, rule)[1], memory.predict(moved, 0.2, rule)[1]
-    assert np.array_equal(after[0][3:12, 2:9], before[0])
-    assert np.count_nonzero(after[0]) == before[0].size
-    assert after[1] == pytest.approx(large.displacement(after[0]), rel=1e-12)
-
-
-def test_extrapolated_start__costs_no_convolution_while_contact_grows():
-    """A step, and its companion's, takes two convolutions an iteration, and one more where contact recedes."""
-    unasked = {"time_step": 0.1, "tolerance": 1e-6, "times": ()}  # a kept row takes one more, to estimate its error
-    held = list(march(scene(MATERIALS["maxwell"], STEP_LOAD, **unasked)))[3:]
-    cost = [(b.state.convolutions - a.state.convolutions) for a, b in pairwise(held)]
-    solved = [(b.state.iterations - a.state.iterations) for a, b in pairwise(held)]
-    assert all(solved)
-    assert cost == [2 * n for n in solved]
-    unloading = rv.Program().load(0.05, over=0.1).load(0.01, over=1.0)
-    steps = list(march(scene(MATERIALS["maxwell"], unloading, **unasked)))[4:]
-    more = [
-        b.state.convolutions - a.state.convolutions - 2 * (b.state.iterations - a.state.iterations)
-        for a, b in pairwise(steps)
-    ]
-    assert set(more) == {0, 1}  # one where a cell lifts off
 
 
 def test_march__goes_on_from_any_state_bit_for_bit():

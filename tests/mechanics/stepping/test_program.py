@@ -100,22 +100,3 @@ def test_pressure__is_a_load_on_an_area():
     assert on.largest_load == pytest.approx(1.5)
     loads = rv.Program().load(1.0, over=1.0)
     assert loads.on_area(3e-6) is loads
-
-
-@pytest.mark.parametrize(
-    ("program", "words"),
-    [
-        (rv.Program(), "nothing"),
-        (rv.Program().load(2.0, over=0.05).hold(5.0), "load to 2 N over 50 ms, hold 5 s"),
-        (rv.Program().load(2.0, over=0).hold(5.0, control="approach"), "load to 2 N at once, hold approach 5 s"),
-        (rv.Program().hold(1e-3), "hold load 1 ms"),
-        (rv.Program().pressure("0.2 MPa", over=1), "nominal pressure to 200 kPa over 1 s"),
-        (rv.Program.cycle(1, 0.25, 2, 5), "load to 1 N at once, load 1 N ± 250 mN in 5 cycles of 2 s"),
-        (
-            rv.Program.table(range(12), [1e-6] * 12, "approach"),
-            "approach to 1 µm at once, " + "approach to 1 µm over 1 s, " * 7 + "and 4 more segments, 11 s in all",
-        ),
-    ],
-)
-def test_repr__says_what_is_prescribed(program, words):
-    assert repr(program) == f"Program: {words}"

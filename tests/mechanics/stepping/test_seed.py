@@ -65,15 +65,3 @@ def test_unstable_steps__are_refused_with_the_bound():
 def test_seed__refuses_what_the_paper_does_not_treat(material, program, message):
     with pytest.raises(rv.InputError, match=message):
         list(seed.march_seed(scene(material, program)))
-
-
-def test_seed__begins_at_rest_as_the_fast_method_does():
-    ramp = rv.Program().load(0.01, over=1.0)
-    times = [
-        [step.shown.time for step in method(scene(MATERIALS["zener"], ramp, time_step=0.5))]
-        for method in (march, seed.march_seed)
-    ]
-    assert times[0][0] == times[1][0] == 0.0
-    first = next(seed.march_seed(scene(MATERIALS["zener"], ramp, time_step=0.5)))
-    assert first.shown.force == 0
-    assert not first.shown.pressure.any()

@@ -290,15 +290,6 @@ def test_two_strokes_in_a_row__are_one():
     assert last[1].state.slid.distance == pytest.approx(0.5e-3, rel=1e-12)
 
 
-@pytest.mark.parametrize("count", [7, 8])
-def test_slope__is_that_of_the_wave(count):
-    x = 2 * np.pi * np.arange(count) / count
-    field = np.sin(x)[:, None] + np.cos(3 * x)[:, None] * np.ones((1, 3))
-    exact = np.cos(x)[:, None] - 3 * np.sin(3 * x)[:, None] * np.ones((1, 3))
-    np.testing.assert_allclose(slope(field, 2 * np.pi / count, 0), exact, atol=1e-12)
-    np.testing.assert_allclose(slope(field.T, 2 * np.pi / count, 1), exact.T, atol=1e-12)
-
-
 def test_slide__is_of_whole_cells_and_periodic():
     assert Slide(1.04e-3).cells((1e-4, 1.0)) == 10
     assert Slide(1.05e-3, "-y").cells((1.0, 1e-4)) == 11
