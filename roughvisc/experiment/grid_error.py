@@ -291,7 +291,7 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
         beside = [(i % filled.shape[0], j % filled.shape[1]) for i, j in beside]
     beside = [(i, j) for i, j in beside if 0 <= i < filled.shape[0] and 0 <= j < filled.shape[1] and present[i, j]]
     changes = [float(filled[cell] - filled[at]) for cell in beside]
-    if not changes or filled[at] > max(changes):
+    if not changes:
         return 0.0, 0.0
     part = _HIDDEN * np.count_nonzero(filled <= max(changes)) / np.count_nonzero(present)
     return part, part * max(abs(float(height[cell] - height[at])) for cell in beside)
