@@ -81,7 +81,7 @@ def simulate(
         Whether to estimate the grid error from two more runs, on cells twice and four times as long: ``grid_error``,
         ``grid_error_area`` and others at the output times.
     numerics : Numerics
-        Settings that are rarely changed: length of the time steps, algorithm, and memory of past pressures.
+        Settings that are rarely changed: length of the time steps.
     threads : int, optional
         Number of threads for a large grid; the result does not depend on it. Default: the value of
         ``scipy.fft.set_workers``, or else all cores that the process may use, but one thread if other threads run or in

@@ -22,10 +22,8 @@ from roughvisc.variables import FIELDS
 
 #: ``auto`` becomes one of the others by :func:`known_boundary`
 Boundary = Literal["auto", "free", "periodic"]
-Method = Literal["fast", "seed"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
-Memory = Literal["auto", "direct"]
 TimeStep = float | str | Literal["auto"]
 
 #: Rounding leaves so much of the numbers that are held against a tolerance: a march to a finer one would not end.
@@ -120,10 +118,6 @@ class Numerics:
     ----------
     time_step : "auto" or float or str
         Steps chosen by the tolerance, or a fixed step length. [s]
-    method : {"fast", "seed"}
-        ``seed`` is the algorithm of the seed paper with its errors corrected, without acceleration.
-    memory : {"auto", "direct"}
-        ``direct`` stores every past pressure, for any material. It is slower, and needs no exponential series.
 
     Raises
     ------
@@ -133,7 +127,7 @@ class Numerics:
     Examples
     --------
     >>> Numerics(time_step="10 ms")
-    Numerics(time_step=0.01, method='fast', memory='auto')
+    Numerics(time_step=0.01)
     """
 
     time_step: TimeStep = setting(
@@ -144,20 +138,6 @@ class Numerics:
         noun="a time",
         unit="s",
         always_in_key=True,
-        only_over="time",
-    )
-    method: Method = setting(
-        "fast",
-        "`fast`; or `seed`: the algorithm of the original paper",
-        '"seed"',
-        in_attributes=True,
-        always_in_key=True,
-        only_over="time",
-    )
-    memory: Memory = setting(
-        "auto",
-        "`auto`: exponentials if they are accurate enough; `direct`: every past pressure",
-        '"direct"',
         only_over="time",
     )
 
@@ -176,7 +156,7 @@ class Settings(Numerics):
     ----------
     boundary, tolerance, times, fields, missing, edge, grid_error
         As :func:`roughvisc.simulate` has them; any sequence of times or fields becomes a tuple.
-    time_step, method, memory
+    time_step
         As :class:`Numerics` has them.
 
     Raises
@@ -190,7 +170,7 @@ class Settings(Numerics):
     >>> Settings(tolerance=1e-2, times=[1.0, 0.5]).times
     (0.5, 1.0)
     >>> Settings().to_attributes()
-    {'method': 'fast', 'boundary': 'auto', 'tolerance': 0.001}
+    {'boundary': 'auto', 'tolerance': 0.001}
     """
 
     boundary: Boundary = setting(

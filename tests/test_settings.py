@@ -3,7 +3,6 @@
 import inspect
 import json
 from dataclasses import FrozenInstanceError, fields
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.hereditary.choice import Kind
 from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.keys import study_schema
@@ -27,10 +25,8 @@ USUAL = {
     "time_step": "auto",
     "times": None,
     "fields": ("pressure", "gap"),
-    "method": "fast",
     "missing": "refuse",
     "edge": "error",
-    "memory": "auto",
     "grid_error": False,
 }
 
@@ -51,7 +47,6 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
 
 
 def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
-    assert WORDS["memory"] == get_args(Kind)
     properties = study_schema()["$defs"]["SolveSection"]["properties"]
     stated = {name: tuple(one["enum"]) for name, one in properties.items() if "enum" in one}
     assert stated == {name: words for name, words in WORDS.items() if name != "missing"}
@@ -61,10 +56,8 @@ def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
     "wrong",
     [
         {"boundary": "open"},
-        {"method": "slow"},
         {"missing": None},
         {"edge": "wrap"},
-        {"memory": "none"},
         {"tolerance": 1},
         {"tolerance": "1e-3"},
         {"tolerance": float("nan")},
@@ -92,7 +85,7 @@ def test_numerics__are_checked_and_one_argument(name):
     with pytest.raises(InputError, match=name):
         rv.Numerics(**{name: "wrong"})
     with pytest.raises(InputError, match="numerics"):
-        rv.simulate(None, rv.elastic(1e6), rv.Program(), numerics={"method": "seed"})
+        rv.simulate(None, rv.elastic(1e6), rv.Program(), numerics={"time_step": 0.1})
 
 
 def test_settings__are_one_frozen_value():

@@ -18,7 +18,7 @@ _OPTIONS = (
 )
 _NAMES = "unit|height_unit|spacing|format|channel"
 #: Settings of which messages speak as Python does -> table of a study that has them.
-_TABLES = {"boundary": "solve", "edge": "solve", "method": "solve", "memory": "solve", "missing": "surface"}
+_TABLES = {"boundary": "solve", "edge": "solve", "missing": "surface"}
 
 
 def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:

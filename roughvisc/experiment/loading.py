@@ -41,13 +41,11 @@ from roughvisc.labels import warnings_text
 from roughvisc.mechanics.arrays import is_wide, over_rows
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
-from roughvisc.mechanics.hereditary.direct import Block, HistoryState
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program, Slid
-from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.state import ControllerState, Instant, State, Step, Trajectory, Uncertainty
 from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
@@ -114,18 +112,13 @@ class Loading(Experiment):
         Uncertainty,
         Energy,
         ModesState,
-        HistoryState,
-        Block,
     )
 
     def __repr__(self) -> str:
         return repr(self.program)
 
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
-        """Every accepted step, those to keep as rows of the result.
-
-        The seed paper's algorithm keeps all past pressures, and has no state to go on from.
-        """
+        """Every accepted step, those to keep as rows of the result."""
         return LoadingRows(problem, self.program, state, in_memory=in_memory)
 
     def content(self) -> Any:
@@ -177,10 +170,7 @@ class Loading(Experiment):
         options = memory_options(self.program.on_area(area), settings)
         memory = choose_body_memory(body, **options).memory
         counts = {"rows": least_rows(settings, self.program)} | counts
-        if settings.method == "fast":
-            return march_bytes(settings, cells, memory, **counts)
-        pressures = 8.0 * cells * counts.get("steps", 0.0)  # the seed paper's algorithm keeps all of them, and whole
-        return march_bytes(settings, cells, memory, **counts | {"part": 1.0}) + pressures
+        return march_bytes(settings, cells, memory, **counts)
 
 
 class LoadingRows(Rows):
@@ -208,9 +198,8 @@ class LoadingRows(Rows):
         height, body, settings = problem.height, problem.body, problem.settings
         self._problem, self._settings, self._start = problem, settings, state
         require_memory(problem, program, in_memory=in_memory)
-        mirror = settings.method == "fast" and not program.slides
         self.profile = Profile(
-            height, settings.missing, follow=uses_window(settings), mirror=mirror, kernel=body.kernel
+            height, settings.missing, follow=uses_window(settings), mirror=not program.slides, kernel=body.kernel
         )
         self._scene, self._choice = build_scene(self.profile, body, program, settings)
         self._followed = not self.profile.window.whole
@@ -237,12 +226,12 @@ class LoadingRows(Rows):
 
     def __iter__(self) -> Iterator[Row]:
         """March to the end of the program."""
-        scene, start, fast = self._scene, self._start, self._settings.method == "fast"
+        scene, start = self._scene, self._start
         self._start = None  # its fields are not needed beyond the first step
         every = scene.times is None
         to_keep = set(scene.program.corners if scene.times is None else scene.times)
         largest = (0.0, 0.0) if start is None else start.largest
-        steps = march(scene, None if start is None else start.march) if fast else march_seed(scene)
+        steps = march(scene, None if start is None else start.march)
         del start
         for step in steps:
             # when contact comes to the border of a free-space domain, in a step that is kept or not
@@ -252,9 +241,7 @@ class LoadingRows(Rows):
             shown, before = step.shown, largest
             largest = max(before[0], shown.force), max(before[1], abs(shown.approach))
             kept = shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error, largest))
-            state = None
-            if fast:
-                state = LoadingState(step.state, largest if kept else before, self.profile.growths, self._border)
+            state = LoadingState(step.state, largest if kept else before, self.profile.growths, self._border)
             if kept or (not every and is_end_value(step)):
                 row = self.row(step, largest, kept, state)
             else:
@@ -365,6 +352,7 @@ class LoadingRows(Rows):
             "edge": "" if self._border is None else edge_note(self._border),
             "wake": self._wake_note(dataset),
             "slide": slide_note(scene.program, profile.spacing),
+            "series": choice.warning(settings.tolerance),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)

@@ -125,7 +125,7 @@ def accuracy_note(scene: Scene) -> str:
 def tolerance_note(scene: Scene, dataset: xr.Dataset) -> str:
     """Count the rows whose stated error exceeds the tolerance; empty if there are none."""
     errors = dataset["stated_error"].values
-    missed = np.flatnonzero(errors > scene.tolerance)  # the seed paper's method states none
+    missed = np.flatnonzero(errors > scene.tolerance)
     if not missed.size:
         return ""
     fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."

@@ -186,4 +186,4 @@ def _checked(height: xr.DataArray, missing: Missing) -> xr.DataArray:
 
 def uses_window(settings: Settings) -> bool:
     """Whether a march follows the contact with a window: where it may reach neither the border nor the other side."""
-    return settings.boundary == "free" and settings.edge == "error" and settings.method == "fast"
+    return settings.boundary == "free" and settings.edge == "error"

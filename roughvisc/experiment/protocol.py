@@ -194,8 +194,8 @@ class Experiment(Protocol):
         cells, area : float
             Of the surface. [m2]
         **counts
-            Of a solve that is known: ``steps``, ``rows``, largest ``contact`` fraction, and ``part`` of the cells that
-            is solved on.
+            Of a solve that is known: ``rows``, largest ``contact`` fraction, and ``part`` of the cells that is solved
+            on.
         """
         return 8.0 * cells * _FIELDS
 

@@ -19,7 +19,6 @@ from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.profile import uses_window
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.arrays import is_wide
-from roughvisc.mechanics.hereditary.direct import History, history_bytes
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import Memory
 from roughvisc.mechanics.stepping.program import Program
@@ -169,8 +168,8 @@ _COMPANION, _EXPONENTIAL = 1.5, 5.2
 #: What a march adds whose window or grid follows the contact, since it may go back to the state before; and what moving
 #: a state to a larger one adds. Measured on balls at 770 x 460 to 1131 x 1096.
 _FOLLOWING, _MOVED = 13.0, 12.0
-#: What the direct history adds beside the companion: total displacements and effective pressures.
-_DIRECT = 6.5
+#: What the memory of waves adds beside the companion: total displacements and effective pressures.
+_TOTALS = 6.5
 #: Spectra of each exponential where every wave has its own compliances, and its symbol; what the two-step rule adds to
 #: these; those of pressure and displacement; and numbers of a padded spectrum over cells (251 to 513 squared).
 _WAVE, _WAVE_BEFORE, _SPECTRA, _PADDED = 3.3, 1.4, 4.0, 5.0
@@ -192,7 +191,6 @@ def march_bytes(
     memory: Memory,
     *,
     contact: float = SPARSE,
-    steps: float = 0.0,
     rows: float = 1.0,
     part: float = 1.0,
     in_memory: bool = False,
@@ -210,8 +208,8 @@ def march_bytes(
         Of the material's past.
     contact : float
         Largest contact fraction.
-    steps, rows : float
-        Accepted steps, and kept ones.
+    rows : float
+        Kept times.
     part : float
         Part of the cells that is solved on.
     in_memory : bool
@@ -230,7 +228,7 @@ def march_bytes(
     ``workflows/benchmarks/memory.py``.
     """
     field = 8.0 * cells
-    state, past = _STATE, 0.0
+    state = _STATE
     solved = _ELASTIC + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
     if not is_wide(math.ceil(part * cells)):
         solved += _NARROW
@@ -246,15 +244,12 @@ def march_bytes(
                 solved += _MOVED if grows else 0.0
     elif isinstance(memory, WaveMemory):
         modes, padded = len(memory.series.compliances), _PADDED if settings.boundary == "free" else 1.0
-        solved += _COMPANION + _DIRECT + padded * (modes * _WAVE + _SPECTRA)
+        solved += _COMPANION + _TOTALS + padded * (modes * _WAVE + _SPECTRA)
         state += 3 * padded * modes
         if "bdf2" in memory.rules:
             solved += _SHOWN + padded * _WAVE_BEFORE * modes
-    elif isinstance(memory, History):
-        past = 1.5 * history_bytes(contact * cells, steps)
-        solved += _COMPANION + _DIRECT
     frames = rows * len(settings.fields) * field
-    surface = _SURFACE * field + past
+    surface = _SURFACE * field
     if in_memory:
         return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
     layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
@@ -304,7 +299,7 @@ def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> No
     there = memory_available()
     if there.fits(needed(cells)):
         return
-    if part and settings.method == "fast" and is_mirrored(height.values):
+    if part and is_mirrored(height.values):
         part = 0.25
         if there.fits(needed(cells)):
             return

@@ -207,11 +207,6 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
             "boundary is 'free' and the program slides: in free space the wake of the profile leaves the grid at its "
             "back; expected boundary = 'periodic'"
         )
-    if settings.method != "fast":
-        raise InputError(
-            f"method is {settings.method!r}, which does not model sliding, and the program slides: expected "
-            "method = 'fast'"
-        )
     if program.segments[0].slide is not None:
         raise InputError("program.0 slides before there is a load: expected load, pressure or approach before it")
     for number, segment in enumerate(program.segments):
@@ -301,11 +296,6 @@ def build_scene(profile: Profile, body: Body, program: Program, settings: Settin
     options = memory_options(program, settings, "pressure" if grows else "displacement")
     choice = choose_body_memory(body, **options, operator=operator)
     if isinstance(choice.memory, WaveMemory):
-        if settings.method != "fast":
-            raise InputError(
-                f"method is {settings.method!r} and the body is {body!r}, in which space and time do not separate: "
-                "expected method = 'fast'"
-            )
         operator = choice.memory.grid
     scene = Scene(
         operator=operator,
@@ -358,7 +348,6 @@ def memory_options(program: Program, settings: Settings, acts_on: ActsOn = "disp
         "duration": program.duration,
         "tolerance": settings.tolerance,
         "acts_on": acts_on,
-        "kind": settings.memory,
         "shortest": shortest_age(program, kept_times(program, settings.times), settings.tolerance),
     }
 

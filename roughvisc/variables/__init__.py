@@ -186,7 +186,6 @@ VARIABLES: dict[str, Variable] = {
         "the largest of pressure (L1), force and approach: "
         "sum of what time steps, contact solver and series leave, over the largest force and approach of the kept "
         "rows so far; comparable to the tolerance; the grid's part is stated apart",
-        may_be_missing=True,
         in_table="largest",
     ),
     "time_error": Variable(
@@ -197,7 +196,6 @@ VARIABLES: dict[str, Variable] = {
         "from the difference to a companion march in steps twice as long; over the largest values of the kept rows so "
         "far",
         every_step=True,
-        may_be_missing=True,
         in_table="largest",
     ),
     "residual": Variable(
@@ -205,7 +203,6 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "error due to the contact solver",
         "part of stated_error: estimated error of the pressure (L1), over its sum",
-        may_be_missing=True,
         in_table="largest",
     ),
     "force_error": Variable(_SERIES, "N", "stated error of the force", "zero where the force is prescribed"),
@@ -214,7 +211,6 @@ VARIABLES: dict[str, Variable] = {
         "m",
         "stated error of the approach",
         "zero where the approach is prescribed",
-        may_be_missing=True,
     ),
     "contact_area_error": Variable(
         _SERIES,
@@ -222,7 +218,6 @@ VARIABLES: dict[str, Variable] = {
         "stated error of the contact area",
         "the area of the cells that time steps and contact solver leave in doubt, in contact or out of it, whichever "
         "is larger; the grid's part is stated apart",
-        may_be_missing=True,
     ),
     "grid_error": Variable(
         _SERIES,

@@ -128,19 +128,6 @@ def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
     assert Case.from_json(case.to_json()).key == case.key
 
 
-def test_direct_memory__gives_the_same_contact():
-    settings = {"grid_error": False, "tolerance": 1e-4}
-    series, direct = pressed((33, 31), **settings), pressed((33, 31), numerics=rv.Numerics(memory="direct"), **settings)
-    assert "direct history" in direct.attrs["memory"]
-    assert direct.approach.values == pytest.approx(series.approach.values, rel=2e-4)
-
-
-def test_direct_memory__is_refused_where_it_would_ring():
-    soft = rv.kelvin_voigt(1e6, 1e5)
-    with pytest.raises(rv.InputError, match="memory='direct'"):
-        rv.simulate(rv.sphere(RADIUS, SIZE, 16), soft, PRESS, numerics=rv.Numerics(memory="direct"), progress=False)
-
-
 def test_coarser__makes_an_indenter_anew_and_keeps_missing_points():
     ball = rv.sphere(RADIUS, SIZE, (31, 24))
     few = coarser(ball, 2, "free")

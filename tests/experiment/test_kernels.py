@@ -75,12 +75,6 @@ PATHS = {
         rv.Program().approach(5e-7, over=0.1),
         {"boundary": "periodic"},
     ),
-    "seed": (
-        rv.sphere(1e-3, 2e-4, 45),
-        rv.Program().load(1e-4, over=0.1),
-        {"numerics": rv.Numerics(method="seed", time_step=0.02)},
-    ),
-    "direct": (rv.sphere(1e-3, 2e-4, 45), RAMP, {"numerics": rv.Numerics(memory="direct")}),
 }
 
 

@@ -21,11 +21,6 @@ MIRRORED = {
     "periodic": (rv.wavy(0.02, 0.5, 1.0, (20, 26)), LOADED_TWICE, {"boundary": "periodic"}),
     "under given approach": (rv.sphere(1.0, 1.0, (24, 20)), rv.Program().approach(0.05, over=0.2).hold(0.3), {}),
     "mirrored scan": (rv.mirror(SCAN), LOADED_TWICE, {"boundary": "periodic"}),
-    "every pressure remembered": (
-        rv.sphere(1.0, 0.7, (24, 20)),
-        LOADED_TWICE,
-        {"numerics": rv.Numerics(memory="direct", time_step=0.05)},
-    ),
 }
 
 

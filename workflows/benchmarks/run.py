@@ -1,6 +1,6 @@
 """All benchmarks: prints the tables and writes them as NetCDF.
 
-    python workflows/benchmarks/run.py [--small] [--only seed,tamaas,contact_mechanics] [--out benchmarks.nc]
+    python workflows/benchmarks/run.py [--small] [--only paper,tamaas,contact_mechanics] [--out benchmarks.nc]
 
 Every figure is a ratio or a count measured in one run, at equal or smaller measured error. Times are processor times,
 of one thread. Tamaas and ContactMechanics are compared with where they are installed.
@@ -15,16 +15,16 @@ import xarray as xr
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import against_contact_mechanics
-import against_seed
+import against_paper
 import against_tamaas
 
 SMALL = {
-    "seed": {"sizes": ((32, 10),), "repeats": 1},
+    "paper": {"sizes": ((32, 10),), "repeats": 1},
     "tamaas": {"sizes": (32,), "areas": (0.3,), "creep_steps": (10,), "creep_cells": 32, "repeats": 1},
     "contact_mechanics": {"sizes": (32,), "areas": (0.3,), "repeats": 1},
 }
 PARTS = {
-    "seed": against_seed.measure,
+    "paper": against_paper.measure,
     "tamaas": against_tamaas.measure,
     "contact_mechanics": against_contact_mechanics.measure,
 }

@@ -71,7 +71,6 @@ def scenes():
         "no compliance at once": lambda: rv.simulate(ball, soft, ramp, **few),
         "flow": lambda: rv.simulate(ball, rv.maxwell(1e6, 1e6, 0.5), hold, **few),
         "power law": lambda: rv.simulate(ball, law, hold, **few),
-        "direct": lambda: rv.simulate(ball, law, hold, numerics=rv.Numerics(memory="direct"), **few),
         "opening cycle": lambda: rv.simulate(ball, zener, opening, **few),
         "slide": lambda: rv.simulate(rough, zener, slide, **periodic),
         "friction": lambda: rv.friction(rough, zener, speeds=[1e-4, 1e-3], load=0.02, progress=False),

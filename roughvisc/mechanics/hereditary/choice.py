@@ -1,22 +1,16 @@
-"""Choice of the memory for a material: the cheapest form whose error is within the tolerance."""
+"""Choice of the memory for a material: its exponentials, or the series nearest to it."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from roughvisc.errors import InputError
-from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.hereditary.memory import STIFF, ActsOn, Memory, stiff_ratio
-from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony, Tabulated
-from roughvisc.mechanics.materials.passive import smallest_loss
-from roughvisc.mechanics.materials.protocol import check_creep, complete
+from roughvisc.mechanics.hereditary.memory import ActsOn, Memory
+from roughvisc.mechanics.materials.models import Material, Prony
+from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.materials.series import series_of
-from roughvisc.mechanics.materials.spectrum import lattice
 
 #: Part of the tolerance that a series in place of a material may take.
 SERIES_SHARE = 0.1
@@ -27,14 +21,6 @@ SHORTEST_AGE = 1e-6
 _MOST_TWICE = 3
 #: Compliance at the end of a step over its mean in it, from which steps may ring: they do from 1.5.
 _RINGING = 1.45
-#: The direct history is offered if its steps need not be shorter than this part of the program to stay smooth.
-_SHORTEST_STEP = 1e-3
-#: Instants in a decade at which a material of the user's own is looked at.
-_SAMPLES = 100
-
-
-#: Which memory to take: the cheapest that is accurate enough, or every past pressure.
-Kind = Literal["auto", "direct"]
 
 
 @dataclass(frozen=True)
@@ -50,16 +36,29 @@ class Choice:
         exact. Before that age it is less, relative to the compliance that has crept by then.
     note : str
         What is modelled, in words.
+    deviation : float
+        Largest relative deviation of the series from the rows of a table that has none, beyond their noise.
     """
 
     memory: Memory
     series_error: float
     note: str
+    deviation: float = 0.0
 
     @property
     def material(self) -> Material:
         """What is pressed: the material, or the series in its place."""
         return self.memory.material
+
+    def warning(self, tolerance: float) -> str:
+        """What to say of a series that is farther from the material than the tolerance; empty if it is not."""
+        off = max(self.series_error, self.deviation)
+        if off <= tolerance:
+            return ""
+        return (
+            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
+            f"{tolerance:g} (memory): no passive material comes nearer to it."
+        )
 
 
 def choose_memory(
@@ -67,7 +66,6 @@ def choose_memory(
     duration: float,
     tolerance: float,
     acts_on: ActsOn = "displacement",
-    kind: Kind = "auto",
     shortest: float | None = None,
 ) -> Choice:
     """Memory for a material over a program.
@@ -81,9 +79,7 @@ def choose_memory(
     tolerance : float
         Relative error that the whole computation is allowed.
     acts_on : {"displacement", "pressure"}
-        The form that a recursive memory takes; one of pressures may be one of both.
-    kind : {"auto", "direct"}
-        ``direct``: the direct history, whatever the material; dearer, and independent of any series.
+        The form that the memory takes; one of pressures may be one of both.
     shortest : float, optional
         Shortest age at which the compliance is asked for, beside zero; a millionth of the program's length if not
         given. [s]
@@ -91,32 +87,21 @@ def choose_memory(
     Returns
     -------
     Choice
-        Recursive exponentials: those of the material, if it is a series; else a series in its place, within a tenth of
-        the tolerance if there is one. A table that has none is made passive: what is pressed then is the positive
-        series nearest to it.
+        Exponentials: those of the material, if it is a series; else a series in its place, within a tenth of the
+        tolerance if there is one. A table that has none is made passive: what is pressed then is the positive series
+        nearest to it. For a program of jumps alone it has the material's instantaneous compliance, which is exact.
 
     Raises
     ------
     InputError
-        If the material is not known over the whole program, or the direct history of it would ring.
+        If the material is not known over the whole program.
     """
-    if kind not in ("auto", "direct"):
-        raise InputError(f"memory is {kind!r}: expected 'auto' or 'direct'")
     material = complete(material)
-    if kind == "direct":
-        if duration > 0 and not isinstance(material, Prony | PowerLaw | Tabulated | Pair):
-            check_creep(material, lattice(SHORTEST_AGE * duration, duration, _SAMPLES))
-        if duration > 0 and not _direct_is_accurate(material, duration):
-            raise InputError(
-                "memory='direct' assumes linear pressure in each step, which oscillates for this material: "
-                "expected memory='auto', or an instantaneous compliance that is not small"
-            )
-        return Choice(History(material), 0.0, f"direct history of every pressure, as asked for{_active(material)}")
     if isinstance(material, Prony):
         return Choice(_recursive(material, acts_on, duration), 0.0, terms(material))
-    if duration == 0:  # jumps only: nothing but the instantaneous compliance matters
-        glassy = float(material.contact_compliance(0.0))
-        return Choice(History(material), 0.0, "instantaneous compliance" if glassy else "no instantaneous compliance")
+    if duration == 0:
+        series, note = at_once(material), "instantaneous compliance"
+        return Choice(_recursive(series, acts_on, duration), 0.0, note if series.glassy else f"no {note}")
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
     material.contact_compliance(duration)  # refuses what ends before
     series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
@@ -127,15 +112,13 @@ def choose_memory(
         )
     if series.repair:
         said.append(series.repair)
-    return Choice(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said))
+    return Choice(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said), series.deviation)
 
 
-def _active(material: Material) -> str:
-    """What to say of tables that are not passive."""
-    if isinstance(material, Pair):
-        return _active(material.a) + _active(material.b)
-    least = smallest_loss(material) if isinstance(material, Tabulated) else 0.0
-    return f"; the table is not passive: sin(delta), about its loss factor, falls to {least:.2g}" if least < 0 else ""
+def at_once(material: Material) -> Prony:
+    """What stands for a material in a program of jumps, where nothing but its instantaneous compliance matters."""
+    glassy = float(material.contact_compliance(0.0)) * 2 / (1 - material.poisson)
+    return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson)
 
 
 def _recursive(series: Prony, acts_on: ActsOn, duration: float) -> Modes:
@@ -160,13 +143,3 @@ def terms(series: Prony) -> str:
     count = len(series.times)
     exponentials = f"{count} exponential{'' if count == 1 else 's'}"
     return f"{exponentials} and a fluidity" if series.fluidity and count else exponentials if count else "a fluidity"
-
-
-def _direct_is_accurate(material: Material, duration: float) -> bool:
-    """Pressure taken as linear in each step must not ring, and a jump must be followed at once."""
-    if float(material.contact_compliance(0.0)) == 0:
-        return False
-    length = duration
-    while stiff_ratio(material, length) > STIFF and length > 1e-12 * duration:
-        length /= 2
-    return math.isfinite(length) and length >= _SHORTEST_STEP * duration

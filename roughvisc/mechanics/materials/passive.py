@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
-from scipy.special import sici
 
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice
@@ -107,36 +106,6 @@ def nearest_series(table: Tabulated) -> Nearest:
 def first_time(table: Tabulated) -> float:
     """Time of the first row after time zero. [s]"""
     return next(t for t in table.times if t > 0)
-
-
-def smallest_loss(table: Tabulated) -> float:
-    r"""Smallest sine of the loss angle over the frequencies that a table covers; negative: the table is not passive.
-
-    Parameters
-    ----------
-    table : Tabulated
-        Beyond its end the compliance is held.
-
-    Returns
-    -------
-    float
-        Least ``J''/|J*|``, about the loss factor ``tan(delta)`` where that is small, over angular frequencies from the
-        inverse of the last time to five times that of the first.
-
-    Notes
-    -----
-    :math:`J' = J(0) + \int_0^\infty \dot J \cos\omega t\, dt` and :math:`J'' = \int_0^\infty \dot J \sin\omega t\, dt`,
-    exact for the table's pieces, linear in time and in its logarithm: sines and cosines, and their integrals.
-    """
-    edges, slopes = table.pieces
-    omega = lattice(1 / table.times[-1], 5 / first_time(table), 100)
-    x = omega[:, None] * edges[1:]
-    sine, cosine = sici(x)
-    storage = (
-        float(table.creep_compliance(0.0)) + slopes[0] * np.sin(x[:, 0]) / omega + np.diff(cosine, axis=1) @ slopes[1:]
-    )
-    loss = slopes[0] * (1 - np.cos(x[:, 0])) / omega + np.diff(sine, axis=1) @ slopes[1:]
-    return float(np.min(loss / np.hypot(loss, storage)))
 
 
 def _fewer(times: Array) -> Array:

@@ -50,6 +50,8 @@ class Series:
         What the error is relative to: the material, its tables made passive where they had no series.
     repair : str
         What was done to the tables, if anything.
+    deviation : float
+        Largest relative deviation from their rows after that, if it is more than their noise.
     """
 
     prony: Prony
@@ -57,6 +59,7 @@ class Series:
     shortest: float
     pressed: Material
     repair: str = ""
+    deviation: float = 0.0
 
 
 def series_of(material: Material, shortest: float, longest: float, tolerance: float) -> Series:
@@ -93,7 +96,8 @@ def series_of(material: Material, shortest: float, longest: float, tolerance: fl
         if found.error <= tolerance:
             return found
         nearest = nearest_series(material)
-        return Series(nearest.prony, 0.0, shortest, nearest.prony, nearest.note)
+        deviation = nearest.largest if nearest.largest > material.noise else 0.0
+        return Series(nearest.prony, 0.0, shortest, nearest.prony, nearest.note, deviation)
     if isinstance(material, Pair):
         parts = [series_of(body, shortest, longest, tolerance) for body in (material.a, material.b)]
         joined = pair(parts[0].prony, parts[1].prony)
@@ -102,7 +106,7 @@ def series_of(material: Material, shortest: float, longest: float, tolerance: fl
         shortest = max(part.shortest for part in parts)
         error = measured_error(pressed, joined, _instants(pressed, shortest, longest))
         repair = "; ".join(f"{name}: {part.repair}" for name, part in zip("ab", parts, strict=True) if part.repair)
-        return Series(joined, error, shortest, pressed, repair)
+        return Series(joined, error, shortest, pressed, repair, max(part.deviation for part in parts))
     material = complete(material)
     check_creep(material, _instants(material, shortest, longest))
     found = _fitted(material, shortest, longest, tolerance)

@@ -136,11 +136,6 @@ class Tabulated(PrintedAsBuilt):
         mean = np.where(length > 0, total / np.where(length > 0, length, 1.0), self._value(start, first))
         return np.asarray(0.5 * (1 - self.poisson) * mean)
 
-    @property
-    def pieces(self) -> tuple[Array, Array]:
-        """Where pieces begin and end, [s]; slopes, the first over time [1/(Pa s)], the others over its logarithm."""
-        return self._edges, self._slopes
-
     @cached_property
     def _edges(self) -> Array:
         """Where pieces begin and end, from zero. [s]"""

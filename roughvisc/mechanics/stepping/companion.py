@@ -18,7 +18,6 @@ from roughvisc.mechanics.arrays import cut_at_zero, empty, over_blocks, weighted
 from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
 from roughvisc.mechanics.stepping.controller import rule_for
-from roughvisc.mechanics.stepping.energy import Energy
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.state import (
@@ -131,7 +130,7 @@ def difference(
     fine, coarse = step.state.now, companion.now
     area = scene.operator.cell_area
     inside, outside = _undecided(scene, step, coarse, displaced) if wants_area else (0, 0)
-    own, other = step.state.energy or Energy(), companion.energy or Energy()
+    own, other = step.state.energy, companion.energy
     entered, soft = 0.0, scene.is_soft
     if earlier is not None and soft:
         entered = _ENTERED * area * float(np.sum(step.shown.pressure, where=earlier.field() == 0))

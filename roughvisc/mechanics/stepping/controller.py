@@ -150,7 +150,7 @@ def remaining(scene: Scene, state: State) -> float:
 
 
 def _fading(scene: Scene) -> Fading | None:
-    """How errors of the pressure fade; None where cells that enter make it jump, or the memory is no series."""
+    """How errors of the pressure fade; None where cells that enter make it jump, or waves fade each in its way."""
     if not (isinstance(scene.memory, Modes) and is_gentle(scene)):
         return None
     return _fading_of(scene.memory.material, scene.program.duration)
@@ -185,11 +185,6 @@ def step_length(scene: Scene, state: State, segment: Segment, event: float, end:
         return distance / max(1, math.ceil(distance / scene.time_step * (1 - 1e-9)))
     length = state.pace.suggestion or _first_length(scene, state, segment, event)
     length = max(length, shortest_step(scene, state, segment))
-    if "bdf2" not in scene.memory.rules:  # pressure taken as linear must not ring
-        longest = distance
-        while scene.stiff_ratio(longest) > STIFF and longest > 1e-9 * distance:
-            longest /= 2
-        length = min(length, longest)
     if segment.amplitude and remaining_creep_fraction(scene, length) > _NOT_SEEN * scene.tolerance:
         length = min(length, segment.period / _STEPS_A_CYCLE)
     if length >= distance * (1 - 1e-9):

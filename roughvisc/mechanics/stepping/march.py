@@ -40,7 +40,7 @@ from roughvisc.mechanics.stepping.controller import (
 from roughvisc.mechanics.stepping.program import Segment
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.slide_march import through_slide
-from roughvisc.mechanics.stepping.state import NO_FIELD, Guess, State, Step, Trial
+from roughvisc.mechanics.stepping.state import Guess, State, Step, Trial
 from roughvisc.mechanics.stepping.step import (
     accept,
     carried_into_step,
@@ -194,7 +194,7 @@ def _steps_of_segment(scene: Scene, state: State, segment: Segment) -> Iterator[
                 guess = coarse_initial_guess(accepted.now, state.companion.now, state.before if state.behind else None)
                 if scene.enlarge is None:  # its fields are not needed while the companion's contact is solved
                     numbers = state.now.without_fields()
-                    state = base = replace(state, now=numbers, before=None, displacement=NO_FIELD, memory=None)
+                    state = base = replace(state, now=numbers, before=None, memory=None)
             judged = _step_with_companion(scene, state, accepted, segment, trial, guess)
             del accepted, guess
         if first is not None:

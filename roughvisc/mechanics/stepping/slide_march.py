@@ -153,7 +153,6 @@ def _moved(scene: Scene, state: AnyTrajectory, slide: Slide, cells: int) -> AnyT
     return replace(
         state,
         now=moved(state.now),
-        displacement=_rolled(state.displacement, slide, cells),
         memory=scene.memory.roll(state.memory, slide.sense * cells, slide.axis),
     )
 

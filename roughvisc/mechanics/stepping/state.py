@@ -20,9 +20,8 @@ from roughvisc.mechanics.stepping.scene import Scene
 Array = NDArray[np.float64]
 #: A pressure near the one sought, and its displacement at unit compliance where that is known. [Pa], [Pa m]
 Guess = tuple[Array, Array | None]
-#: In place of a field that is not held.
-NO_FIELD = np.zeros((0, 0))
-NO_CONTACT = Sparse.whole(NO_FIELD)
+#: In place of one that is not held.
+NO_CONTACT = Sparse.whole(np.zeros((0, 0)))
 
 
 _EXCESS = ("stored_excess", "dissipated_excess")
@@ -69,14 +68,10 @@ class Uncertainty:
 
     def relative(self, force: float, approach: float) -> float:
         """The largest of pressure, force and approach over what these have come to so far [N], [m]. [-]"""
-        if math.isnan(self.pressure):  # unknown, of surfaces at rest too
-            return math.nan
         by_force = max(self.pressure, self.force) / force if force > 0 else 0.0
         return max(by_force, self.approach / approach if approach > 0 else 0.0)
 
 
-#: Of a march that has no companion.
-UNKNOWN = Uncertainty(**dict.fromkeys(Uncertainty.__dataclass_fields__, math.nan))
 # A step that is tried again is shortened to meet what is allowed, of which it aims at the square of the first number,
 # and within the other two. The third is taken where there is no estimate.
 _AIM, _SHORTEST, _LONGEST = 0.7, 0.2, 0.5
@@ -184,28 +179,24 @@ class Trajectory:
     ----------
     now, before : Instant
         The present instant, and the one before if the next step may extrapolate from it.
-    displacement : ndarray, shape (nx, ny)
-        Total displacement of the half-space at the present instant, where the work is summed up from it; empty where
-        the energies give that. [m]
     memory : object
         State of the memory at the present instant.
     start : float
         Value at the start of the segment of what it controls. [N or m]
     work : float
         Work of the pressure on the displacement since the start; jumps count as quasi-static. [J]
-    energy : Energy or None
-        What of it is stored and what is dissipated; None where the memory is no series of exponentials.
+    energy : Energy
+        What of it is stored and what is dissipated.
     unresolved : bool
         Whether a jump was prescribed that the material cannot follow at once.
     """
 
     now: Instant
-    displacement: Array
     memory: Any
     before: Instant | None = None
     start: float = 0.0
     work: float = 0.0
-    energy: Energy | None = None
+    energy: Energy = field(default_factory=Energy)
     unresolved: bool = False
 
     def extrapolated(self, length: float) -> tuple[Array, bool]:
@@ -355,18 +346,18 @@ class Step:
 
     @property
     def stored(self) -> float:
-        """Energy stored in the springs of the material; NaN where the memory is no series. [J]"""
-        return self.state.energy.stored - self.uncertainty.stored_excess if self.state.energy else math.nan
+        """Energy stored in the springs of the material. [J]"""
+        return self.state.energy.stored - self.uncertainty.stored_excess
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated in its dashpots so far; NaN where the memory is no series. [J]"""
-        return self.state.energy.dissipated - self.uncertainty.dissipated_excess if self.state.energy else math.nan
+        """Energy dissipated in its dashpots so far. [J]"""
+        return self.state.energy.dissipated - self.uncertainty.dissipated_excess
 
     @property
     def work(self) -> float:
         """Work of the pressure on the displacement since the start. [J]"""
-        return self.stored + self.dissipated if self.state.energy else self.state.work
+        return self.stored + self.dissipated
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ from roughvisc.mechanics.stepping import energy
 from roughvisc.mechanics.stepping.program import Control
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.mechanics.stepping.state import (
-    NO_FIELD,
     AnyTrajectory,
     ControllerState,
     Guess,
@@ -46,8 +45,8 @@ def initial_state(scene: Scene) -> State:
     nothing = np.zeros(scene.operator.shape)
     given = any(segment.control == "approach" for segment in scene.program.segments[:1])
     now = Instant(0.0, Sparse.of(nothing), 0.0, 0.0 if given else scene.lowest(scene.gap), nothing)
-    at_rest = energy.at_rest(scene.memory) if isinstance(scene.memory, Modes | WaveMemory) else None
-    return State(now, nothing, scene.memory.start(scene.operator.shape), energy=at_rest)
+    assert isinstance(scene.memory, Modes | WaveMemory)
+    return State(now, scene.memory.start(scene.operator.shape), energy=energy.at_rest(scene.memory))
 
 
 def trial_at_rest(scene: Scene, state: State) -> Trial:
@@ -175,19 +174,12 @@ def advance_trajectory(scene: Scene, state: AnyTrajectory, trial: Trial) -> AnyT
         field, now = both, Instant(now.time, Sparse.of(both[0]), now.force, now.approach, both[1])
     memory = scene.memory.advance(state.memory, trial.length, trial.rule, field)
     spent = energy_after(scene, state, trial, memory)
-    if spent is None:
-        assert trial.displacement is not None
-        displacement = trial.displacement
-        work = state.work + work_between(scene, state, now.pressure, displacement, jumped=state.unresolved)
-    else:
-        displacement, work = NO_FIELD, spent.stored + spent.dissipated
     return replace(
         state,
         now=now,
-        displacement=displacement,
         before=state.now if trial.length > 0 else None,
         memory=memory,
-        work=work,
+        work=spent.stored + spent.dissipated,
         energy=spent,
         unresolved=False,
     )
@@ -225,10 +217,8 @@ def accept(scene: Scene, state: State, trial: Trial, pace: ControllerState, **mo
     )
 
 
-def energy_after(scene: Scene, state: Trajectory, trial: Trial, memory: Any) -> energy.Energy | None:
-    """Energies at the end of a step, with the state of the memory then; None where that is no series."""
-    if state.energy is None:
-        return None
+def energy_after(scene: Scene, state: Trajectory, trial: Trial, memory: Any) -> energy.Energy:
+    """Energies at the end of a step, with the state of the memory then."""
     if isinstance(scene.memory, WaveMemory):
         products = scene.memory.products(state.memory, memory.field, trial.rule)
     else:
@@ -267,16 +257,6 @@ def work_while_held(state: Trajectory, trial: Trial) -> float | None:
     if trial.control == "load" and (now.force == before.force or state.unresolved):
         return now.force * (now.approach - before.approach)
     return None
-
-
-def work_between(scene: Scene, state: Trajectory, pressure: Array, displacement: Array, jumped: bool = False) -> float:
-    """Work of the pressure on the displacement from a state to the next. [J]
-
-    Where surfaces touch that is the force on the approach; cells that touch in a part of the step count by that part
-    only. Without memory it is the stored energy, whatever the steps. ``jumped``: the pressure changed at once, before.
-    """
-    mean = pressure if jumped else 0.5 * (state.now.pressure + pressure)
-    return float(np.sum(mean * (displacement - state.displacement))) * scene.operator.cell_area
 
 
 def cost_after(state: State, trial: Trial) -> dict[str, Any]:
@@ -424,8 +404,5 @@ def _on_larger(scene: Scene, offset: tuple[int, int], state: AnyTrajectory) -> A
         return replace(instant, contact=contact, unit_displacement=None)
 
     now, before = on_larger_grid(state.now), None if state.before is None else on_larger_grid(state.before)
-    _, glassy, _, carried = carried_into_step(scene, memory, 0.0, "linear")
-    unit_displacement = scene.operator.displacement(now.pressure)
-    now = replace(now, unit_displacement=unit_displacement)
-    displacement = carried + glassy * unit_displacement
-    return replace(state, now=now, displacement=displacement, before=before, memory=memory)
+    now = replace(now, unit_displacement=scene.operator.displacement(now.pressure))
+    return replace(state, now=now, before=before, memory=memory)

@@ -20,11 +20,11 @@ from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.layer import LayeredBody
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.wave_series import Strata, WaveSeries, wave_series
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, SHORTEST_AGE, Choice, Kind, choose_memory, may_ring
+from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, SHORTEST_AGE, Choice, at_once, choose_memory, may_ring
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.protocol import Material, complete
+from roughvisc.mechanics.materials.protocol import complete
 from roughvisc.mechanics.materials.series import series_of
 
 Array = NDArray[np.float64]
@@ -214,7 +214,6 @@ def choose_body_memory(
     duration: float,
     tolerance: float,
     acts_on: ActsOn = "displacement",
-    kind: Kind = "auto",
     shortest: float | None = None,
     operator: Operator | None = None,
 ) -> Choice:
@@ -223,7 +222,7 @@ def choose_body_memory(
     Parameters
     ----------
     body : Body
-    duration, tolerance, acts_on, kind, shortest
+    duration, tolerance, acts_on, shortest
         As :func:`~roughvisc.mechanics.hereditary.choice.choose_memory` has them.
     operator : Operator, optional
         The grid; without one the memory tells its number of exponentials alone.
@@ -231,18 +230,14 @@ def choose_body_memory(
     Raises
     ------
     InputError
-        As there; if a direct history of waves is asked for; and if no memory is known for the body.
+        As there; and if no memory is known for the body.
     """
     if body.separates:
-        return choose_memory(body.material, duration, tolerance, acts_on, kind, shortest)
+        return choose_memory(body.material, duration, tolerance, acts_on, shortest)
     if not isinstance(body, LayeredBody):
         raise InputError(
             f"material is a {type(body).__name__} in which space and time do not separate, and no memory is known for "
             "it: expected the body that layer() makes, or a Body whose kernel is constant in time"
-        )
-    if kind == "direct":
-        raise InputError(
-            f"memory is 'direct' and the body is {body!r}, in which space and time do not separate: expected 'auto'"
         )
     share = SERIES_SHARE * tolerance
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
@@ -251,7 +246,7 @@ def choose_body_memory(
         for one in body.materials
     ]
     materials = tuple(
-        _at_once(one) if found is None else found.prony for one, found in zip(body.materials, series, strict=True)
+        at_once(one) if found is None else found.prony for one, found in zip(body.materials, series, strict=True)
     )
     of_materials = max((found.error for found in series if found is not None), default=0.0)
     waves = wave_series(Strata(body.thicknesses, materials), shortest, duration, share - of_materials)
@@ -267,10 +262,5 @@ def choose_body_memory(
         )
     )
     repairs = [found.repair for found in series if found is not None and found.repair]
-    return Choice(memory, error, "; ".join([note, *repairs]))
-
-
-def _at_once(material: Material) -> Prony:
-    """What stands for a material where nothing but its instantaneous compliance matters."""
-    glassy = float(material.contact_compliance(0.0)) * 2 / (1 - material.poisson)
-    return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson)
+    deviation = max((found.deviation for found in series if found is not None), default=0.0)
+    return Choice(memory, error, "; ".join([note, *repairs]), deviation)

@@ -21,13 +21,11 @@ from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import Choice
-from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import STIFF
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.program import Program, Slide
 from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.mechanics.stepping.seed import march_seed
 from roughvisc.mechanics.stepping.step import at_border
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory
 from roughvisc.settings import Settings
@@ -286,7 +284,7 @@ def over(height: xr.DataArray, shape: tuple[int, ...], side: int) -> xr.DataArra
 def grids_of(height: xr.DataArray, settings: Settings) -> tuple[tuple[int, ...], ...]:
     """Shape of a surface's grid, and of those that it may grow to."""
     shapes = [height.shape]
-    if settings.boundary == "free" and settings.edge == "error" and settings.method == "fast":
+    if settings.boundary == "free" and settings.edge == "error":
         while grown(height, 1.0) is not None and math.prod(shape := grown_shape(shapes[-1], GROWTH)) <= MOST_CELLS:
             shapes.append(shape)
     return tuple(shapes)
@@ -415,7 +413,7 @@ def _march(case: Case, program: Program, height: xr.DataArray, outgrowing: bool 
     scene, _ = build_scene(profile, case.body(), program, settings)
     course: list[Passed] = []
     reached, work, bordering, began = 0.0, 0, False, time.perf_counter()
-    for step in march(scene) if settings.method == "fast" else march_seed(scene):
+    for step in march(scene):
         now, touching = step.shown.time, step.shown.pressure > 0
         share = float(np.mean(touching))
         taken_off = staircase_area(touching, scene) / (scene.operator.cell_area * touching.size)
@@ -601,8 +599,7 @@ def wall_time(
     """
     cells = solved.cells
     modes = len(choice.memory.material.times) if isinstance(choice.memory, Modes | WaveMemory) else 0
-    past = found.contact * found.steps / 2 if isinstance(choice.memory, History) else 0.0
-    stepping = found.steps * (beside + solved.mean(float) * 8 * (10 + 4 * modes + past) * 0.3e-9)
+    stepping = found.steps * (beside + solved.mean(float) * 8 * (10 + 4 * modes) * 0.3e-9)
     writing = found.rows * cells * 8 * len(settings.fields) * _WRITE
     again = _AGAIN if settings.grid_error else 1.0
     return found.convolutions * convolution * solved.mean(work) / work(cells) * again + stepping + writing + _FILE
@@ -612,7 +609,7 @@ def bytes_needed(
     settings: Settings, cells: int, found: CostEstimate, choice: Choice, part: float = 1.0, grows: bool = False
 ) -> float:
     """Memory of the process that computes a case, at its peak, ``part`` of the cells being solved on. [bytes]"""
-    counts = {"contact": found.contact, "steps": found.steps, "rows": found.rows, "part": part}
+    counts = {"contact": found.contact, "rows": found.rows, "part": part}
     return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 

@@ -387,8 +387,6 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
     if found is None or ahead.problem:
         return row
     stages = surface.stages[0 if window else whole : None if grows else whole + 1]
-    if settings.method != "fast":
-        stages = (Stage(stages[0].shape, height.size),)
     solved = solved_on(stages, found)
     again = 1 + solved.growths / max(found.steps, 1.0)  # a step in which it grows is tried again
     found = replace(found, convolutions=found.convolutions * again)
@@ -440,8 +438,6 @@ def _general_row(ahead: _Ahead, stopwatch: ConvolutionTimer, there: Available) -
 
 
 def _scheme(settings: Settings, choice: Choice, found: CostEstimate) -> str:
-    if settings.method == "seed":
-        return "the seed paper's: rectangle rule, first order"
     steps = "chosen by the tolerance" if settings.time_step == "auto" else f"of {settings.time_step:g} s"
     if choice.note.startswith("no memory"):
         return f"no memory: each step by itself, steps {steps}"

@@ -165,8 +165,8 @@ def run_case(
     """Bring one case to its file in a folder, and give the file's path.
 
     Finished already: nothing is computed. Interrupted, by whatever means: it goes on from its last checkpoint, and
-    ends with the same numbers, to the last bit, as if it had not been; ``wall_time`` leaves out what was lost. The
-    seed paper's method begins again. A curve of friction goes on with the speed that was being computed.
+    ends with the same numbers, to the last bit, as if it had not been; ``wall_time`` leaves out what was lost. A curve
+    of friction goes on with the speed that was being computed.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
-    # the seed paper's algorithm estimates nothing, and another program may have left the estimates out
+    # another program may have left the estimates out
     left = (
         np.asarray(histories[AXES[rows].residual], dtype=float)[bad]
         if AXES[rows].residual in histories

@@ -35,7 +35,6 @@ _SHARED = (
     "comment",
     "boundary",
     "tolerance",
-    "method",
     "direction",
     "thickness",
     "base",

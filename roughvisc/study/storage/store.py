@@ -145,8 +145,7 @@ def is_field(variable: xr.Variable) -> bool:
 def may_be_missing(name: str) -> bool:
     """Whether a value of a variable may be missing, and NaN says so; any other has no fill value.
 
-    The seed paper's algorithm states no accuracy, the direct history no energies; of steps between kept times the mean
-    gap is not known over a grid that has grown since.
+    Of steps between kept times the mean gap is not known over a grid that has grown since.
     """
     return any(name in axis.variables and axis.variables[name].may_be_missing for axis in AXES.values())
 

@@ -58,7 +58,6 @@ _SETTINGS = (
     "direction",
     "boundary",
     "tolerance",
-    "method",
     "memory",
     "series_error",
     "transforms",

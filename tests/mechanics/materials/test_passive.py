@@ -1,11 +1,9 @@
-"""Passive materials for tables: the nearest positive series, and what the loss factor of a table says."""
-
-from itertools import pairwise
+"""Passive materials for tables: the nearest positive series."""
 
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.materials.passive import nearest_series, smallest_loss
+from roughvisc.mechanics.materials.passive import nearest_series
 from roughvisc.mechanics.materials.tabulated import Tabulated
 
 ROWS = np.geomspace(1e-3, 1e3, 60)
@@ -58,25 +56,3 @@ def test_nearest_series__of_a_delay():
     found = nearest_series(Tabulated((0.0, 1.0, 3.0), (0.0, 0.0, 4.0)))
     assert 0 < found.largest < 1
     assert found.prony.glassy == 0
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_loss__is_the_transform_of_the_table(seed):
-    """The least over closely spaced frequencies, by direct integration of the creep rate."""
-    times = np.array([0.0, 0.5, 1.0, 2.0, 4.0])
-    rises = np.random.default_rng(seed).uniform(0.05, 1.0, 4)
-    table = Tabulated(times, np.append(0.3, 0.3 + np.cumsum(rises)))
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    pieces = list(pairwise(times))
-    t = np.concatenate([(a + b + (b - a) * nodes) / 2 for a, b in pieces])
-    rates = [rises[0] / 0.5, *(rise / np.log(b / a) for rise, (a, b) in zip(rises[1:], pieces[1:], strict=True))]
-    rate = np.concatenate([np.full(60, rates[0]), np.repeat(rates[1:], 60) / t[60:]])
-    rate *= np.concatenate([weights * (b - a) / 2 for a, b in pieces])
-    phase = np.geomspace(0.25, 10.0, 2000)[:, None] * t
-    loss, storage = np.sin(phase) @ rate, 0.3 + np.cos(phase) @ rate
-    assert smallest_loss(table) == pytest.approx(np.min(loss / np.hypot(loss, storage)), abs=0.02)
-
-
-def test_loss__of_passive_and_active_tables():
-    assert smallest_loss(Tabulated(ROWS, 0.5 + ROWS**0.3)) > 0
-    assert smallest_loss(Tabulated((0.0, 1.0, 2.0, 3.0), (1.0, 1.0, 2.0, 2.0))) < -0.1

@@ -8,7 +8,6 @@ import pytest
 import roughvisc as rv
 from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics.bodies.operator import Operator
-from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.march import march
@@ -153,15 +152,6 @@ def test_going_on_from_any_state__states_the_same():
         for one, other in zip(resumed, whole[cut + 1 :], strict=True):
             same(one, other)
 
-
-def test_work_error__of_a_direct_history_covers_the_true_one():
-    program, times = PROGRAMS["triangle"], (0.3, 0.7, 1.0, 1.4, 2.0)
-    scene = sphere(MATERIALS["zener"], program, times=times, tolerance=3e-2)
-    found = kept(replace(scene, memory=History(MATERIALS["zener"])))
-    exact = kept(replace(scene, tolerance=1e-3))
-    true, said = np.array([(abs(step.work - exact[t].work), step.uncertainty.work) for t, step in found.items()]).T
-    assert np.all(said >= 0.8 * true)
-    assert np.all(said <= 3e-2 * exact[2.0].work)
 
 
 def test_row_right_after_a_corner__is_judged():

@@ -11,7 +11,6 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
-from roughvisc.mechanics.hereditary.direct import History
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
@@ -40,13 +39,13 @@ def rough(shape):
     return rv.self_affine(PERIOD, shape, hurst=0.8, rms_slope=0.1, **settings).values
 
 
-def scene(height, material, program, times=(), tolerance=1e-3, memory=None):
+def scene(height, material, program, times=(), tolerance=1e-3):
     """On a square surface, or on a strip of square cells."""
     nx, ny = height.shape
     spacing = (PERIOD / nx, PERIOD / ny if ny > 3 else PERIOD / nx)
     operator = Operator((nx, ny), spacing, "periodic")
-    memory = memory or Modes(material)
-    return Scene(operator, height.max() - height, material, memory, program, times=times, tolerance=tolerance)
+    gap = height.max() - height
+    return Scene(operator, gap, material, Modes(material), program, times=times, tolerance=tolerance)
 
 
 def force(found, step):
@@ -205,14 +204,6 @@ def test_work_of_the_friction_force__is_what_the_body_takes_up():
     assert sliding[-1].state.slid.work == pytest.approx(np.trapezoid(forces, distance), rel=5e-3)
 
 
-def test_work_of_the_friction_force__is_known_of_the_direct_history_too():
-    found, steps = settled(wave(40), rubber(), 0.1, 5e3 * PERIOD**2 / 40, 0.8, times=None, memory=History(rubber()))
-    distance = np.array([step.state.slid.distance for step in steps[1:]])
-    forces = np.array([force(found, step) for step in steps[1:]])
-    integral = np.trapezoid(np.append(0.0, forces), np.append(0.0, distance))
-    assert steps[-1].state.slid.work == pytest.approx(integral, rel=0.04)
-
-
 @pytest.mark.parametrize("direction", ["-x", "y", pytest.param("-y", marks=pytest.mark.long)])
 def test_turned_surface__slides_as_well_in_the_turned_direction(direction):
     height, material = rough((30, 24)), rubber()
@@ -251,18 +242,6 @@ def test_slow_slide__is_not_frozen_by_the_tolerance():
         found, steps = settled(rough((32, 24)), rubber(), 1e-4, 2e-3, periods=1, tolerance=tolerance)
         forces.append(force(found, steps[-1]))
     assert forces[0] == pytest.approx(forces[1], rel=1e-3)
-
-
-def test_direct_history__slides_as_the_series_does():
-    program = (
-        rv.Program().load(2e-3, over=0).slide(0.5e-3, speed=0.1).hold(1e-3).slide(0.25e-3, speed=0.1, direction="-y")
-    )
-    material, height = rubber(), rough((20, 21))
-    instants = (2e-3, 5e-3, program.duration)
-    found = [scene(height, material, program, instants, 1e-5, memory) for memory in (None, History(material))]
-    last = [list(march(one))[-1] for one in found]
-    assert force(found[1], last[1]) == pytest.approx(force(found[0], last[0]), rel=1e-4)
-    np.testing.assert_allclose(last[1].shown.pressure, last[0].shown.pressure, atol=1e-4 * last[0].shown.pressure.max())
 
 
 def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():

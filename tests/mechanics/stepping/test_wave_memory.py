@@ -87,18 +87,6 @@ def test_resume__goes_on_to_the_same_bits(tmp_path):
     assert len(resumed) == len(whole) - len(whole) // 2 - 1
 
 
-@pytest.mark.parametrize(
-    ("body", "settings", "expected"),
-    [
-        (rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7)), {"memory": "direct"}, "memory is 'direct' and the body is layer"),
-        (rv.layer(RUBBER, 1e-4, on=rv.elastic(1e7)), {"method": "seed"}, "method is 'seed'"),
-    ],
-)
-def test_simulate__refuses(body, settings, expected):
-    with pytest.raises(InputError, match=expected):
-        pressed(body, boundary="periodic", numerics=rv.Numerics(**settings))
-
-
 def test_jump__of_a_layer_without_instantaneous_compliance_is_refused():
     body = rv.layer(rv.kelvin_voigt(1e6, 1e5), 1e-4, on=rv.kelvin_voigt(1e7, 1e5))
     with pytest.raises(InputError, match="no instantaneous compliance"):

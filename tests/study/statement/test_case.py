@@ -428,7 +428,7 @@ def test_key__counts_what_determines_the_numbers(study):
         ('"3 MPa"', '"3.00000000000001 MPa"'),
         ("[32, 24]", "[24, 32]"),
         ("[surface]", "[solve]\nboundary = 'periodic'\n[surface]"),
-        ("[surface]", "[solve]\nmethod = 'seed'\n[surface]"),
+        ("[surface]", "[solve]\ntime_step = 0.01\n[surface]"),
         ("[surface]", "[keep]\ntimes = 3\n[surface]"),
         ("[surface]", "[keep]\nfields = ['gap']\n[surface]"),
         ("[material]", "level = 1\n[solve]\nboundary = 'free'\n[material]"),

@@ -35,7 +35,7 @@ def test_unit_of__is_what_the_key_expects(above, section, case):
 
 
 def test_unit_of__words_counts_and_unknown_keys_have_none():
-    for key in ("surface.seed", "surface.level", "solve.method", "solve.tolerance", "keep.times", "keep.fields"):
+    for key in ("surface.seed", "surface.level", "solve.boundary", "solve.tolerance", "keep.times", "keep.fields"):
         assert unit_of(key) == ""
     for key in ("", "program", "program.0", "program.first.load", "material.colour", "nothing.load", "title"):
         assert unit_of(key) == ""

@@ -17,7 +17,7 @@ SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\
 SWEEP = """
 [sweep]
 "program.0.load" = ["2 mN", "1 mN"]
-"solve.memory" = ["auto", "direct"]
+"solve.edge" = ["error", "accept"]
 """
 TOGETHER = {"concat_dim": "case", "data_vars": "all", "coords": "different", "compat": "equals", "join": "outer"}
 
@@ -59,14 +59,14 @@ def test_files__open_together_by_xarray_alone(folder, options):
         xr.open_mfdataset(f"{folder}/*.nc", combine="nested", **TOGETHER) as ds,
     ):
         assert sorted(ds.program_0_load.values) == [1e-3, 1e-3, 2e-3, 2e-3]
-        direct = ds.sel(case=ds.solve_memory == "direct").sortby("program_0_load")
-        assert direct.force.isel(time=-1).values == pytest.approx([1e-3, 2e-3], rel=1e-12)
+        accepted = ds.sel(case=ds.solve_edge == "accept").sortby("program_0_load")
+        assert accepted.force.isel(time=-1).values == pytest.approx([1e-3, 2e-3], rel=1e-12)
         areas = ds.contact_area.isel(time=-1).groupby("program_0_load").mean().load()
         assert areas.sel(program_0_load=2e-3) > areas.sel(program_0_load=1e-3)
         frame = ds[["force"]].to_dataframe()
-        assert len(frame.query("program_0_load > 1.5e-3 and solve_memory == 'auto'")) == ds.sizes["time"]
-        apart = ds[["force", "contact_area"]].set_index(case=["program_0_load", "solve_memory"]).unstack()
-        assert apart.force.sel(program_0_load=1e-3, solve_memory="auto")[0].values == pytest.approx(1e-3, rel=1e-12)
+        assert len(frame.query("program_0_load > 1.5e-3 and solve_edge == 'error'")) == ds.sizes["time"]
+        apart = ds[["force", "contact_area"]].set_index(case=["program_0_load", "solve_edge"]).unstack()
+        assert apart.force.sel(program_0_load=1e-3, solve_edge="error")[0].values == pytest.approx(1e-3, rel=1e-12)
         ours = rv.plot.sweep(ds.load(), "contact_area", along="program_0_load")
         theirs = rv.plot.sweep(rv.open_results(folder), "contact_area", along="program.0.load")
         assert [ax.get_xlabel() for ax in ours.axes] == [ax.get_xlabel() for ax in theirs.axes]
@@ -76,7 +76,7 @@ def test_files__open_together_by_xarray_alone(folder, options):
 def test_open_results__names_each_parameter_once(folder):
     ds = rv.open_results(folder)
     assert ds.attrs.get("title") == "A ball"
-    for key in ("program.0.load", "solve.memory"):
+    for key in ("program.0.load", "solve.edge"):
         assert ds[identifier(key)].attrs["long_name"] == key
         assert key not in ds
     assert ds.sel(case=ds.program_0_load == 1e-3).sizes["case"] == 2

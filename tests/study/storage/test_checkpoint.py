@@ -86,12 +86,6 @@ tolerance = 3e-2
 fields = ["gap"]
 times = "all"
 """
-# Creep data with a kink, as they are: every pressure is kept.
-_TIMES = [i / 40 for i in range(41)]
-DIRECT = MODES.replace(
-    'model = "zener"\nshear_modulus = "3 MPa"\nkelvin_modulus = "1 MPa"\nkelvin_viscosity = "0.1 MPa s"',
-    f'model = "tabulated"\ntimes = {_TIMES}\ncompliances = {[1e-7 * (1 + t + 20 * max(t - 0.2, 0)) for t in _TIMES]}',
-).replace("[solve]", '[solve]\nmemory = "direct"')
 # Begins on a window of 32 cells that grows with the contact.
 FOLLOWING = GROWING.replace('"30 um", "24 um"', '"206 um", "242 um"').replace("[15, 12]", "[103, 121]")
 # Slides, rests with what the slide has left, and slides back.
@@ -107,7 +101,6 @@ CASES = {
     "modes": MODES,
     "soft": SOFT,
     "growing": GROWING,
-    "direct": DIRECT,
     "sliding": SLIDING,
 }
 

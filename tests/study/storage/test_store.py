@@ -16,22 +16,14 @@ from roughvisc.study.storage import store
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.store import may_be_missing, open_result, write_result
 
-#: What the seed paper's algorithm, or the direct history, leaves unsaid.
-MISSING = {"stated_error", "time_error", "residual", "approach_error", "contact_area_error"}
-
 
 def test_missing__is_declared_where_it_occurs():
-    ball, rubber = rv.sphere(1e-3, 2e-4, 20), rv.zener(3e6, 1e6, 1e5)
+    punch, rubber = rv.flat_punch(5e-5, 2e-4, 20), rv.zener(3e6, 1e6, 1e5)
     program = rv.Program().load(1e-4, over=0.05).hold(0.1)
-    found = set()
-    for rare in ({"method": "seed", "time_step": 0.01}, {"memory": "direct"}, {"time_step": 0.02}):
-        numerics = rv.Numerics(**rare)
-        ds = rv.simulate(ball, rubber, program, times=[0, 0.05, 0.15], progress=False, numerics=numerics)
-        missing = {str(name) for name in ds.variables if ds[name].isnull().any()}
-        assert all(ds[name].isnull().all() for name in missing), "throughout"
-        found |= missing
-    assert found == MISSING
-    assert all(map(may_be_missing, found))
+    ds = rv.simulate(punch, rubber, program, times=[0, 0.05, 0.15], edge="accept", progress=False)
+    missing = {str(name) for name in ds.variables if ds[name].isnull().any()}
+    assert missing == {"height", "gap"}
+    assert all(map(may_be_missing, missing))
 
 
 def test_write_result__gives_the_same_numbers_back(tmp_path):
@@ -56,7 +48,7 @@ def test_write_result__follows_the_conventions(tmp_path):
         assert raw["status"].flag_values.dtype == raw["status"].dtype
         everywhere = raw.variables | {n: v for group in raw.groups.values() for n, v in group.variables.items()}
         filled = {n for n, v in everywhere.items() if "_FillValue" in v.ncattrs()}
-        assert filled == MISSING | {"height", "gap", "mean_gap"}
+        assert filled == {"height", "gap", "mean_gap"}
         for name, variable in everywhere.items():
             assert variable.filters()["zlib"] is (len(variable.dimensions) == 3), name
             assert name.endswith("_bounds") or variable.long_name

@@ -1,0 +1,153 @@
+"""The algorithm of the paper, with its errors corrected: what this package is compared with, and no part of a solve.
+
+"A robust algorithm for the contact of viscoelastic materials" presses a profile in equal steps of time: rectangle rule,
+one convolution for each past increment of pressure, plain conjugate gradients from uniform pressure, stopped when the
+pressure stagnates. Numbers in brackets are those of the paper's equations; "printed" marks what is corrected
+(docs/theory.md, "Errors in the paper").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import ConvergenceError
+
+Array = NDArray[np.float64]
+
+
+class Convolution(Protocol):
+    """Grid on which the profile is pressed: displacement at unit compliance [Pa m], and the area of a cell [m2]."""
+
+    cell_area: float
+
+    def displacement(self, pressure: Array) -> Array:
+        """``K0 p``."""
+        ...
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One elastic contact: pressure [Pa], level of the rigid profile [m], iterations, and whether it stagnated."""
+
+    pressure: Array
+    approach: float
+    iterations: int
+    stagnated: bool
+
+
+def press(
+    operator: Convolution,
+    gap: Array,
+    compliance: Callable[[float], float],
+    load: Callable[[float], float],
+    times: Sequence[float],
+    *,
+    epsilon: float = 1e-5,
+) -> Iterator[tuple[float, Array, float]]:
+    """Press a profile on a viscoelastic half-space under a given load.
+
+    The rectangle rule is stable only while ``sum J_i tanh(h / 2 tau_i) + phi h / 2 < J_0``, with a step ``h``,
+    retardation times ``tau_i``, and a fluidity ``phi``.
+
+    Parameters
+    ----------
+    operator : Convolution
+        Of the half-space, on the grid of the gap.
+    gap : ndarray, shape (nx, ny)
+        Undeformed gap. [m]
+    compliance : callable
+        Contact compliance, [1/Pa], by the age, [s]; half of the paper's.
+    load : callable
+        Normal force, [N], by the time, [s].
+    times : sequence of float
+        In equal steps from zero, at which the load may jump. [s]
+    epsilon : float
+        A contact is solved once an iteration changes the pressure by less than this part of the load.
+
+    Yields
+    ------
+    time : float
+        [s]
+    pressure : ndarray, shape (nx, ny)
+        [Pa]
+    approach : float
+        [m]
+
+    Raises
+    ------
+    ConvergenceError
+        If the pressure of a step does not stagnate.
+    """
+    # (17) Printed: C at the first lag. The present increment has lag 0, and the load may jump.
+    at_once = compliance(0.0)
+    pressure = np.zeros_like(gap)
+    increments: list[Array] = []  # (5) Printed: from n = 2. The first increment is that at the first time.
+    for time in times:
+        # (5) Printed: up to the last step, with a kernel of unit force. An increment was applied and is kept. Of the
+        # present one, all that is known yet is the part that takes the last pressure away.
+        past = -at_once * operator.displacement(pressure)
+        for began, increment in zip(times, increments, strict=False):
+            past += operator.displacement(compliance(time - began) * increment)
+        contact = conjugate_gradients(operator, gap + past, at_once, load(time), epsilon=epsilon)
+        if not contact.stagnated:
+            raise ConvergenceError(
+                f"at {time:.6g} s the paper's iteration does not stagnate in {contact.iterations} iterations: expected "
+                "a larger epsilon"
+            )
+        increments.append(contact.pressure - pressure)
+        pressure = contact.pressure
+        yield time, pressure, contact.approach
+
+
+def conjugate_gradients(
+    operator: Convolution,
+    gap: Array,
+    compliance: float,
+    load: float,
+    *,
+    epsilon: float = 1e-5,
+    sign: float = 1.0,
+    most: int = 3000,
+) -> Contact:
+    """Elastic contact under a load, (1) to (4), by the iteration (6) to (16).
+
+    ``gap`` is that without the present pressure [m], ``compliance`` that of the present increment [1/Pa]. ``sign`` is
+    that of (9); with the printed one, -1, the iteration stalls. It ends after ``most`` iterations.
+    """
+    if load == 0:
+        return Contact(np.zeros_like(gap), float(np.min(gap)), 0, True)
+    pressure = np.full(gap.shape, load / (operator.cell_area * gap.size))  # (1), uniform
+    direction, last, restart = np.zeros_like(gap), 1.0, True
+    for iteration in range(1, most + 1):
+        touching = pressure > 0  # (3) Printed: all points
+        opening = gap + compliance * operator.displacement(pressure)  # (2)
+        opening -= np.mean(opening[touching])  # (7) Printed: mean over all points
+        residual = np.where(touching, opening, 0.0)
+        norm = float(np.sum(residual**2))  # (8)
+        # (9) Printed: a minus. The residual is the gradient, and (12) goes against the direction.
+        factor = 0.0 if restart else sign * norm / last
+        direction, last = np.where(touching, residual + factor * direction, 0.0), norm
+        # (11) Printed: the kernel at the lag of the whole time, which makes steps too short.
+        change = compliance * operator.displacement(direction)
+        change -= np.mean(change[touching])  # (10) Printed: no mean
+        curvature = float(np.sum(direction * change))
+        length = float(np.sum(residual * direction)) / curvature if curvature else 0.0  # (11)
+        before = pressure
+        pressure = np.maximum(pressure - length * direction, 0.0)  # (12), (13)
+        penetrating = (pressure == 0) & (opening < 0)  # (4) Printed: opening > 0 outside. It may be 0.
+        pressure[penetrating] -= length * opening[penetrating]  # (14)
+        restart = bool(np.any(penetrating))
+        total = operator.cell_area * float(np.sum(pressure))
+        if total == 0:
+            return Contact(before, float("nan"), iteration, False)
+        pressure *= load / total  # (15) Printed: without the cell's area, as (16)
+        stagnated = bool(operator.cell_area * np.sum(np.abs(pressure - before)) <= epsilon * load)  # (16)
+        if stagnated:
+            break
+    displaced = gap + compliance * operator.displacement(pressure)
+    return Contact(pressure, float(np.mean(displaced[pressure > 0])), iteration, stagnated)
