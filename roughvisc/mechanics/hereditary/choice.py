@@ -100,8 +100,8 @@ def choose_memory(
     if isinstance(material, Prony):
         return Choice(_recursive(material, acts_on, duration), 0.0, terms(material))
     if duration == 0:
-        series, note = at_once(material), "instantaneous compliance"
-        return Choice(_recursive(series, acts_on, duration), 0.0, note if series.glassy else f"no {note}")
+        jumped, note = at_once(material), "instantaneous compliance"
+        return Choice(_recursive(jumped, acts_on, duration), 0.0, note if jumped.glassy else f"no {note}")
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
     material.contact_compliance(duration)  # refuses what ends before
     series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
