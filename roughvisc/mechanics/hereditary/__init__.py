@@ -1,1 +1,1 @@
-"""The hereditary integral: what a material remembers, and the choice of the form it is kept in."""
+"""The hereditary integral: what a material remembers, in exponentials."""

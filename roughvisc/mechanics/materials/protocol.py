@@ -34,9 +34,9 @@ class Material(Protocol):
     Notes
     -----
     A creep compliance is not negative and ascends. That of a passive material is a positive sum of exponentials, of
-    however many; then there is a series as near to it as the tolerance asks. ``memory="auto"`` samples the compliance
-    over the times that the program asks for, at a hundred instants a decade, and presses that series; how near it is
-    was measured, and is part of what a result states. Of others the nearest series is pressed, which the result says.
+    however many; then there is a series as near to it as the tolerance asks. The compliance is sampled over the
+    times that the program asks for, at a hundred instants a decade, and that series is pressed; how near it is was
+    measured, and is part of what a result states. Of others the nearest series is pressed, which the result says.
     Equal materials should be equal, which frozen dataclasses are.
     """
 
