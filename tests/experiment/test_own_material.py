@@ -13,7 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import Paraboloid, lee_radok_step
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.materials.protocol import mean_of
+from roughvisc.mechanics.materials.protocol import complete, mean_of
 from roughvisc.mechanics.materials.series import series_of
 
 

@@ -153,7 +153,6 @@ def test_going_on_from_any_state__states_the_same():
             same(one, other)
 
 
-
 def test_row_right_after_a_corner__is_judged():
     """The program of docs/howto/indentation.md: pulled back from a hold, and asked a fifth of the way."""
     times = (0.1, 0.3, 0.5, 0.6)
