@@ -13,7 +13,7 @@ from roughvisc.mechanics.materials.models import Material
 
 Array = NDArray[np.float64]
 
-#: Ratio of :func:`stiff_ratio` from which the damped rule is taken (docs/theory.md, "Step lengths").
+#: Weight :func:`old_weight` from which the damped rule is taken (docs/theory.md, "Step lengths").
 STIFF = 0.5
 
 #: How pressure is taken to run within a step. ``linear``: second order, exact for piecewise-linear pressure.
@@ -79,14 +79,10 @@ def mean_compliance(material: Material, step: float) -> float:
     return float(material.mean_contact_compliance(0.0, step))
 
 
-def stiff_ratio(material: Material, step: float) -> float:
+def old_weight(compliance: float, mean: float) -> float:
     """Weight of the old over the new pressure in a ``linear`` step; above :data:`STIFF` it rings.
 
-    ``C(h) / mean C - 1``: zero for an elastic material, one for a dashpot or a Kelvin-Voigt solid.
+    From the compliance at the end of the step and its mean over it [1/Pa]: zero for an elastic material, one for a
+    dashpot or a Kelvin-Voigt solid.
     """
-    return old_weight(float(material.contact_compliance(step)), mean_compliance(material, step))
-
-
-def old_weight(compliance: float, mean: float) -> float:
-    """The ratio of :func:`stiff_ratio` from the compliance at the end of a step and its mean over it. [1/Pa]"""
     return compliance / mean - 1 if mean > 0 else math.inf

@@ -86,7 +86,7 @@ class Scene:
         return lru_cache(maxsize=32)(lambda step: mean_compliance(material, min(step, end)))
 
     def stiff_ratio(self, step: float) -> float:
-        """As :func:`~roughvisc.mechanics.hereditary.exponentials.stiff_ratio`, no longer than the program."""
+        """As :func:`~roughvisc.mechanics.hereditary.memory.old_weight`, no longer than the program."""
         return old_weight(self.compliance(step), self.mean_compliance(step))
 
     @cached_property

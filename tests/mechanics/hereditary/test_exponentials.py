@@ -9,7 +9,7 @@ from support import direct as displaced
 
 import roughvisc as rv
 from roughvisc.mechanics.hereditary.exponentials import Modes, padded
-from roughvisc.mechanics.hereditary.memory import mean_compliance, stiff_ratio
+from roughvisc.mechanics.hereditary.memory import mean_compliance, old_weight
 
 CELL = (1, 1)
 
@@ -94,10 +94,13 @@ def test_coefficients__keep_a_constant_at_any_step(rule, x):
     assert float(alpha + carried[0, 0]) == pytest.approx(0.5, rel=1e-8)
 
 
-def test_stiff_ratio__tells_what_a_linear_step_does():
-    assert stiff_ratio(rv.elastic(1.0), 1.0) == pytest.approx(0, abs=1e-15)
-    assert stiff_ratio(rv.kelvin_voigt(1.0, 1.0), 1e-6) == pytest.approx(1, rel=1e-5)
-    assert stiff_ratio(rv.maxwell(1.0, 1.0), 2.0) == pytest.approx(0.5)
+def test_old_weight__tells_what_a_linear_step_does():
+    def weight(material, step):
+        return old_weight(float(material.contact_compliance(step)), mean_compliance(material, step))
+
+    assert weight(rv.elastic(1.0), 1.0) == pytest.approx(0, abs=1e-15)
+    assert weight(rv.kelvin_voigt(1.0, 1.0), 1e-6) == pytest.approx(1, rel=1e-5)
+    assert weight(rv.maxwell(1.0, 1.0), 2.0) == pytest.approx(0.5)
     assert mean_compliance(rv.maxwell(1.0, 1.0), 0.0) == pytest.approx(0.25)
 
 
