@@ -48,7 +48,7 @@ def test_accessor__has_every_name_with_its_docstring():
 
 RESULTS = {
     "simulated": "ds = rv.simulate(rv.sphere(1e-3, 2e-4, (12, 9)), rv.elastic(1e6), rv.Program().load(1e-5, over=0), "
-    "progress=False)",
+    "tolerance=1e-2, progress=False)",
     "run": "ds = rv.run('ball.toml', 'out', progress=False)",
     "opened": "ds = rv.open_results('there')",
     "xarray alone": "import roughvisc.study.storage; ds = xr.Dataset()",
