@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from dense_sliding import PERIOD, TIME, dense, line_profiles, rubber, slid, strong_errors
 from scipy import fft
+from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.operator import Operator
@@ -251,7 +251,7 @@ def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch
     with fft.set_workers(2):
         sliding = Sliding(Body(rubber(), HALF_SPACE), shape, (1e-3, 1e-3), 1.0)
         pressure = np.zeros(shape)
-        for transformed in (sliding.displacement, sliding.full_contact, sliding.lagging, sliding.force_across):
+        for transformed in (sliding.displacement, sliding.full_contact, sliding.force_along, sliding.force_across):
             transformed(pressure)
     assert used == {threads}
 
@@ -265,7 +265,7 @@ def test_not_converged__says_so():
 
 @pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.PowerLaw(1e-7, 1e-6, 0.3)])
 def test_endless_creep__is_refused_where_waves_stand_still(material):
-    with pytest.raises(InputError, match="creeps without end"):
+    with refused("material"):
         slid(ROUGH, material, 0.1, LOAD)
     ridge = slid(wave(33, 1e-5), material, 0.1, 1e-5)
     assert ridge.converged
@@ -274,5 +274,5 @@ def test_endless_creep__is_refused_where_waves_stand_still(material):
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.inf, math.nan])
 def test_speed__is_positive(speed):
-    with pytest.raises(InputError, match="expected a positive number"):
+    with refused("speed", speed):
         slid(ROUGH, rubber(), speed, LOAD)
