@@ -258,7 +258,7 @@ def _hidden_opening(dataset: xr.Dataset, row: int) -> tuple[float, float]:
 
 
 def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[float, float]:
-    """Contact area and mean gap that a grid in full contact may hide: zero unless the least pressure is small.
+    """Return the area and the mean gap of openings too small for a grid in full contact; zero if all pressure is high.
 
     Parameters
     ----------

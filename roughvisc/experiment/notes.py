@@ -109,7 +109,7 @@ _AT_ONCE = 0.1
 
 
 def accuracy_note(scene: Scene) -> str:
-    """Say which errors may exceed the tolerance because hardly any compliance is instantaneous; empty otherwise."""
+    """Return a warning if the instantaneous compliance is so small that errors may exceed the tolerance, else ''."""
     at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
     if at_once == 0:
         return NO_JUMP

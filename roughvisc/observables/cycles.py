@@ -64,7 +64,7 @@ def cycle_work(dataset: xr.Dataset, *, program: Any = None) -> xr.Dataset:
 
 
 def _work_at(at: np.ndarray, slack: np.ndarray, times: np.ndarray, work: np.ndarray) -> np.ndarray:
-    """Work at some times: that of the step there, of a jump the state after it; else interpolated."""
+    """Return the work at given times: that of the step there, after a jump if there is one; else interpolated."""
     last = np.searchsorted(times, at + slack, side="right") - 1
     return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
 

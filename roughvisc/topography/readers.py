@@ -192,7 +192,7 @@ def _labelled(
     else:
         unit = lateral if vertical is None else vertical
         if vertical is not None and sides is None and known and lateral is not None:
-            raise InputError("it states the unit of x and y: pass the unit of its heights alone, as unit=")
+            raise InputError("it states the unit of x and y only: pass the unit of its heights as unit=")
         if sides is None and not known and raw.sides is not None and lateral is None:
             raise InputError("it states no unit of x and y: pass unit= (such as unit='mm')")
     values = raw.heights if unit == 1.0 else raw.heights * unit

@@ -1,6 +1,6 @@
-"""Surfaces on other grids, and without their shortest waves.
+"""Resampling of surfaces to other grids, and removal of their shortest waves.
 
-Heights belong to cell centres, so that those of the old and the new cells differ.
+Heights belong to cell centres; the centres of the old and the new cells differ.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Viscoelastic contact on an area that does not change: a flat punch, and full contact of a wave."""
+"""Contact on an area that does not change: a flat punch, also one that sticks, and full contact of a wave."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,3 +130,24 @@ def full_contact_wave(amplitude: Quantity, wavenumber: Quantity, material: Prony
     Contact stays full as long as the sum of the waves and the mean pressure is nowhere negative.
     """
     return ContactRelaxation.of(material)(t) * wavenumber * amplitude / 2
+
+
+def sticking_stiffness(poisson: float) -> float:
+    r"""Stiffness of a round flat punch that sticks to a half-space, over that of one without friction.
+
+    Parameters
+    ----------
+    poisson : float
+        Poisson's ratio of the half-space.
+
+    Returns
+    -------
+    float
+        :math:`(1 - \nu) \ln(3 - 4 \nu) / (1 - 2 \nu)`. [-]
+
+    References
+    ----------
+    .. [1] D. A. Spence, Proc. R. Soc. A 305 (1968) 55.
+    """
+    x = 1 - 2 * poisson
+    return 1.0 if x == 0 else (1 - poisson) * math.log1p(2 * x) / x

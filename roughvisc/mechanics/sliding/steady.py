@@ -46,10 +46,10 @@ Array = NDArray[np.float64]
 # Stated error over the change by Newton's step. Measured on line contacts against dense solutions, with loss tangents
 # up to 27: the true error is 0.8 to 2.8 times that change.
 _CAUTION = 2.25
-# Residual of GMRES over the residuals of note 2. Measured on line contacts with loss tangents up to 27: 0.1 and 0.3
-# cost the same, 1 does not always converge.
+# Largest residual of GMRES over the residuals of note 2. Measured on line contacts with loss tangents up to
+# 27: 0.1 and 0.3 cost the same, 1 does not always converge.
 _FORCING = 0.3
-# Largest residual of GMRES over the right-hand side: of any step, and of the step that states an accepted error.
+# Largest residual of GMRES over the right-hand side: in any step, and in the step whose error is stated.
 _LOOSEST, _STATED = 0.5, 0.05
 # Fraction of the way to the border of the feasible set.
 _INSIDE = 0.995
@@ -309,7 +309,7 @@ class _NewtonSystem:
         self._inside = sliding.self_influence / both
         self._outside = (1 - self._inside**2) / both
         punch = self._inverse(np.ones_like(both))
-        #: Pressure of a uniform displacement by the preconditioner, over its sum.
+        #: Pressure that the preconditioner gives for a uniform displacement, scaled to a sum of 1.
         self._punch = punch / float(punch.sum())
 
     def solve(

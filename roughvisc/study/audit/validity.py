@@ -114,32 +114,6 @@ def dundurs_coupling(compliances: Sequence[Quantity], poissons: Sequence[float])
     return abs(shares[0] - sum(shares[1:])) / sum(compliances)
 
 
-def sticking_stiffness(poisson: float) -> float:
-    r"""Stiffness of a round flat punch that sticks to a half-space, over that of one without friction.
-
-    Parameters
-    ----------
-    poisson : float
-        Poisson's ratio of the half-space.
-
-    Returns
-    -------
-    float
-        :math:`(1 - \nu) \ln(3 - 4 \nu) / (1 - 2 \nu)`. [-]
-
-    References
-    ----------
-    .. [1] D. A. Spence, Proc. R. Soc. A 305 (1968) 55.
-
-    Examples
-    --------
-    >>> round(sticking_stiffness(0.0), 4), round(sticking_stiffness(0.3), 4), sticking_stiffness(0.5)
-    (1.0986, 1.0286, 1.0)
-    """
-    x = 1 - 2 * poisson
-    return 1.0 if x == 0 else (1 - poisson) * math.log1p(2 * x) / x
-
-
 @quantities(radius="m", shear_modulus="Pa", density="kg/m^3")
 def radiation_lag(radius: Quantity, shear_modulus: Quantity, density: Quantity) -> float:
     r"""Time by which the force on a round punch leads its approach, because waves carry energy away.

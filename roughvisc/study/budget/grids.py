@@ -224,13 +224,13 @@ class Around:
         return {one.name: self.error(one) for one in self.quantities}
 
     def floor(self, quantity: Observable) -> float:
-        """What neither grid nor tolerance lessens of the error of a quantity."""
+        """Return the part of a quantity's error that neither a finer grid nor a smaller tolerance reduces."""
         return self.error(quantity, FLOOR)
 
     def missed(self, targets: Mapping[str, float], sources: Sequence[str] | None = None) -> Iterator[str]:
-        """What to tell of each target that is not met: the sources of its error.
+        """Yield a message for each target that is not met, with the sources of its error.
 
-        By some sources alone: what no grid can meet.
+        With `sources`, only these count: an error that no grid reduces.
         """
         where = f"with cells {cells_in_words(self.level)}" if sources is None else "whatever the grid"
         for one in self.quantities:

@@ -260,7 +260,7 @@ def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkp
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
-        found = plain["key"], plain["revision"], plain.get("result_format", 1), plain.get("layout", 1)
+        found = plain["key"], plain["revision"], plain["result_format"], plain["layout"]
         if found == (key, NUMERICS_REVISION, RESULT_FORMAT, _LAYOUT):
             kinds = {kind.__name__: kind for kind in (Checkpoint, *states)}
             reached = _unflatten({"type": "Checkpoint", "parts": plain["reached"]}, arrays, kinds)

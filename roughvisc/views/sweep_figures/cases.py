@@ -208,7 +208,7 @@ def cases_of(results: Any) -> Cases:
         If they are something else, or one case only.
     """
     if not isinstance(results, xr.Dataset) or "case" not in results.dims:
-        raise InputError("expected what rv.open_results or rv.sweep gives: a Dataset with a dimension 'case'")
+        raise InputError("expected the Dataset of rv.open_results or rv.sweep, with a dimension 'case'")
     over = [dim for dim in ("case", REALISATION) if dim in results.dims]
     held = [name for name in results.data_vars if set(results[name].dims) <= {*over, ROW, *AXES}]
     table = results[held].load()

