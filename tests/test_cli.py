@@ -26,6 +26,7 @@ def write_study(text=BALL, *replacements):
     return "ball.toml"
 
 
+@pytest.mark.thorough
 def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pictures):
     study = write_study()
     status, out, err = invoke("run", study)
@@ -177,7 +178,8 @@ def test_process__ends_with_its_status(tmp_path):
         assert done.stdout.endswith("[]\n")
 
 
-@pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
 def test_streams__whose_encoding_lacks_letters_end_no_command(tmp_path, monkeypatch, scan_file, encoding):
     """Units (µm), rules of tables and titles of studies."""
     monkeypatch.chdir(tmp_path)
@@ -208,6 +210,7 @@ def scan_file(tmp_path):
     return path
 
 
+@pytest.mark.thorough
 def test_scan__says_what_is_there_and_draws_it(invoke, tmp_path, scan_file):
     status, out, err = invoke("scan", scan_file)
     assert (status, err) == (0, "")

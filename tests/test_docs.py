@@ -104,6 +104,7 @@ def test_python__runs(path, there):
     run_python(blocks(path, "python"), there)
 
 
+@pytest.mark.thorough
 def test_notebook__runs(tmp_path):
     """In an empty folder: it needs no file but those that are installed."""
     cells = json.loads((DOCS / "first_contact.ipynb").read_text(encoding="utf-8"))["cells"]

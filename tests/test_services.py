@@ -179,6 +179,7 @@ def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
     assert table["contact_area [m^2]"].iloc[0] == float(done.result.contact_area[row])
 
 
+@pytest.mark.thorough
 @only_slides_are_quick
 def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pictures):
     drawn = rv.plot.save_figures(done.result, tmp_path, "one")
@@ -188,6 +189,7 @@ def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pict
     assert ("slide" in names or "friction" in names) == kind.moves
 
 
+@pytest.mark.thorough
 @only_slides_are_quick
 def test_report__has_pictures_and_the_key(kind, done, tmp_path, coarse_pictures):
     page = rv.report(done.result, tmp_path / "page.html").read_text(encoding="utf-8")

@@ -53,6 +53,7 @@ def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     assert (ds.status.values != NOT_CONVERGED).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["maxwell_step", "zener_step"])
 def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
@@ -84,6 +85,7 @@ def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monk
     assert len(capsys.readouterr().out.splitlines()) == len(at) + 2, "the table and its headings"
 
 
+@pytest.mark.thorough
 def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)
@@ -115,6 +117,7 @@ def test_benchmarks__run_small(tmp_path, monkeypatch):
         assert row["error"] <= row["peer_error"]
 
 
+@pytest.mark.thorough
 def test_accuracy__of_random_cases_is_judged(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     module = importlib.import_module("accuracy")
@@ -128,6 +131,7 @@ def test_accuracy__of_random_cases_is_judged(tmp_path, monkeypatch):
     assert late["status"].startswith("run: TimeoutError"), "reported, not dropped"
 
 
+@pytest.mark.thorough
 def test_accuracy__with_more_choices_of_kept_times_and_a_checked_reference(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     module = importlib.import_module("accuracy")
@@ -138,6 +142,7 @@ def test_accuracy__with_more_choices_of_kept_times_and_a_checked_reference(monke
     assert 0 < finer < own / 3, "the reference is the more accurate"
 
 
+@pytest.mark.thorough
 def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     module = importlib.import_module("grid_accuracy")
@@ -156,6 +161,7 @@ def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
         assert -0.08 < row["least"] <= row["largest"] < 0.03
 
 
+@pytest.mark.thorough
 def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}
@@ -184,6 +190,7 @@ def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, m
         assert "filled" in ds.variables, "what was invented stays marked in the result"
 
 
+@pytest.mark.thorough
 def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER))
     seal = importlib.import_module("creeping_seal").main(tmp_path / "seal.png")

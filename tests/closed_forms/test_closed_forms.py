@@ -273,6 +273,7 @@ def triangle():
     return references.ting(SPHERE, ZENER, TRIANGLE)
 
 
+@pytest.mark.thorough
 def test_ting__triangle_on_zener_has_the_known_values(triangle):
     # from an independent program with tabulated memory integrals
     assert triangle.time_of_maximum == pytest.approx(1.084415017, abs=1e-9)
@@ -361,6 +362,7 @@ def test_reduced_contact__single_maximum_is_ting(name, indenter):
     assert found.error < 3e-5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "t"), [("zener", 1.7), ("zener stiff", 1.2)])
 def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
     exact = float(references.ting(SPHERE, REDUCED[name], TRIANGLE).approach(t))
@@ -372,6 +374,7 @@ def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
     assert np.all(orders > 1.7), orders
 
 
+@pytest.mark.thorough
 def test_reduced_contact__dent_recovers_as_ting_says():
     program = TRIANGLE.hold(2.0)
     exact = references.ting(SPHERE, ZENER, program)
@@ -436,6 +439,7 @@ def test_reduced_contact__units_are_neutral():
     np.testing.assert_allclose(small.work / (pressure * length**3), plain.work, rtol=1e-9)
 
 
+@pytest.mark.thorough
 def test_reduced_contact__reload_after_long_rest_is_the_first_loading():
     program = TRIANGLE.hold(200.0) + TRIANGLE
     found = references.reduced_contact(SPHERE, ZENER, program, [0.5, 1.5, 202.5, 203.5])

@@ -119,6 +119,7 @@ def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair, cell
     assert -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.6
 
 
+@pytest.mark.thorough
 def test_settled_slide_in_full_contact__takes_what_both_bodies_dissipate():
     """Work of friction over a period is the loss of the wave, ``q A^2 |Im 1/C| / 2`` of area and distance."""
     thickness, amplitude, q, cells = 1.5e-4, 1e-6, 2 * math.pi / SIDE, 65

@@ -94,6 +94,7 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(material):
     assert "in place of the compliance" in ds.attrs["memory"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
 def test_a_cycle__is_that_of_all_past_forces_without_a_series(material):
     """The method of dimensionality reduction, with the material's own compliance and integral."""

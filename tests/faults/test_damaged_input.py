@@ -87,6 +87,7 @@ def read_or_refused(path):
                 raise
 
 
+@pytest.mark.thorough
 @HUNDRED
 @given(text=edited_texts([BALL, ROUGH + LOADS, FRICTION]))
 def test_edited_study__gives_a_case_or_names_the_file(text, tmp_path):

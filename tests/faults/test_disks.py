@@ -24,6 +24,7 @@ def results(folder):
     return rv.open_results(folder).drop_vars("wall_time").load()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("workers", ["0", pytest.param("2", marks=pytest.mark.long)])
 def test_sweep__on_a_full_disk(study, tmp_path, small_disk, invoke, workers):
     folder, remount = small_disk

@@ -73,6 +73,7 @@ def test_functions__refuse_the_same(study):
             rv.simulate(rv.sphere(1e-2, 1e-3, 12), rv.elastic(1e6), rv.Program().load(1e-3, over=0), **settings)
 
 
+@pytest.mark.thorough
 def test_x3p__a_bomb_is_not_unpacked(tmp_path):
     path = tmp_path / "bomb.x3p"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as parts:

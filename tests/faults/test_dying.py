@@ -67,6 +67,7 @@ def damaged_bytes(rng, whole):
     return whole[:at] if kind == 1 else whole[:at] + bytes(len(whole[at : at + 64])) + whole[at + 64 :]
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.long)])
 def test_damaged_checkpoints(case, wanted, tmp_path, count):

@@ -2,6 +2,7 @@
 
 import re
 
+import pytest
 from support import BALL
 
 import roughvisc as rv
@@ -36,6 +37,7 @@ def test_run__two_hundred_problems_take_600_characters_and_the_log_has_all(tmp_p
     assert set(map(int, re.findall(r"surface\.unknown_(\d+)", logged))) == set(range(200))
 
 
+@pytest.mark.thorough
 def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke):
     path, out = study(tmp_path, TWO), tmp_path / "out"
     out.mkdir()

@@ -31,6 +31,7 @@ def terminated(folder, *options, whole_group, after):
     return (*process.communicate(timeout=100), process.returncode)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(
     ("text", "options", "whole_group"),
@@ -80,6 +81,7 @@ runpy.run_module("roughvisc", run_name="__main__")
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_run__signalled_during_an_import_ends_quietly(tmp_path, number, status):

@@ -35,6 +35,7 @@ def test_elastic_contact__is_that_of_hertz():
     assert hertz_run(+1.0).approach == pytest.approx(closed_forms.hertz(1.0, 4.0, 0.1).approach, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_pressure__comes_near_that_of_simulate_with_the_step():
     """Of first order: to the pressure at the end of a load that is held."""
     n, size, load, duration = 33, 1.6, 0.05, 2.0

@@ -108,6 +108,7 @@ def test_run__without_observe_loads_none_of_it(invoke, study, counted):
     assert counted == []
 
 
+@pytest.mark.thorough
 def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coarse_pictures):
     assert invoke("run", study(LEAKAGE + LOADS), "--out", "out", "--workers", 0)[0] == 0
     results = rv.open_results(tmp_path / "out")
@@ -152,6 +153,7 @@ def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_
 CONDUCTANCE = '[observe.conductance]\nresistivity = ["5 K m/W", 0]\n'
 
 
+@pytest.mark.thorough
 def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pictures, monkeypatch):
     monkeypatch.setattr(rv.plot, "FIGURES", {"history": rv.plot.FIGURES["history"]})
     status, told, _ = invoke("run", study(CONDUCTANCE), "--out", "out")
@@ -168,6 +170,7 @@ def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pic
         assert json.loads(ds.attrs["observed"]) == asked
 
 
+@pytest.mark.thorough
 def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
     assert invoke("run", study(CONDUCTANCE + LOADS), "--out", "out", "--workers", 0)[0] == 0
     assert "thermal_conductance [W/K]" in (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig")
@@ -176,6 +179,7 @@ def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
     assert "sweep-thermal_conductance-histories.png" in written
 
 
+@pytest.mark.thorough
 def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     """The second begins while the first computes: it is refused, and adds its own afterwards."""
     from roughvisc.errors import InUseError

@@ -20,6 +20,7 @@ def test_surrogates__fixed_amplitudes_have_the_radial_spectrum_of_the_surface():
         np.testing.assert_allclose(rv.psd(one).psd[whole], wanted.psd[whole], rtol=1e-9, atol=1e-12 * wanted.psd.max())
 
 
+@pytest.mark.thorough
 def test_surrogates__gaussian_amplitudes_scatter_about_the_spectrum():
     """The mean square of a wave's Gaussian amplitude has itself as standard deviation."""
     h = rough((21, 23), None)

@@ -105,6 +105,7 @@ def test_influence__answers_long_waves_as_plane_strain_does(base, poisson, side)
     assert answer == pytest.approx(2 / q * wave_on_sheet(q, poisson, base)[0], rel=5e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ratio", [0.51, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 50.0])
 def test_ball_on_an_incompressible_sheet__agrees_with_the_integral_equation_on_long_cells(ratio):
     """Thin sheets tend to lubrication theory, ``F = pi E* a^6 / 128 h^3 R`` and ``d = a^2 / 4 R``.

@@ -157,6 +157,7 @@ def test_missing_waves__count_on_one_side(tmp_path):
     assert 2 - 1e-9 <= shortest / (1e-3 / 54) < 2.1  # the grid holds whole rings of waves of two cells
 
 
+@pytest.mark.thorough
 def test_interval__holds_the_waves_that_a_finer_grid_shows(tmp_path):
     """The same surface with its waves down to the cut-off, on a grid that holds them."""
     fine = case(ROUGH, tmp_path, **{"surface.shape": [216, 200], "surface.shortcut": "18.6 um"})
@@ -215,6 +216,7 @@ def test_surface_with_absent_cells__is_no_sample(tmp_path):
     assert (found["lower"] < found["value"]).all()
 
 
+@pytest.mark.thorough
 def test_mirrored_scan__takes_patches_of_its_own_size(tmp_path):
     scan = rv.self_affine((1e-3, 0.9e-3), (40, 36), hurst=0.8, rms_slope=0.2, rolloff=3e-4, seed=3)
     rv.save_scan(scan, tmp_path / "scan.x3p")
@@ -292,6 +294,7 @@ def test_budget__refuses_a_result_without_a_case():
         rv.budget(result)
 
 
+@pytest.mark.thorough
 def test_command__prints_and_writes(invoke, tmp_path):
     (tmp_path / "study.toml").write_text(BALL)
     arguments = ("--at", "1 s", "--modulus-error", "10%", "--workers", 1)
@@ -343,6 +346,7 @@ def written(tmp_path, name):
         return found.load()
 
 
+@pytest.mark.thorough
 def test_ball__is_computed_on_the_coarsest_grid_that_gives_the_wanted_error(tmp_path):
     exact, cells = np.pi * RADIUS**2, []
     for part in (0.1, 0.01):
@@ -356,6 +360,7 @@ def test_ball__is_computed_on_the_coarsest_grid_that_gives_the_wanted_error(tmp_
     assert cells[0] < cells[1]
 
 
+@pytest.mark.thorough
 def test_choice__is_a_case_like_any_other(tmp_path, monkeypatch):
     study = case(ROUGH, tmp_path, **SMOOTH)
     found = got(study, tmp_path, {"mean_gap": "2 %"})
@@ -393,6 +398,7 @@ def test_floor__above_the_wanted_error_is_refused_before_fine_grids_are_solved(t
     assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["budget"]
 
 
+@pytest.mark.thorough
 def test_error_equal_to_the_wanted_one__is_accepted(tmp_path):
     """The force under a given approach is proportional to the modulus, which is known to the wanted error."""
     study = case(BALL, tmp_path, **{"program": [{"approach": "1 um", "over": "10 ms"}], "keep.times": [0.01]})

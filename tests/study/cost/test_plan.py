@@ -75,6 +75,7 @@ def study(tmp_path):
     return write
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("text", "changes"),
     [
@@ -109,6 +110,7 @@ def test_plan__counts_the_same_on_a_busy_machine(study, monkeypatch):
         assert first[name].equals(second[name]), name
 
 
+@pytest.mark.thorough
 def test_small_contact__costs_less_in_a_window(study):
     surface = '[surface]\ngenerate = "sphere"\nradius = "10 mm"\nsize = "2 mm"\nshape = [201, 187]\n'
     text = ROUGH[: ROUGH.index("[surface]")] + surface + ROUGH[ROUGH.index("[material]") :]
@@ -117,6 +119,7 @@ def test_small_contact__costs_less_in_a_window(study):
     assert float(planned.wall_time[0]) < 0.5 * float(planned.wall_time[1])
 
 
+@pytest.mark.thorough
 def test_plan__names_what_is_modelled(study):
     base = study(ROUGH)[0]
     cases = [
@@ -159,6 +162,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
         rv.run(rough, progress=False)
 
 
+@pytest.mark.thorough
 def test_plan__refuses_with_a_reason(study, monkeypatch):
     (case,) = study(BALL)
     beyond = vary(case, {"solve.boundary": "periodic", "program": [{"approach": "1 mm", "over": 1}]})

@@ -135,6 +135,7 @@ def key_of(event):
     return event.get("key") if isinstance(event, dict) and {"key", "now", "end"} <= event.keys() else None
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_restart__by_another_client_loses_nothing(study, tmp_path):
     (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
@@ -158,6 +159,7 @@ def test_restart__by_another_client_loses_nothing(study, tmp_path):
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_lost_scheduler__is_one_message_and_no_traceback(study, tmp_path):
     study(LONG)

@@ -54,6 +54,7 @@ def after_the_first(monkeypatch, change):
     return pressed
 
 
+@pytest.mark.thorough
 def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan, tmp_path, monkeypatch):
     before = hashlib.sha256(scan.read_bytes()).hexdigest()
     cases = read_cases(study)

@@ -78,6 +78,7 @@ def test_sweep__same_bits_here_and_on_workers_and_on_a_cluster(study, tmp_path, 
         assert leftovers(tmp_path / name) == []
 
 
+@pytest.mark.thorough
 def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     study()
     command = [*RUN, "ball.toml", "--scheduler-file", by_hand]
@@ -220,6 +221,7 @@ def alive(group):
     return found
 
 
+@pytest.mark.thorough
 def test_run__ctrl_c_is_status_130(study, tmp_path):
     text = LONG.replace('times = [0, "0.1 s", "200 ms"]', "times = 2")
     study(text + '[sweep]\n"program.1.hold" = ["1 ms", "20 s", "21 s", "22 s"]\n')
@@ -278,6 +280,7 @@ def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
         assert words in stream.getvalue()
 
 
+@pytest.mark.thorough
 def test_watch__hears_from_workers(study, tmp_path):
     heard = {}
 

@@ -18,6 +18,7 @@ print(len({float(ds.pressure.max()) for ds in found}))
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("count", [8, pytest.param(400, marks=pytest.mark.long)])
 def test_run__in_four_threads(tmp_path, count):
     loads = ", ".join(f'"{4 + 0.01 * number} mN"' for number in range(count))

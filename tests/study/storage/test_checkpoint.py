@@ -155,6 +155,7 @@ def whole(tmp_path_factory):
     return of
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("cuts", ["few", pytest.param("more", marks=pytest.mark.long)])
 def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name, cuts):
@@ -385,6 +386,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
         np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
 
 
+@pytest.mark.thorough
 def test_two_runs_at_once__the_second_says_so(whole, tmp_path):
     case, expected, _ = whole(MODES)
     refused = []

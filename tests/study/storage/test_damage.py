@@ -86,6 +86,7 @@ def test_damage__is_noticed_in_any_block_of_any_array(sample, tmp_path):
         assert is_noticed(path), name
 
 
+@pytest.mark.thorough
 def test_damage__of_random_bits_and_lengths_changes_no_value(sample, tmp_path):
     path, rng = tmp_path / "result.nc", np.random.default_rng(17)
     whole = np.fromfile(sample[1], np.uint8)

@@ -97,6 +97,7 @@ def test_own_times__are_drawn_by_xarray_and_by_the_sweep_figure(own_times):
         assert np.isclose(drawn, 1e6 * value, rtol=1e-9).any()
 
 
+@pytest.mark.thorough
 def test_own_times__have_observables_as_each_result(own_times):
     folder, ds = own_times
     case = int(ds.rows.values.argmin())
@@ -223,6 +224,7 @@ def test_list_of_cases__damaged_is_refused(study, tmp_path):
     assert rv.open_results(out).sizes["case"] == 4
 
 
+@pytest.mark.thorough
 def test_index__damaged_is_made_again(study, tmp_path):
     out = tmp_path / "out"
     sweep(study(), out, workers=0, progress=False)
@@ -304,6 +306,7 @@ def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
         ds.pressure.compute(scheduler="sync")
 
 
+@pytest.mark.thorough
 def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
     folder = tmp_path / "copy"
     shutil.copytree(sixty, folder)

@@ -312,6 +312,7 @@ def test_surface__scale_is_not_moved_by_spikes():
 # --------------------------------------------------------------------------------------------- files, animation
 
 
+@pytest.mark.thorough
 def test_save_figures__writes_what_the_result_allows(tmp_path):
     ds = made.hertz_creep(shape=(21, 16))
     written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)

@@ -70,6 +70,7 @@ def page(folder):
     return report(folder, folder / "page" / "report.html").read_text()
 
 
+@pytest.mark.thorough
 def test_page__numbers_the_cases_as_their_table(folder, page):
     table = re.search(r'<table id="table">.*?</table>', page, re.S)[0]
     loads = to_table(folder)["program.0.load [mN]"]
@@ -117,6 +118,7 @@ def test_page__holds_the_study_that_gives_the_result_again(page, folder, tmp_pat
         assert (folder / f"{case.key}.nc").exists()
 
 
+@pytest.mark.thorough
 def test_page__of_many_cases_has_figures_of_some_and_all_in_its_table(tmp_path):
     for number in range(9):
         ds = made.one_frame().drop_vars(["height", "gap", "displacement"])
@@ -127,6 +129,7 @@ def test_page__of_many_cases_has_figures_of_some_and_all_in_its_table(tmp_path):
     assert "Figures of 6 of 9 cases are shown" in text
 
 
+@pytest.mark.thorough
 def test_command__writes_the_page_and_refuses_an_empty_folder(folder, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = next(folder.glob("*.nc"))
