@@ -325,7 +325,7 @@ def _foreseen(profile: Profile, program: Program, material: Material) -> float:
     dx, dy = (stride * side for side in profile.spacing)
     operator = Operator((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=profile.mirrored, kernel=profile.kernel)
     load = value * glassy / operator.cell_area
-    return solve_contact(operator, gap, load=load, tolerance=1e-2, max_iterations=50).approach
+    return solve_contact(operator, gap, load=load, tolerance=1e-2).approach
 
 
 def _check_approach(program: Program, full: float) -> None:

@@ -137,12 +137,6 @@ def l1_distance(a: Array, b: Array, threads: int) -> float:
     return sum_over(lambda x, y: summed(np.abs(x - y)), a.reshape(-1), b.reshape(-1), threads=threads)
 
 
-def any_positive(field: Array) -> bool:
-    """Whether any cell is: asked block by block, since one of the first mostly says so."""
-    values = field.reshape(-1)
-    return any(np.logical_or.reduce(values[part] > 0) for part in blocks(field.size, _BLOCK))
-
-
 def lowest(field: Array, present: Mask | None, threads: int) -> float:
     """Least value of a field, of its present cells where there are others."""
     if present is None:
@@ -191,18 +185,6 @@ def gather(field: Array, cells: Cells, threads: int) -> Array:
     return found
 
 
-def scatter(out: Array, cells: Cells, values: Array, threads: int) -> None:
-    """Set a flat field at some cells."""
-    if cells.size <= _BLOCK:
-        out[cells] = values
-        return
-
-    def put(here: Cells, new: Array) -> None:
-        out[here] = new
-
-    blockwise(put, cells, values, threads=threads)
-
-
 def slice_of_sorted(part: slice, cells: Cells) -> slice:
     """Which of some cells lie in a block of a field."""
     # bounds of the same kind: for others, numpy makes a copy of all cells, for each block anew
@@ -221,29 +203,9 @@ def part_of(values: Array, cells: Cells, part: slice) -> Array:
     return found
 
 
-def regather(values: Array, cells: Cells, onto: Cells, size: int, threads: int) -> Array:
-    """Values at other cells of a field that is given at some cells; zero where the others are not among these."""
-    found = np.empty(onto.size)
-
-    def take(part: slice, few: slice) -> None:
-        asked = slice_of_sorted(part, onto)
-        if np.array_equal(cells[few], onto[asked]):
-            found[asked] = values[few]
-        else:
-            found[asked] = part_of(values[few], cells[few], part).take(local_index(part, onto[asked]))
-
-    over_cells(take, size, cells, threads)
-    return found
-
-
 def summed(values: Array) -> float:
     """Sum of a block: without what the method of arrays does beside, which takes as long as the sum of a small one."""
     return float(np.add.reduce(values))
-
-
-def total(vector: Array, threads: int) -> float:
-    """Sum of a vector."""
-    return summed(vector) if vector.size <= _BLOCK else sum(blockwise(summed, vector, threads=threads))
 
 
 def inner(field: NDArray[Any], cells: Cells, values: Array, threads: int) -> float:
@@ -301,14 +263,6 @@ def parallel_map(work: Callable[[Part], Found], parts: Sequence[Part], threads: 
         for task in begun:
             task.result()
     return found
-
-
-def submit(work: Callable[[], Found], threads: int) -> Callable[[], Found]:
-    """Begin some work beside the caller's where there is another thread; what is returned waits for what it gives."""
-    if threads == 1:
-        return work
-    task = _begun(work, threads)
-    return lambda: work() if task.claim() else task.result()
 
 
 def blocks(length: int, size: int) -> Iterator[slice]:

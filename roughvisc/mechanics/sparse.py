@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roughvisc.mechanics import arrays
 from roughvisc.mechanics.arrays import Array, Cells, Mask, empty, threads_of
@@ -136,60 +135,6 @@ class Sparse:
     def count(self) -> int:
         """How many cells are not zero."""
         return int(np.count_nonzero(self.values)) if self.cells is None else self.cells.size
-
-
-@dataclass(frozen=True)
-class Scattered:
-    """A field in single precision, over a size of its own: single precision underflows.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Of the grid.
-    cells : ndarray of int
-        Cells that may be other than zero, as flat indices, ascending.
-    values : ndarray
-        At these cells, in double precision.
-    size : float
-        What they are divided by.
-    """
-
-    shape: tuple[int, int]
-    cells: Cells
-    values: Array
-    size: float
-
-    @classmethod
-    def over_largest(cls, shape: tuple[int, int], cells: Cells, values: Array) -> Scattered:
-        """Values over their largest magnitude."""
-
-        def largest(here: Array) -> float:
-            return float(np.maximum.reduce(np.abs(here), initial=0.0))
-
-        size = max(arrays.blockwise(largest, values, threads=threads_of(shape[0] * shape[1])))
-        return cls(shape, cells, values, size or 1.0)
-
-    def rows(self, rows: slice) -> NDArray[np.float32]:
-        """Some rows of it."""
-        found = np.zeros((rows.stop - rows.start, self.shape[1]), np.float32)
-        few, cells = self._of(rows)
-        found.reshape(-1)[cells] = (self.values[few] / self.size).astype(np.float32)
-        return found
-
-    def gather_rows(self, out: Array, rows: slice, found: NDArray[np.float32]) -> None:
-        """Into a vector over its cells goes what was found on some rows, times the size."""
-        few, cells = self._of(rows)
-        here = out[few]
-        here[...] = found.reshape(-1).take(cells)
-        here *= self.size
-
-    def _of(self, rows: slice) -> tuple[slice, Cells]:
-        """Which of its cells lie in some rows, and where in them."""
-        if rows.stop - rows.start == self.shape[0]:
-            return slice(0, self.cells.size), self.cells
-        part = slice(rows.start * self.shape[1], rows.stop * self.shape[1])
-        few = arrays.slice_of_sorted(part, self.cells)
-        return few, arrays.local_index(part, self.cells[few])
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,6 @@ def pulled(request):
     """
     names = ("contact_area", "contact_area_error")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(attempt, "_ALGEBRAIC", 1e-6)
         patched.setattr(attempt, "_SOLVED", 1e-4)
         runs = {
             step: pressed(MATERIALS[request.param], PULLED, times=TIMES, numerics=rv.Numerics(time_step=step))
@@ -73,8 +72,7 @@ def test_interval__is_narrow_and_shrinks_with_the_steps(pulled):
 
 
 def test_elastic__leaves_no_cell_in_doubt_on_account_of_the_steps(monkeypatch):
-    monkeypatch.setattr(attempt, "_ALGEBRAIC", 1e-6)  # nor on account of the solver
-    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)
+    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)  # nor on account of the solver
     ds = pressed(rv.elastic(1.0), rv.Program().load(0.03, over=1.0).load(0.003, over=1.0), times=TIMES)
     assert (ds.contact_area_error == 0).all()
 

@@ -110,8 +110,8 @@ def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
     x = np.arange(n) - n / 2
     gap = (x[:, None] ** 2 + x**2) / 2000
     body = Operator((n, n), (1.0, 1.0), kernel=kernel)
-    found = solve_contact(body, gap, load=200.0)
-    guessed = solve_contact(body, gap, load=200.0, start=np.ones((n, n)))
+    found = solve_contact(body, gap, load=200.0, tolerance=1e-7)
+    guessed = solve_contact(body, gap, load=200.0, tolerance=1e-7, start=np.ones((n, n)))
     assert found.pressure == pytest.approx(guessed.pressure, abs=1e-5 * guessed.pressure.max())
     assert body.on((9, 8)).kernel is kernel
 
@@ -152,7 +152,7 @@ def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeyp
 def test_preconditioner__knows_the_mean():
     body = Operator((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
     pressure = 1 + np.random.default_rng(1).random((12, 15))
-    back = body.approximate_inverse(body.displacement(pressure).astype(np.float32))
+    back = body.inverse(body.displacement(pressure).astype(np.float32))
     assert back == pytest.approx(pressure, rel=1e-5)
 
 

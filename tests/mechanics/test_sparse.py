@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from roughvisc.mechanics import arrays as arrays_module
 from roughvisc.mechanics import sparse
-from roughvisc.mechanics.sparse import Scattered, Sparse, Sum
+from roughvisc.mechanics.sparse import Sparse, Sum
 
 SHAPE = (9, 11)
 FIELDS = arrays(float, SHAPE, elements=st.sampled_from([0.0, 0.0, 0.0, 1.5, -2.25, 1e-300]))
@@ -57,24 +57,6 @@ def test_sparse__is_as_far_from_another_as_the_fields_are(part):
     a, b = some(part), some(0.2, seed=3)
     assert Sparse.of(a).apart_from(Sparse.of(b)) == pytest.approx(np.abs(a - b).sum(), rel=1e-14)
     assert Sparse.of(a).apart_from(Sparse.of(a.copy())) == 0
-
-
-@pytest.mark.parametrize("part", [0.0, 0.1, 0.9])
-@pytest.mark.parametrize("height", [1, 2, 9])
-def test_scattered_values__are_rows_of_a_field_over_its_largest_value_and_back(part, height):
-    """A zero among the values stays one of its cells."""
-    field = 1e-60 * some(part)  # underflows in single precision
-    cells = np.union1d(np.flatnonzero(field), [17])
-    found = Scattered.over_largest(SHAPE, cells, field.reshape(-1)[cells])
-    assert found.size == (np.abs(field).max() or 1.0)
-    back = np.full(cells.size, np.nan)
-    for first in range(0, SHAPE[0], height):
-        rows = slice(first, min(first + height, SHAPE[0]))
-        single = found.rows(rows)
-        np.testing.assert_array_equal(single, (field[rows] / found.size).astype(np.float32))
-        assert single.dtype == np.float32
-        found.gather_rows(back, rows, single)
-    np.testing.assert_allclose(back, field.reshape(-1)[cells], rtol=1e-7)
 
 
 def test_sparse__takes_what_its_cells_take():

@@ -62,18 +62,18 @@ def load_for_area(operator, gap, fraction):
     low, high = 1e-4, 20.0
     for _ in range(25):
         mean = (low * high) ** 0.5
-        state = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-4)
+        state = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-2)
         low, high = (mean, high) if np.mean(state.pressure > 0) < fraction else (low, mean)
     return mean
 
 
 def tight_pressure(operator, gap, mean):
-    return solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-13, max_iterations=5000).pressure
+    return solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-10, max_iterations=5000).pressure
 
 
 def solved_to(operator, gap, mean, exact, error, repeats):
     """Our time to reach an L1 error: the loosest tolerance of a ladder that does."""
-    for tolerance in 10.0 ** -np.arange(1, 14, 0.5):
+    for tolerance in 10.0 ** -np.arange(1, 10, 0.5):
         took, state = seconds(lambda t=tolerance: solve_contact(operator, gap, load=mean * gap.size, tolerance=t), 1)
         reached = float(np.abs(state.pressure - exact).sum() / exact.sum())
         if reached <= error:

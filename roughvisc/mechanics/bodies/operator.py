@@ -6,7 +6,6 @@ given. It knows neither material, time nor contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property, lru_cache
 from typing import Any, Literal, NamedTuple
 
@@ -19,7 +18,6 @@ from roughvisc.mechanics.arrays import blocks, empty, parallel_map, threads_of
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
 from roughvisc.mechanics.bodies.transforms import transforms
-from roughvisc.mechanics.sparse import Scattered
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -109,6 +107,8 @@ class Operator:
         self.definite = boundary == "free" or float(symbol[0, 0]) > 0
         self._symbol = self._transforms.cropped(symbol, self._points)
         self._work: dict[tuple[tuple[int, int], np.dtype[Any]], _Work] = {}
+        #: Number of convolutions so far, applications of the inverse included.
+        self.convolutions = 0
 
     def symbol_of(self, kernel: Kernel) -> Array:
         """Symbol of another kernel on these cells, of either sign. [m]"""
@@ -199,7 +199,13 @@ class Operator:
         return self.on((-(-self.shape[0] // _BLOCK), -(-self.shape[1] // _BLOCK)))
 
     @cached_property
-    def largest_influence(self) -> float:
+    def block_of_cell(self) -> NDArray[np.int32]:
+        """Block of each cell, as flat indices."""
+        rows, columns = (np.arange(n) * m // n for n, m in zip(self.shape, self.coarse.shape, strict=True))
+        return (rows[:, None] * self.coarse.shape[1] + columns).astype(np.int32).reshape(-1)
+
+    @cached_property
+    def stiffest(self) -> float:
         """Largest eigenvalue of the influence matrix, or a bound on it. [m]"""
         return float(np.max(self._symbol)) or self.spacing[0]
 
@@ -229,24 +235,12 @@ class Operator:
         Returns
         -------
         ndarray, shape (nx, ny)
-            Displacement; with periodic boundaries the mean of a half-space's is zero. [m]
+            Displacement; with periodic boundaries the mean of a half-space's is zero. In single precision if the
+            pressure is. [m]
         """
-        return self._convolved(pressure, self._symbol_by_columns, self._points, out)
-
-    def displacement_single(self, pressure: Single | Scattered) -> Single:
-        """The same in single precision, in units of the largest influence: within 1e-6 of the largest displacement.
-
-        Parameters
-        ----------
-        pressure : ndarray of float32, shape (nx, ny), or Scattered
-            Of ordinary size: single precision underflows. [-]
-
-        Returns
-        -------
-        ndarray of float32, shape (nx, ny)
-            Displacement over :attr:`largest_influence`, by the pressure over its size if that is scattered. [-]
-        """
-        return self._convolved(pressure, self._single_symbol, self._points)
+        self.convolutions += 1
+        symbol = self._single_symbol if pressure.dtype == np.float32 else self._symbol_by_columns
+        return self._convolved(pressure, symbol, self._points, out)
 
     @cached_property
     def _symbol_by_columns(self) -> list[NDArray[Any]]:
@@ -254,7 +248,7 @@ class Operator:
 
     @cached_property
     def _single_symbol(self) -> list[NDArray[Any]]:
-        return self._by_columns((self._symbol / self.largest_influence).astype(np.float32), self._points)
+        return self._by_columns(self._symbol.astype(np.float32), self._points)
 
     def _by_columns(self, symbol: NDArray[Any], points: tuple[int, int]) -> list[NDArray[Any]]:
         """A symbol by the columns that are transformed together; whole where whole fields are.
@@ -275,7 +269,7 @@ class Operator:
 
     def _convolved(
         self,
-        field: NDArray[Any] | Scattered,
+        field: NDArray[Any],
         symbol: list[NDArray[Any]],
         points: tuple[int, int],
         out: NDArray[Any] | None = None,
@@ -284,25 +278,20 @@ class Operator:
         if points == self.shape and not self._goes_by_blocks:
             return self._whole(field, symbol)
         found = empty(self.shape, symbol[0].dtype) if out is None else out
-
-        def keep(rows: slice, come_back: Callable[[NDArray[Any]], None]) -> None:
-            come_back(found[rows])
-
-        self._by_blocks(field, symbol, points, keep)
+        self._by_blocks(field, symbol, points, found)
         return found
 
     def _by_blocks(
         self,
-        field: NDArray[Any] | Scattered,
+        field: NDArray[Any],
         symbol: list[NDArray[Any]],
         points: tuple[int, int],
-        keep: Callable[[slice, Callable[[NDArray[Any]], None]], None],
+        found: NDArray[Any],
     ) -> None:
         """Convolution on so many points, in the precision of the symbol.
 
         Pruned: only the loaded rows are transformed along y, and only the wanted ones back; between, blocks of columns
-        go forward, are multiplied and come back while they stay in the cache. Rows go to ``keep`` as they come back: it
-        has them written where it wants them.
+        go forward, are multiplied and come back while they stay in the cache.
         """
         along, nx, threads = self._transforms, self.shape[0], self.threads
         work = self._work_on(points, symbol[0].dtype)
@@ -311,7 +300,7 @@ class Operator:
 
         def forward(rows: slice) -> None:
             room = rooms.pop()
-            along.rows_into(spectrum[rows], _rows_of(field, rows), room[0][: rows.stop - rows.start])
+            along.rows_into(spectrum[rows], field[rows], room[0][: rows.stop - rows.start])
             rooms.append(room)
 
         def across(number_of_block: int) -> None:
@@ -332,7 +321,7 @@ class Operator:
         def back(rows: slice) -> None:
             room = rooms.pop()
             here = room[0][: rows.stop - rows.start]
-            keep(rows, lambda out: along.rows_back_into(out, spectrum[rows], here))
+            along.rows_back_into(found[rows], spectrum[rows], here)
             rooms.append(room)
 
         parallel_map(forward, work.rows, threads)
@@ -365,7 +354,7 @@ class Operator:
                 room = max(room, _bytes(kind, (mx, block.stop - block.start)))
         return _lines(_bytes(number, (self.shape[0], count))), [_lines(room) for _ in range(self.threads)]
 
-    def approximate_inverse(self, displacement: Single) -> Single:
+    def inverse(self, displacement: Single) -> Single:
         """Pressure that causes about this displacement: the preconditioner of the contact solver.
 
         Parameters
@@ -383,33 +372,8 @@ class Operator:
         The inverse of the periodic kernel on the unpadded grid also where space is free: symmetric and
         positive definite, wrong only by what wraps around, at a fifth of the cost of a padded convolution.
         """
+        self.convolutions += 1
         return self._convolved(displacement, self._inverse_symbol, self.shape)
-
-    def approximate_inverse_within(self, displacement: Scattered) -> Array:
-        """The same on the cells of a displacement that is scattered, in double precision and in its size.
-
-        Parameters
-        ----------
-        displacement : Scattered
-            [m]
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Pressure over the contact modulus on these cells. [-]
-        """
-        found = np.empty(displacement.cells.size)
-
-        def keep(rows: slice, come_back: Callable[[NDArray[Any]], None]) -> None:
-            here = np.empty((rows.stop - rows.start, self.shape[1]), np.float32)
-            come_back(here)
-            displacement.gather_rows(found, rows, here)
-
-        if self._goes_by_blocks:
-            self._by_blocks(displacement, self._inverse_symbol, self.shape, keep)
-        else:
-            displacement.gather_rows(found, slice(0, self.shape[0]), self._whole(displacement, self._inverse_symbol))
-        return found
 
     @cached_property
     def _inverse_symbol(self) -> list[NDArray[Any]]:
@@ -421,21 +385,16 @@ class Operator:
         np.divide(1, symbol, out=symbol)
         return self._by_columns(self._transforms.cropped(symbol, self.shape).astype(np.float32), self.shape)
 
-    def _whole(self, field: NDArray[Any] | Scattered, symbol: list[NDArray[Any]]) -> NDArray[Any]:
+    def _whole(self, field: NDArray[Any], symbol: list[NDArray[Any]]) -> NDArray[Any]:
         """Convolution on the cells themselves at once."""
         [whole] = symbol
-        field_q = self._transforms.of_field(_rows_of(field, slice(0, self.shape[0])), workers=1)
+        field_q = self._transforms.of_field(field, workers=1)
         self._transforms.multiply(field_q, whole)
         return self._transforms.field_back(field_q, s=self.shape, overwrite_x=True, workers=1)
 
 
 #: What an operator has found of its symbol.
 _OF_SYMBOL = {name for name, value in vars(Operator).items() if isinstance(value, cached_property)}
-
-
-def _rows_of(field: NDArray[Any] | Scattered, rows: slice) -> NDArray[Any]:
-    """Some rows of a field."""
-    return field.rows(rows) if isinstance(field, Scattered) else field[rows]
 
 
 def _rows_together(points: int) -> int:

@@ -256,7 +256,7 @@ def acceptance_error(scene: Scene, state: State, trial: Trial, segment: Segment,
     force = max(state.largest_force, trial.instant.force * ahead)
     # rounding cannot tell a smaller approach from none: all that a flat surface has with periodic boundaries
     mean_pressure = trial.instant.force / (trial.instant.contact.size * scene.operator.cell_area)
-    none = _ROUNDING * scene.compliance(trial.instant.time) * mean_pressure * scene.operator.largest_influence
+    none = _ROUNDING * scene.compliance(trial.instant.time) * mean_pressure * scene.operator.stiffest
     approach = max(state.largest_approach, abs(trial.instant.approach) * ahead * soft, none)
     difference = l1_distance(trial.instant.pressure, state.extrapolated(trial.length)[0], scene.operator.threads)
     counts = force > 0 and not state.pace.ignore_pressure_error

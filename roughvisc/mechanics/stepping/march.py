@@ -126,7 +126,7 @@ def jump(scene: Scene, state: State, segment: Segment) -> tuple[Scene, Step]:
     if not scene.can_jump:
         return scene, step_of(scene, _defer_jump(scene, state, segment, value), trial_at_rest(scene, state))
     while True:
-        trial = trial_step(scene, state, segment.control, value, 0.0, "linear", estimate_error=True)
+        trial = trial_step(scene, state, segment.control, value, 0.0, "linear")
         if not is_outgrown(scene, trial.instant):
             jumped = accept(scene, state, trial, replace(state.pace, ignore_pressure_error=False))
             found = followed(scene, jumped, segment, coarse_initial_guess(trial.instant), "linear")
@@ -221,9 +221,7 @@ def _tried(scene: Scene, state: State, segment: Segment, event: float, end: floa
     # what a short discarded solve shows of a soft step's end is the step's own residual, magnified
     share = _MAGNIFIED if scene.lacks_instantaneous_compliance(length) and scene.keeps(arrival) else 1.0
     rule = rule_for(scene, state, length)
-    trial = trial_step(
-        scene, state, segment.control, value, length, rule, share, estimate_error=scene.keeps(arrival), arrival=arrival
-    )
+    trial = trial_step(scene, state, segment.control, value, length, rule, share, arrival=arrival)
     return trial, acceptance_error(scene, state, trial, segment, event)
 
 

@@ -121,9 +121,8 @@ def _tried(
     assert segment.slide is not None
     value = segment.value(arrival, state.start)  # it is held
     body, rule = _moved(scene, state, segment.slide, cells), rule_for(scene, state, cells * length)
-    estimated = cells == 1 and scene.keeps(arrival)
     step, control = cells * length, segment.control
-    trial = trial_step(scene, body, control, value, step, rule, share, guess, estimate_error=estimated, arrival=arrival)
+    trial = trial_step(scene, body, control, value, step, rule, share, guess, arrival=arrival)
     return replace(trial, slides=True)
 
 

@@ -300,8 +300,6 @@ class Step:
         What was prescribed.
     given : bool
         Whether the program stated its value; else it was found before, and kept.
-    bound : float
-        Bound on the relative error of the pressure left by the contact solver, in the energy norm.
     solver_error : float
         Estimated error of the pressure that the contact solver leaves (L1). [-]
     solver_error_approach : float
@@ -320,7 +318,6 @@ class Step:
     level: float
     control: Control
     given: bool
-    bound: float
     solver_error: float
     solver_error_approach: float
     uncertainty: Uncertainty
@@ -370,10 +367,8 @@ class Trial:
     length: float
     rule: Rule
     control: Control = "load"
-    bound: float = 0.0
     solver_error: float = 0.0
     solver_error_approach: float = 0.0
-    converged: bool = True
     iterations: int = 0
     convolutions: int = 0
     slides: bool = False

@@ -1,0 +1,366 @@
+"""The contact of one instant: optimality, closed forms, dense linear algebra, random problems, degenerate cases."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from references.contact_problems import rows
+from strategies import boundaries, examples, shapes
+from support import direct, rough_gap
+
+import roughvisc as rv
+from roughvisc.errors import ConvergenceError
+from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.contact import solve_contact, solver
+
+BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic"])
+
+
+def l1(found, exact):
+    return np.abs(found - exact).sum() / exact.sum()
+
+
+def check_optimal(operator, gap, state, precision, present=None):
+    """No tension, no penetration, pressure only in closed gaps."""
+    present = np.ones(gap.shape, bool) if present is None else present
+    opening = gap + operator.displacement(state.pressure) - state.approach
+    scale = np.ptp(gap[present]) or state.approach
+    assert (state.pressure >= 0).all()
+    assert (state.pressure[~present] == 0).all()
+    assert opening[present].min() > -precision * scale
+    assert np.abs(opening[state.pressure > 0]).max() < precision * scale
+    assert state.displacement == pytest.approx(operator.displacement(state.pressure), abs=1e-12 * scale)
+    assert state.load == pytest.approx(state.pressure.sum())
+
+
+# ------------------------------------------------------------------------------------------------- exact solutions
+
+
+def test_given_load__agrees_with_dense_linear_algebra():
+    """Active set with a dense matrix, independent of the solver; cells leave, and none of them would penetrate."""
+    shape, spacing, load = (11, 9), (1.0, 0.8), 12.0
+    x, y = np.indices(shape)
+    gap = ((x - 4.7) ** 2 + (0.8 * (y - 4.2)) ** 2) / 30
+    matrix = np.array([direct(cell, spacing).ravel() for cell in np.eye(99).reshape(99, *shape)])
+    active, expected = np.ones(99, bool), np.full(99, -1.0)
+    while (expected < 0).any():
+        m = int(active.sum())
+        system = np.ones((m + 1, m + 1))
+        system[:m, :m], system[:m, m], system[m, m] = matrix[np.ix_(active, active)], -1, 0
+        solution = np.linalg.solve(system, np.append(-gap.ravel()[active], load))
+        expected = np.zeros(99)
+        expected[active] = solution[:m]
+        active &= expected > 0
+    state = solve_contact(Operator(shape, spacing), gap, load=load, tolerance=1e-9)
+    assert state.pressure.ravel() == pytest.approx(expected, abs=1e-8 * expected.max())
+    assert state.approach == pytest.approx(solution[m], rel=1e-10)
+
+
+def hertz_errors(n, ny):
+    """Relative errors of approach and pressure on a grid with the sphere at an arbitrary place in a cell."""
+    radius, modulus, force, size = 2.0, 3.0, 0.05, 1.0
+    spacing = (size / n, size / ny)
+    x = (np.arange(n) + 0.5) * spacing[0] - 0.5037 * size
+    y = (np.arange(ny) + 0.5) * spacing[1] - 0.4951 * size
+    squared = x[:, None] ** 2 + y[None, :] ** 2
+    exact = closed_forms.hertz(radius, modulus, force)
+    area = spacing[0] * spacing[1]
+    state = solve_contact(
+        Operator((n, ny), spacing), squared / (2 * radius), load=force / modulus / area, tolerance=1e-7
+    )
+    off = np.abs(modulus * state.pressure - exact.pressure(np.sqrt(squared)))
+    return abs(state.approach / exact.approach - 1), np.sum(off) * area / force
+
+
+def test_hertz__converges_at_order_two_in_approach_and_three_halves_in_pressure():
+    grids = [(31, 34), (61, 68), (123, 134), (245, 270)]
+    errors = np.array([hertz_errors(*grid) for grid in grids])
+    orders = -np.polyfit(np.log([g[0] for g in grids]), np.log(errors), 1)[0]
+    assert 1.8 < orders[0] < 2.4, f"approach: {orders[0]:.2f}, errors {errors[:, 0]}"
+    assert 1.35 < orders[1] < 1.8, f"L1 pressure: {orders[1]:.2f}, errors {errors[:, 1]}"
+    assert errors[-1, 0] < 1e-4
+    assert errors[-1, 1] < 2e-3
+
+
+@pytest.mark.parametrize("closed", [0.15, 0.5, 0.9])
+def test_wave__has_the_pressure_of_westergaard(closed):
+    """``p = 2 pm cos(x) sqrt(sin^2 a - sin^2 x) / sin^2 a`` with ``x = pi s / L`` and ``pm = p* sin^2 a``."""
+    errors = []
+    for n in (101, 403):
+        x = np.pi * (np.arange(n) + 0.5 - n / 2) / n
+        full = np.pi * 0.01  # E* = 1: p* = pi Delta / L with Delta = 0.01, L = 1
+        inside = np.clip(np.sin(closed * np.pi / 2) ** 2 - np.sin(x) ** 2, 0, None)
+        exact = 2 * full * np.cos(x) * np.sqrt(inside)
+        gap = np.repeat(0.01 * (1 - np.cos(2 * x))[:, None], 3, axis=1)
+        load = 3 * n * full * np.sin(closed * np.pi / 2) ** 2
+        state = solve_contact(Operator((n, 3), (1 / n, 0.4), "periodic"), gap, load=load, tolerance=1e-7)
+        errors.append(l1(state.pressure, np.repeat(exact[:, None], 3, axis=1)))
+    assert errors[0] < 5e-3
+    assert errors[1] < min(0.5 * errors[0], 2e-3)
+
+
+def full_pressure(operator, gap):
+    """Pressure variation in full contact of a periodic surface, exact by Fourier series."""
+    qx, qy = (2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip(gap.shape, operator.spacing, strict=True))
+    return np.fft.ifft2(np.fft.fft2(gap.mean() - gap) * np.hypot(qx[:, None], qy) / 2).real
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1e-9, 1e-2, 1.0])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 23), (2, 2), (33, 40)])
+def test_full_contact__is_the_fourier_series(shape, roughness):
+    operator, gap = Operator(shape, (1.0, 0.7), "periodic"), roughness * rough_gap((40, 40))[: shape[0], : shape[1]]
+    exact = full_pressure(operator, gap)
+    exact += 1.0 - 2 * exact.min()
+    state = solve_contact(operator, gap, load=exact.sum(), tolerance=1e-9)
+    assert l1(state.pressure, exact) < 1e-9
+    assert state.approach == pytest.approx(gap.mean(), rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 23), (2, 2), (16, 15)])
+def test_flat_surface__is_in_full_contact(shape):
+    state = solve_contact(Operator(shape, (1.0, 2.0)), np.zeros(shape), load=3.0)
+    assert (state.pressure > 0).all()
+    assert state.load == pytest.approx(3.0)
+
+
+def test_absent_cells__carry_nothing():
+    shape = (41, 40)
+    x, y = np.indices(shape)
+    present = np.hypot(x - 20, y - 19.5) < 12
+    operator, gap = Operator(shape, (0.5, 0.5)), np.where(present, 0.0, np.nan)
+    by_load = solve_contact(operator, gap, load=20.0, present=present, tolerance=1e-8)
+    check_optimal(operator, np.where(present, 0.0, 9.0), by_load, 1e-7, present)
+    by_approach = solve_contact(operator, gap, approach=by_load.approach, present=present, tolerance=1e-8)
+    assert by_approach.load == pytest.approx(20.0, rel=1e-8)
+
+
+# ------------------------------------------------------------------------------------------------------ optimality
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("mean", [1e-3, 0.05, 0.4])
+def test_rough_surface__is_in_equilibrium_under_load_and_approach(boundary, mirrored, mean):
+    operator = Operator((63, 48), (1.0, 1.3), boundary, mirrored=mirrored)
+    gap = rough_gap(operator.shape)
+    state = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-8)
+    check_optimal(operator, gap, state, 1e-6)
+    assert np.sum(state.pressure) == pytest.approx(mean * gap.size, rel=1e-12)
+    back = solve_contact(operator, gap, approach=state.approach, tolerance=1e-8)
+    check_optimal(operator, gap, back, 1e-6)
+    assert back.load == pytest.approx(state.load, rel=1e-7)
+
+
+def test_error__is_honestly_estimated():
+    """Against tight solutions: spheres, cones, punches, waves, rough surfaces, quarters of them; cold and warm."""
+    found = list(rows((34,), (1e-3, 3e-5)))
+    assert all(row["error"] <= row["tolerance"] for row in found)
+    known = [row for row in found if row["error"] > 1e-9]
+    ratios = np.array([row["estimate"] / row["error"] for row in known])
+    assert ratios.size > 250
+    assert np.mean(ratios >= 0.8) > 0.98
+    assert ratios.min() > 0.7, known[np.argmin(ratios)]["case"]
+    assert np.median(ratios) < 4
+    assert np.mean(ratios < 10) > 0.95
+
+
+@given(
+    shape=shapes(3, 24),
+    boundary=boundaries,
+    seed=st.integers(0, 99),
+    load=st.floats(-4, 1),
+    tolerance=st.floats(-7, -1),
+    present=st.sampled_from([0.5, 1.0, 1.0]),
+    is_load=st.booleans(),
+)
+@examples(100)
+def test_random_problems__are_solved_to_the_tolerance(shape, boundary, seed, load, tolerance, present, is_load):
+    rng = np.random.default_rng(seed)
+    gap, present = rng.random(shape), rng.random(shape) <= present
+    assume(present.any())
+    operator = Operator(shape, (1.0, rng.choice([0.3, 1.0, 4.0])), boundary)
+    exact = solve_contact(operator, gap, load=10**load * gap.size, present=present, tolerance=1e-10)
+    is_full = boundary == "periodic" and 1 - exact.approach / gap.mean() < 0.02
+    assume(is_load or not is_full)
+    known = {"load": exact.load} if is_load else {"approach": exact.approach}
+    state = solve_contact(operator, gap, present=present, tolerance=10**tolerance, **known)
+    assert l1(state.pressure, exact.pressure) < max(10**tolerance, 1e-8)
+
+
+def test_bound__bounds_the_error_in_the_energy_norm():
+    operator = Operator((47, 50), (1.0, 1.0))
+    gap = rough_gap(operator.shape, seed=5)
+    exact = solve_contact(operator, gap, load=100.0, tolerance=1e-10)
+    for control in ({"load": 100.0}, {"approach": exact.approach}):
+        for tolerance in (1e-1, 1e-3, 1e-5):
+            state = solve_contact(operator, gap, **control, tolerance=tolerance)
+            off = state.pressure - exact.pressure
+            energy, total = (np.sum(p * operator.displacement(p)) for p in (off, state.pressure))
+            assert np.sqrt(energy / total) <= state.bound * (1 + 1e-6)
+
+
+@given(exponent=st.integers(-290, 12), boundary=boundaries)
+@examples(30)
+def test_loads__of_any_size_are_carried(exponent, boundary):
+    gap, load = rough_gap((15, 17)), 10.0**exponent
+    state = solve_contact(Operator(gap.shape, (1.0, 1.0), boundary), gap, load=load)
+    assert np.isfinite(state.displacement).all()
+    assert np.sum(state.pressure) == pytest.approx(load, rel=1e-12)
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("unit", [1e-12, 1e-9, 1e6, 1e30])
+def test_lengths__are_neutral(boundary, unit):
+    gap = rough_gap((31, 28))
+    one, other = Operator(gap.shape, (1.0, 0.7), boundary), Operator(gap.shape, (unit, 0.7 * unit), boundary)
+    exact = solve_contact(one, gap, load=20.0, tolerance=1e-9)
+    for known in ({"load": 20.0}, {"approach": exact.approach}):
+        scaled = {name: value * unit if name == "approach" else value for name, value in known.items()}
+        expected, found = solve_contact(one, gap, **known), solve_contact(other, unit * gap, **scaled)
+        assert found.pressure == pytest.approx(expected.pressure, abs=1e-6 * expected.pressure.max())
+        assert found.approach == pytest.approx(unit * expected.approach, rel=1e-7)
+        assert found.error == pytest.approx(expected.error, rel=1e-2)
+
+
+# ---------------------------------------------------------------------------------------------- guesses and safeguards
+
+
+def test_first_guess__saves_iterations():
+    operator, gap = Operator((63, 64), (1.0, 1.0), "periodic"), rough_gap((63, 64))
+    cold = solve_contact(operator, gap, load=300.0, tolerance=1e-5)
+    warm = solve_contact(operator, gap, load=303.0, tolerance=1e-5, start=cold.pressure)
+    assert warm.iterations < 0.7 * cold.iterations
+
+
+@pytest.mark.parametrize("known", [{"load": 30.0}, {"approach": 3.0}], ids=["load", "approach"])
+@BOUNDARIES
+def test_known_displacement__saves_a_convolution_and_leaves_its_rounding_behind(boundary, known):
+    operator, gap = Operator((31, 28), (1.0, 1.0), boundary), rough_gap((31, 28))
+    start = solve_contact(operator, gap, load=20.0).pressure
+    displacement = operator.displacement(start)
+    plain = solve_contact(operator, gap, start=start, **known)
+    arguments = [array.copy() for array in (gap, start, displacement)]
+    found = solve_contact(operator, gap, start=start, start_displacement=(1 + 1e-9) * displacement, **known)
+    assert found.convolutions == plain.convolutions - 1
+    assert l1(found.pressure, plain.pressure) < 1e-4
+    off = operator.displacement(found.pressure) - found.displacement
+    assert np.abs(off).max() < 1e-10 * found.displacement.max()
+    assert all(np.array_equal(*pair) for pair in zip(arguments, (gap, start, displacement), strict=True))
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("mean", [0.02, 0.5])
+def test_cold_start__is_guessed_on_half_the_cells(boundary, mean, monkeypatch):
+    operator, gap = Operator((257, 301), (1.0, 1.0), boundary), rough_gap((257, 301))
+    guessed = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-3)
+    monkeypatch.setattr(solver, "COARSE_FROM", 10**6)
+    cold = solve_contact(operator, gap, load=mean * gap.size, tolerance=1e-3)
+    assert guessed.iterations < (0.8 if mean < 0.1 else 0.95) * cold.iterations
+    assert l1(guessed.pressure, cold.pressure) < 2e-3
+
+
+@BOUNDARIES
+def test_blocks__save_iterations_in_many_spots_and_change_no_result(boundary, monkeypatch):
+    surface = rv.self_affine((500.0, 490.0), (500, 490), hurst=0.8, rms_slope=1.0, rolloff=125.0, seed=3)
+    operator, gap = Operator((500, 490), (1.0, 1.0), boundary), surface.values.max() - surface.values
+    alone = solve_contact(operator, gap, load=0.05 * gap.size, tolerance=1e-4)
+    monkeypatch.setattr(solver, "BLOCKS_FROM", 400)
+    both = solve_contact(operator, gap, load=0.05 * gap.size, tolerance=1e-4)
+    assert 0.05 < np.mean(alone.pressure > 0) < 0.15
+    assert both.iterations < 0.85 * alone.iterations
+    assert l1(both.pressure, alone.pressure) < 2e-4
+
+
+def test_projected_gradient__converges_alone(monkeypatch):
+    """With a useless preconditioner the safeguard still reaches the solution."""
+    operator, gap = Operator((15, 12), (1.0, 1.0)), rough_gap((15, 12), seed=3)
+    expected = solve_contact(operator, gap, load=40.0, tolerance=1e-8)
+    monkeypatch.setattr(Operator, "inverse", lambda self, field: np.roll(-field, 3))
+    state = solve_contact(operator, gap, load=40.0, tolerance=1e-5, max_iterations=20_000)
+    assert state.approach == pytest.approx(expected.approach, rel=1e-5)
+
+
+def test_unsolved_contact__raises():
+    operator = Operator((33, 30), (1.0, 1.0))
+    with pytest.raises(ConvergenceError, match="3 iterations"):
+        solve_contact(operator, rough_gap(operator.shape), load=10.0, tolerance=1e-8, max_iterations=3)
+    for known in ({}, {"load": 1.0, "approach": 1.0}):
+        with pytest.raises(ValueError, match="either load or approach"):
+            solve_contact(operator, rough_gap(operator.shape), **known)
+
+
+@given(approach=st.floats(1e-9, 0.5), shape=shapes(1, 9), boundary=boundaries, tolerance=st.sampled_from([1e-3, 1e-9]))
+@examples(200)
+def test_given_approach__is_solved_down_to_rounding(approach, shape, boundary, tolerance):
+    """A step that has already arrived has neither slope nor curvature left."""
+    gap = rough_gap((9, 9), seed=1)[: shape[0], : shape[1]]
+    gap = gap - gap.min()
+    assume(boundary == "free" or approach < 0.99 * gap.mean())
+    with np.errstate(all="raise", under="ignore"):
+        operator = Operator(shape, (1.0, 1.3), boundary)
+        state = solve_contact(operator, gap, approach=approach, tolerance=tolerance)
+        state = solve_contact(operator, gap, approach=approach, tolerance=1e-9, start=state.pressure)
+    check_optimal(operator, gap, state, 1e-6)
+    assert state.load > 0
+
+
+# ------------------------------------------------------------------------------------------------ near full contact
+
+
+def nearly_full(kind):
+    """Half-space and gap with odd and unequal sides, and the load of full contact."""
+    shape, spacing = (33, 40), (1.0, 0.7)
+    x, y = (np.arange(n) / n for n in shape)
+    wave = 2 - np.cos(2 * np.pi * x)[:, None] - np.cos(2 * np.pi * y)
+    operator, gap = Operator(shape, spacing, "periodic"), wave if kind == "wave" else rough_gap(shape, seed=4)
+    return operator, gap, -full_pressure(operator, gap).min() * gap.size
+
+
+@pytest.mark.parametrize("kind", ["wave", "rough"])
+@pytest.mark.parametrize("short", [0.3, 0.05, 1e-2, 1e-4])
+def test_given_approach__near_full_contact_has_the_load(kind, short):
+    """The energy does not depend on a uniform pressure: the load is checked by itself, or the solver raises."""
+    operator, gap, full = nearly_full(kind)
+    exact = solve_contact(operator, gap, load=(1 - short) * full, tolerance=1e-10, max_iterations=5000)
+    solved = 0
+    for tolerance in (3e-4, 3e-5):
+        for start in (None, exact.pressure + 2 * full / gap.size, 0.5 * exact.pressure):
+            try:
+                state = solve_contact(operator, gap, approach=exact.approach, tolerance=tolerance, start=start)
+            except ConvergenceError:
+                continue
+            solved += 1
+            assert abs(state.load / exact.load - 1) < 10 * tolerance
+    assert solved == 6 or short < 1e-2
+
+
+@pytest.mark.parametrize("deeper", [0.0, 1e-3])
+def test_given_approach__of_full_contact_does_not_determine_the_load(deeper):
+    operator, gap, _ = nearly_full("rough")
+    with pytest.raises(ConvergenceError, match="full contact"):
+        solve_contact(operator, gap, approach=gap.mean() * (1 + deeper))
+
+
+@pytest.mark.parametrize("absent", [1, 40])
+def test_given_approach__has_the_load_if_absent_cells_alone_are_open(absent):
+    operator, gap, full = nearly_full("wave")
+    present = np.ones(gap.shape, bool)
+    present.reshape(-1)[7 : 7 + absent] = False
+    for load in (0.6 * full, 1.5 * full):
+        exact = solve_contact(operator, gap, load=load, present=present, tolerance=1e-10)
+        for start in (None, 3 * exact.pressure):
+            state = solve_contact(operator, gap, approach=exact.approach, present=present, start=start)
+            assert abs(state.load / load - 1) < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["wave", "rough"])
+def test_given_load__near_full_contact_has_the_mean_gap(kind):
+    """The approach is that of a loosely solved pressure; what counts is how much is left to full contact."""
+    operator, gap, full = nearly_full(kind)
+    for short in (1e-2, 1e-3, 1e-4):
+        tight = solve_contact(operator, gap, load=(1 - short) * full, tolerance=1e-10, max_iterations=5000)
+        loose = solve_contact(operator, gap, load=(1 - short) * full, tolerance=1e-4)
+        assert gap.mean() - loose.approach == pytest.approx(gap.mean() - tight.approach, rel=0.05)
+    pressed = solve_contact(operator, gap, load=2 * full, tolerance=1e-4)
+    assert pressed.approach == pytest.approx(gap.mean(), rel=1e-14)
