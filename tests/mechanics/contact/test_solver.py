@@ -249,6 +249,18 @@ def test_known_displacement__saves_a_convolution_and_leaves_its_rounding_behind(
     assert all(np.array_equal(*pair) for pair in zip(arguments, (gap, start, displacement), strict=True))
 
 
+@pytest.mark.parametrize("known", [{"load": 3000.0}, {"approach": 5.0}], ids=["load", "approach"])
+@BOUNDARIES
+def test_wide_grid__has_its_displacement_in_double_precision(boundary, known):
+    """Steps far from the solution are convolved in single precision."""
+    operator, gap = Operator((101, 96), (1.0, 1.0), boundary), rough_gap((101, 96))
+    state = solve_contact(operator, gap, **known)
+    expected = operator.displacement(state.pressure)
+    assert np.abs(state.displacement - expected).max() < 1e-12 * expected.max()
+    tight = solve_contact(operator, gap, **known, tolerance=1e-9)
+    assert l1(state.pressure, tight.pressure) < 1e-4
+
+
 @BOUNDARIES
 @pytest.mark.parametrize("mean", [0.02, 0.5])
 def test_cold_start__is_guessed_on_half_the_cells(boundary, mean, monkeypatch):
