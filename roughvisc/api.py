@@ -14,7 +14,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.bodies.body import Body, body_of
-from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
@@ -53,8 +53,8 @@ def simulate(
         that heights or coordinates state is converted; without one they are metres. The undeformed gap is
         ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Material of a half-space: one of roughvisc, or any object with the two methods of
-        :class:`roughvisc.mechanics.materials.models.Material`; or a body, such as from :func:`roughvisc.sheet`. With
+        Material of a half-space: one of roughvisc, or any object with a contact compliance, see
+        :class:`roughvisc.mechanics.materials.creep.Material`; or a body, such as from :func:`roughvisc.sheet`. With
         periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet includes its compression.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the given

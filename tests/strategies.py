@@ -70,7 +70,7 @@ series_with_common_times = st.builds(
 )
 #: With and without an instantaneous compliance, in seconds, microseconds and weeks.
 power_laws = st.builds(
-    rv.PowerLaw,
+    rv.power_law,
     st.sampled_from([0.0, 0.3, 10.0]),
     st.just(2.0),
     st.floats(0.05, 0.95),
@@ -88,5 +88,5 @@ def stiffened(draw):
         "elastic": lambda s: rv.Prony(glassy / s),
         "maxwell": lambda s: rv.Prony(glassy / s, fluidity=glassy / time / s),
         "zener": lambda s: rv.Prony(glassy / s, 0.0, (late / s,), (time,)),
-        "power law": lambda s: rv.PowerLaw(glassy / s, late / s, 0.4, time),
+        "power law": lambda s: rv.power_law(glassy / s, late / s, 0.4, time),
     }[kind]

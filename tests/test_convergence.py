@@ -15,10 +15,10 @@ MATERIALS = {
     "maxwell": rv.maxwell(1.0, 1.0),
     "zener_equal": rv.zener(1.0, 1.0, 1.0),
     "zener_soft": rv.zener(1.0, 0.01, 0.01),
-    "power_law": rv.PowerLaw(0.5, 1.0, 0.4),
+    "power_law": rv.power_law(0.5, 1.0, 0.4),
     "two_branches": rv.Prony(1.0, 0.0, (1.0, 2.0), (0.3, 3.0)),
     "kelvin_voigt": rv.kelvin_voigt(1.0, 1.0),
-    "pure_power_law": rv.PowerLaw(0.0, 1.0, 0.5),
+    "pure_power_law": rv.power_law(0.0, 1.0, 0.5),
 }
 PROGRAMS = {
     "triangle": rv.Program().load(1.0, over=1.0).load(0.3, over=1.0),

@@ -100,7 +100,7 @@ def test_shear_modulus_over_kelvin_modulus(exponent, duration):
 @pytest.mark.parametrize("exponent", [0.5, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0.1, 0.9))])
 @pytest.mark.parametrize("glassy", [0.0, 1.0])
 def test_power_law(glassy, exponent, duration):
-    assert_follows(*step_load(rv.PowerLaw(glassy, 1.0, exponent), duration))
+    assert_follows(*step_load(rv.power_law(glassy, 1.0, exponent), duration))
 
 
 @pytest.mark.parametrize("count", [1, 2, 12, 60])

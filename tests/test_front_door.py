@@ -62,10 +62,10 @@ def test_text__is_the_number():
     assert rv.zener(3e6, 1e6, 1e5) == RUBBER
     assert rv.sheet(RUBBER, "1 mm") == rv.sheet(RUBBER, 1e-3)
     assert rv.Prony("0.3 1/MPa", times=["1 min"], compliances=["1 1/MPa"]) == rv.Prony(3e-7, 0.0, (1e-6,), (60.0,))
-    assert rv.PowerLaw("0 1/Pa", "2 1/GPa", 0.3, "1 h") == rv.PowerLaw(0.0, 2e-9, 0.3, 3600.0)
-    assert rv.Tabulated(["1 ms", 1.0], ["1 1/MPa", 2e-6]) == rv.Tabulated((1e-3, 1.0), (1e-6, 2e-6))
+    assert rv.power_law("0 1/Pa", "2 1/GPa", 0.3, "1 h") == rv.power_law(0.0, 2e-9, 0.3, 3600.0)
+    assert rv.creep_table(["1 ms", 1.0], ["1 1/MPa", 2e-6]) == rv.creep_table((1e-3, 1.0), (1e-6, 2e-6))
     assert rv.from_relaxation("1 MPa", ["2 MPa"], ["10 ms"]) == rv.from_relaxation(1e6, [2e6], [0.01])
-    assert rv.wlf_shift("40 degC", "20 degC", 8.86, "101.6 K") == rv.wlf_shift(313.15, 293.15, 8.86, 101.6)
+    assert rv.wlf("40 degC", "20 degC", 8.86, "101.6 K") == rv.wlf(313.15, 293.15, 8.86, 101.6)
     assert rv.closed_forms.hertz("1 mm", "4 MPa", "1 mN") == rv.closed_forms.hertz(1e-3, 4e6, 1e-3)
     told, plain = (
         rv.friction(WAVE, RUBBER, pressure=pressure, speeds=speeds, progress=False)

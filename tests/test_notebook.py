@@ -1,4 +1,4 @@
-"""What a notebook shows of materials, programs, cases and plans."""
+"""What a notebook shows of programs, cases and plans."""
 
 import re
 from html import unescape
@@ -16,23 +16,6 @@ def shown(one):
     rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", found)]
     title = re.search(r"<b>(.*?)</b>", found).group(1)
     return unescape(title), [[unescape(text) for text in row] for row in rows]
-
-
-def test_material__shows_its_parameters():
-    title, rows = shown(rv.zener(3e6, 1e6, 1e5, poisson=0.3))
-    assert title == "zener"
-    assert dict(rows) == {
-        "shear_modulus": "3 MPa",
-        "kelvin_modulus": "1 MPa",
-        "kelvin_viscosity": "100 kPa s",
-        "poisson": "0.3",
-    }
-
-
-def test_text_of_the_user__is_no_html():
-    hostile = rv.Tabulated((0.1, 1.0), (1e-7, 2e-7), remark="<script>alert(1)</script> & co")
-    title, rows = shown(hostile)
-    assert repr(hostile) == f"{title}({', '.join(f'{key}={text}' for key, text in rows)})"
 
 
 def test_program__shows_its_segments():

@@ -129,7 +129,7 @@ def test_elastic_work__is_the_stored_energy_whatever_the_steps(boundary):
 
 
 @pytest.mark.parametrize(
-    "material", [rv.kelvin_voigt(1.0, 1.0), rv.zener(50.0, 5.0, 0.3), rv.PowerLaw(0.0, 1.0, 0.6)], ids=str
+    "material", [rv.kelvin_voigt(1.0, 1.0), rv.zener(50.0, 5.0, 0.3), rv.power_law(0.0, 1.0, 0.6)], ids=str
 )
 def test_flat_periodic_surface__is_not_stepped_for_its_rounding(material):
     """Its approach is zero: rounding relative to rounding once drove the steps to their least."""

@@ -74,7 +74,7 @@ def test_relaxation__load_then_constant_approach():
 
 
 def test_power_law_ramp__approach():
-    material = rv.PowerLaw(0.0, 1.0, 0.5)
+    material = rv.power_law(0.0, 1.0, 0.5)
     exact = references.power_law_ramp(1.0, 0.3, 0.25, 0.5)  # C = J/4
     ds = rv.simulate(
         rv.sphere(1.0, 1.4, (101, 99)), material, rv.Program().load(0.3, over=1.0), times=[0.5, 1.0],

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from itertools import pairwise
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.materials.models import Material, Tabulated
+from roughvisc.mechanics.materials.creep import Creep
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import grown
@@ -138,36 +136,9 @@ def tolerance_note(scene: Scene, dataset: xr.Dataset) -> str:
     )
 
 
-#: Largest ratio of the times of neighbouring rows of a creep table without a warning.
-_DECADE = 10.0 * (1 + 1e-9)
-
-
-def table_note(materials: Sequence[Material]) -> str:
-    """Warn of creep tables whose rows are more than a decade apart; empty if there are none.
-
-    Without rows between, the compliance is a straight line over the logarithm of time. Two to three rows over six
-    decades of a power law gave approaches 1.4 to 3.9 times too large.
-    """
-    widest = (1.0, 0.0, 0.0)
-    for table in (table for material in materials for table in _tables(material)):
-        times = [time for time in table.times if time > 0]
-        widest = max([widest, *((after / before, before, after) for before, after in pairwise(times))])
-    ratio, before, after = widest
-    if not ratio > _DECADE:
-        return ""
-    return (
-        f"The creep table has no row between {said(before, 's')} and {said(after, 's')}, more than a decade: the "
-        "compliance between them is a guess, and stated errors do not include it. Use at least one row per decade."
-    )
-
-
-def _tables(material: Any) -> Iterator[Tabulated]:
-    """Yield the creep tables that a material is made of."""
-    if isinstance(material, Tabulated):
-        yield material
-    elif is_dataclass(material):
-        for one in fields(material):
-            yield from _tables(getattr(material, one.name))
+def table_note(materials: Sequence[Prony | Creep]) -> str:
+    """Return the warnings of creep tables, such as rows more than a decade apart; empty if there are none."""
+    return " ".join(dict.fromkeys(one.warning for one in materials if isinstance(one, Creep) and one.warning))
 
 
 def speeds_note(dataset: xr.Dataset) -> str:

@@ -20,8 +20,7 @@ from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice
 from roughvisc.mechanics.hereditary.memory import ActsOn
-from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.mechanics.stepping.controller import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program, Segment, instant
 from roughvisc.mechanics.stepping.scene import Scene

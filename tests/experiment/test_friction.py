@@ -98,7 +98,7 @@ def test_force_across__is_to_the_left_of_the_motion(direction, across):
 
 
 def test_temperature__shifts_the_speed(curve):
-    warm = rv.friction(ROUGH, rv.shifted(RUBBER, 0.01), pressure=2e4, speeds=20.0)
+    warm = rv.friction(ROUGH, rv.shift(RUBBER, 0.01), pressure=2e4, speeds=20.0)
     assert float(warm.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
 
 
@@ -124,7 +124,7 @@ def test_persson__is_that_of_the_surface_as_it_slides(curve):
 
 def test_measured_material__by_its_series(curve):
     t = np.geomspace(1e-9, 1e4, 1400)
-    table = rv.Tabulated(tuple(t), tuple(RUBBER.creep_compliance(t)))
+    table = rv.creep_table(tuple(t), tuple(RUBBER.creep_compliance(t)))
     found = rv.friction(ROUGH, table, **PRESS)
     # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
     np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
@@ -160,7 +160,9 @@ def test_missing_points_and_fluids__are_refused():
         rv.friction(ROUGH, rv.maxwell(1e6, 1e6), **PRESS)
 
 
-@pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.PowerLaw(1e-7, 1e-6, 0.3)], ids=["maxwell", "power law"])
+@pytest.mark.parametrize(
+    "material", [rv.maxwell(1e6, 1e3), rv.power_law(1e-7, 1e-6, 0.3)], ids=["maxwell", "power law"]
+)
 @pytest.mark.parametrize("direction", ["x", "-y"])
 def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(material, direction):
     """Full contact of a wave has mu = k^2 A^2 Im E*(k V) / (4 p0), on any number of rows."""

@@ -1,4 +1,4 @@
-"""Materials of the user's own: any creep compliance and its integral, by a series."""
+"""Materials of the user's own: an object with a contact compliance, or a creep function, by a series."""
 
 import math
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from references.reduction import reduced_contact
 from scipy.special import gammainc
+from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import Paraboloid, lee_radok_step
 from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.mechanics.materials.models import Material
-from roughvisc.mechanics.materials.protocol import complete, mean_of
-from roughvisc.mechanics.materials.series import series_of
+from roughvisc.mechanics.materials.creep import Material, complete
+from roughvisc.mechanics.materials.series import series
 
 
 @dataclass(frozen=True)
@@ -112,27 +112,51 @@ def test_a_cycle__is_that_of_all_past_forces_without_a_series(material):
 @pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("shortest", [1e-8, 1e-4])
 def test_the_series__is_within_the_tolerance_between_its_samples(material, shortest):
-    series = series_of(material, shortest, 10.0, 1e-4)
+    found, error = series(material, shortest, 10.0, 1e-4)
     t = np.append(0.0, np.geomspace(shortest, 10.0, 3001))
-    assert series.prony.contact_compliance(t) == pytest.approx(material.contact_compliance(t), rel=1.05e-4)
-    assert series.error <= 1e-4
-    assert series.prony.poisson == getattr(material, "poisson", 0.5)
-    assert series.repair == ""
+    assert found.contact_compliance(t) == pytest.approx(material.contact_compliance(t), rel=1.05e-4)
+    assert error <= 1e-4
+    assert found.poisson == getattr(material, "poisson", 0.5)
 
 
 def test_no_compliance_at_once__has_a_series_too():
     material = Stretched(glassy=0.0)
-    series = series_of(material, 1e-6, 10.0, 1e-4)
-    assert series.prony.glassy == 0
-    assert series.error <= 1e-4
+    found, error = series(material, 1e-6, 10.0, 1e-4)
+    assert found.glassy == 0
+    assert error <= 1e-4
 
 
-@pytest.mark.parametrize("s", [0.0, 1e-9, 0.3, 1e6])
-def test_means__keep_their_digits(s):
-    known = rv.zener(1e6, 5e5, 1e5)
-    h = np.array([0.0, 1e-12, 1e-6, 0.02, 0.5, 40.0]) if s else np.array([1e-12, 1e-6, 0.02, 0.5, 40.0])
-    found = mean_of(known.contact_compliance, known.contact_integral, s, h)
-    assert found == pytest.approx(known.mean_contact_compliance(s, h), rel=1e-13)
+@pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
+def test_the_integral__is_found_from_the_compliance(material):
+    t = np.array([[0.0, 1e-9, 1e-4], [0.3, 7.0, 1e6]])
+    assert complete(material).contact_integral(t) == pytest.approx(material.contact_integral(t), rel=1e-11, abs=0)
+
+
+def test_a_creep_function__is_the_same_material_as_the_object():
+    """J(t) and C(t) = (1 - nu) J(t) / 2 of logarithmic creep."""
+    own = Logarithmic()
+    found = rv.creep(lambda t: 2 / 0.6 * own.contact_compliance(t), poisson=0.4)
+    t = np.array([0.0, 1e-3, 2.0])
+    assert found.contact_compliance(t) == pytest.approx(own.contact_compliance(t), rel=1e-14)
+    ds, expected = pressed(found), pressed(own)
+    np.testing.assert_allclose(ds.approach, expected.approach, rtol=1e-10)
+    assert "in place of the compliance" in ds.attrs["memory"]
+    stiff = rv.creep(lambda t: 1e-7 * (1 + t), longest=1.0)
+    with pytest.raises(InputError, match=r"asked for at 2 s, and the table ends at 1 s"):
+        pressed(stiff)
+
+
+@pytest.mark.parametrize(
+    ("make", "key", "found"),
+    [
+        (lambda: rv.creep(3.0), "function", "float"),
+        (lambda: rv.creep(np.sqrt, poisson=0.7), "poisson", 0.7),
+        (lambda: rv.creep(np.sqrt, longest=0.0), "longest", 0.0),
+    ],
+)
+def test_creep__refuses(make, key, found):
+    with refused(key, found):
+        make()
 
 
 def test_a_pair__takes_one():
@@ -168,15 +192,16 @@ def changed(**functions):
 @pytest.mark.parametrize(
     ("material", "words"),
     [
-        (3.0, "material is a float: expected one of roughvisc's materials, or an object with contact_compliance"),
-        (type("Half", (), {"contact_compliance": lambda self, t: t})(), "it has no contact_integral"),
-        (changed(contact_compliance=lambda t: -1.0 - t), r"contact_compliance is -1 at 0 s: expected no negative"),
-        (changed(contact_compliance=lambda t: t * np.nan), r"contact_compliance is nan at 0 s"),
-        (changed(contact_compliance=lambda t: 1 / (1 + t)), r"contact_compliance is .*: expected no less than before"),
+        (3.0, "material is a float: expected one of roughvisc's materials, .* or an object with contact_compliance"),
+        (type("None", (), {"contact_integral": lambda self, t: t})(), "expected .* an object with contact_compliance"),
+        (
+            changed(contact_compliance=lambda t: -1.0 - t),
+            r"creep of Wrong is -4 1/Pa at 0 s: expected a number that is not",
+        ),
+        (changed(contact_compliance=lambda t: t * np.nan), r"creep of Wrong is nan 1/Pa at 0 s"),
+        (changed(contact_compliance=lambda t: 1 / (1 + t)), r"creep of Wrong is .*: expected no less than before"),
         (changed(contact_compliance=lambda t: 1e-7), r"gives \(\) of .* times: expected a number each"),
-        (changed(contact_integral=lambda t: 1.01 * Stretched().contact_integral(t)), r"expected the antiderivative"),
-        (changed(contact_integral=lambda t: 1e-9 + Stretched().contact_integral(t)), r"1e-09 at 0 s: expected the"),
-        (changed(contact_compliance=lambda t: 0 * t, contact_integral=lambda t: 0 * t), "is 0 at .* expected creep"),
+        (changed(contact_compliance=lambda t: 0 * t), "is 0 1/Pa at .* expected a positive compliance"),
         (Logarithmic(poisson=0.7), "poisson is 0.7: expected a number above -1"),
     ],
 )

@@ -11,7 +11,7 @@ MATERIALS = {
     "zener": rv.zener(1.0, 1.0, 0.3),
     "maxwell": rv.maxwell(1.0, 1.0),
     "kelvin_voigt": rv.kelvin_voigt(1.0, 0.3),
-    "power_law": rv.PowerLaw(1.0, 1.0, 0.3),
+    "power_law": rv.power_law(1.0, 1.0, 0.3),
 }
 PROGRAMS = {
     "loads": rv.Program().load(0.02, over=0.3).hold(0.3).load(0.0, over=0.2).hold(0.2).load(0.01, over=0.2),

@@ -235,7 +235,7 @@ def test_python__refuses(case):
         rv.Body(thick, Sheet(1.0))
     with pytest.raises(rv.InputError, match="kernel is a float: expected a Kernel; it has no influence"):
         rv.Body(rv.elastic(1e6), 1e-4)
-    for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.PowerLaw(1e-7, 1e-6, 0.3), rv.elastic(1e9))):
+    for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.power_law(1e-7, 1e-6, 0.3), rv.elastic(1e9))):
         with pytest.raises(rv.InputError, match="a pair of bodies"):
             pressed(case.height(), two, load)
     with pytest.raises(rv.InputError, match="changes in time"):

@@ -31,7 +31,7 @@ pressure = "10 kPa"
 speeds = ["1 mm/s", "10 mm/s"]
 """
 TABULATED = re.sub(
-    r'model = "zener".*?(?=\n\[\[)', 'model = "tabulated"\nfile = "edited.csv"', BALL, count=1, flags=re.S
+    r'model = "zener".*?(?=\n\[\[)', 'model = "creep_table"\nfile = "edited.csv"', BALL, count=1, flags=re.S
 )
 CREEP = "time [s]; compliance [1/MPa]\n0,01; 0,20\n0,1; 0,31\n1; 0,55\n10; 0,82\n"
 MACHINE = '"Time","Force"\n"s","mN"\n0,0\n0.1,4\n0.2,7\n0.4,5.5\n'

@@ -37,14 +37,9 @@ from roughvisc.mechanics.bodies.body import sheet as sheet_of
 from roughvisc.mechanics.bodies.layer import layer as layer_of
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
-from roughvisc.mechanics.materials.models import (
-    Material,
-    Prony,
-    elastic,
-    kelvin_voigt,
-    maxwell,
-    zener,
-)
+from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings

@@ -26,7 +26,7 @@ from scipy.special import ive, kve
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.indenters import positive
-from roughvisc.mechanics.materials.models import Prony
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities
 
 # exp of minus that is nothing.

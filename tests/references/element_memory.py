@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, hereditary_integral
-from roughvisc.mechanics.materials.models import Material, Prony
+from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.units import Quantity, quantities
 

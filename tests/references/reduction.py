@@ -27,7 +27,8 @@ from references.element_memory import AllForces, Exponentials
 from references.sheet import OnSheet
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.closed_forms.indenters import Indenter
-from roughvisc.mechanics.materials.models import Material, Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.stepping.program import Program, Segment
 from roughvisc.units import quantities
 

@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, with_decays
 from roughvisc.mechanics.closed_forms.indenters import Indenter, places
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
-from roughvisc.mechanics.materials.models import Prony
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.units import Quantity, quantities
 

@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.growing_contact import Growing, StepLoad
 from roughvisc.mechanics.closed_forms.indenters import Paraboloid, places, positive, punch_pressure
 from roughvisc.mechanics.closed_forms.quadrature import integrate
-from roughvisc.mechanics.materials.models import Prony
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]

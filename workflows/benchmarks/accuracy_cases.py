@@ -105,7 +105,7 @@ def _prony(rng, unit, span):
 def _power_law(pure):
     def drawn(rng, unit, span):
         glassy = 0.0 if pure else unit * 10 ** rng.uniform(-3, 0)
-        return rv.PowerLaw(glassy, unit, rng.uniform(0.1, 0.9), span * 10 ** rng.uniform(-1, 1), rng.uniform(0, 0.5))
+        return rv.power_law(glassy, unit, rng.uniform(0.1, 0.9), span * 10 ** rng.uniform(-1, 1), rng.uniform(0, 0.5))
 
     return drawn
 
@@ -118,7 +118,7 @@ def _table(rng, unit, span):
     values *= unit * (1 + rng.uniform(0, 0.03) * np.clip(rng.standard_normal(times.size), -3, 3))
     if rng.random() < 0.5:
         times, values = np.append(0.0, times), np.append(rng.uniform(0.5, 1) * values.min(), values)
-    return rv.Tabulated(tuple(times), tuple(values), noise=0.25, poisson=rng.uniform(0, 0.5))
+    return rv.creep_table(tuple(times), tuple(values), noise=0.25, poisson=rng.uniform(0, 0.5))
 
 
 def _bulk(rng, unit, span):

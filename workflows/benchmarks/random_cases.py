@@ -30,7 +30,7 @@ def material(rng):
         lambda: rv.zener(modulus, kelvin, kelvin * time, poisson),
         lambda: rv.Prony(rng.choice([0, 1 / modulus]), 0.0, tuple(10 ** rng.uniform(-2, 2, count)),
                          tuple(10 ** rng.uniform(-3, 3, count)), poisson),
-        lambda: rv.PowerLaw(rng.choice([0, 1 / modulus]), 1 / kelvin, rng.uniform(0.1, 0.9), time, poisson),
+        lambda: rv.power_law(rng.choice([0, 1 / modulus]), 1 / kelvin, rng.uniform(0.1, 0.9), time, poisson),
     ][rng.integers(6)]()  # fmt: skip
 
 

@@ -39,7 +39,7 @@ def scenes():
     zener = rv.zener(1e6, 1e6, 1e6, 0.5)
     soft = rv.kelvin_voigt(1e6, 1e6, 0.5)
     prony = rv.Prony(glassy=1e-7, compliances=(1e-7, 3e-7, 1e-6, 2e-6), times=(0.01, 0.1, 1.0, 10.0))
-    law = rv.PowerLaw(glassy=1e-8, coefficient=1e-6, exponent=0.3)
+    law = rv.power_law(glassy=1e-8, coefficient=1e-6, exponent=0.3)
     at_rest = rv.Program()
     hold, ramp = at_rest.load(0.01, over=0).hold(2.0), at_rest.load(0.01, over=1.0).hold(1.0)
     ball = rv.sphere(1e-2, 2e-3, (33, 31))

@@ -16,8 +16,9 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.sheet import Base, Sheet
+from roughvisc.mechanics.materials.creep import Creep, Material, complete
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
-from roughvisc.mechanics.materials.protocol import Material, complete
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -32,8 +33,8 @@ class Body:
     Parameters
     ----------
     material : Material
-        A material of roughvisc, or any object with the two methods of
-        :class:`roughvisc.mechanics.materials.models.Material`.
+        A material of roughvisc, or any object with a contact compliance, see
+        :class:`roughvisc.mechanics.materials.creep.Material`.
     kernel : Kernel
         Displacement of the surface under pressure at unit contact compliance; default: that of a half-space. See
         :class:`roughvisc.mechanics.bodies.kernel.Kernel` for your own kernels.
@@ -68,7 +69,7 @@ class Body:
         return True
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[Prony | Creep, ...]:
         """What it is made of."""
         return (complete(self.material),)
 
@@ -153,10 +154,5 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
 
 
 def separability_error(material: Any) -> str:
-    """What a material stands for that is no one body of a constant Poisson ratio; empty if it is one."""
-    while material is not None:
-        amiss: str = getattr(material, "stands_for", "")
-        if amiss:
-            return amiss
-        material = getattr(material, "given", None)  # of one that was shifted or completed
-    return ""
+    """Return what a material represents if it is not one body of a constant Poisson ratio; otherwise empty."""
+    return str(getattr(material, "stands_for", ""))

@@ -18,9 +18,9 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import Body, separability_error
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.layered import Layered, effective_compliance
+from roughvisc.mechanics.materials.creep import Creep, Material, complete
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
-from roughvisc.mechanics.materials.models import Material, Prony
-from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities, said
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class LayeredBody(Body):
         return text
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[Prony | Creep, ...]:
         """Of the strata, from the top."""
         return tuple(complete(one.material) for one in self.strata)
 

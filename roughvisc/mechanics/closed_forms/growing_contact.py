@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, places, positive
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
-from roughvisc.mechanics.materials.models import Material, Prony
+from roughvisc.mechanics.materials.creep import Creep, Material
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.units import Quantity, quantities
 
@@ -229,13 +230,13 @@ class GrowingContact(Growing):
     ----------
     indenter : Indenter
         The rigid indenter.
-    material : Material
+    material : Prony or Creep
         The half-space.
     program : Program
         The load.
     """
 
-    material: Material
+    material: Prony | Creep
     program: Program
 
     def scaled_force(self, t: ArrayLike) -> Array:
@@ -243,14 +244,14 @@ class GrowingContact(Growing):
         return hereditary_integral(self.material.contact_compliance, self.material.contact_integral, self.program, t)
 
 
-def lee_radok(indenter: Indenter, material: Material, program: Program) -> GrowingContact:
+def lee_radok(indenter: Indenter, material: Prony | Creep, program: Program) -> GrowingContact:
     """An axisymmetric indenter under a load that never falls, on any material.
 
     Parameters
     ----------
     indenter : Indenter
         A sphere (:class:`Paraboloid`) or a :class:`Cone`.
-    material : Material
+    material : Prony or Creep
         Anything with ``contact_compliance(t)`` and ``contact_integral(t)``.
     program : Program
         Rising ramps, holds and jumps of load.

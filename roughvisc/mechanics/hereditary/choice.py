@@ -8,13 +8,13 @@ import numpy as np
 
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import ActsOn, Memory
-from roughvisc.mechanics.materials.models import Material, Prony
-from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.materials.series import series_of
+from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.series import series
 
-#: Part of the tolerance that a series in place of a material may take.
+#: Largest error of a series that replaces a material, as a part of the tolerance.
 SERIES_SHARE = 0.1
-#: A series is certified from this part of the program's length on, if nothing else is asked for.
+#: Default shortest time of a series, as a part of the length of the program.
 SHORTEST_AGE = 1e-6
 #: Up to so many exponentials are remembered as pressures and as displacements where the grid may change: the passes
 #: over the grid that each of them takes cost less than the convolution that this saves (measured at 128 squared).
@@ -25,34 +25,34 @@ _RINGING = 1.45
 
 @dataclass(frozen=True)
 class Choice:
-    """A memory, and how well it stands for the material.
+    """A memory, and its distance from the material.
 
     Attributes
     ----------
     memory : Memory
-        What a march keeps its past in.
+        The memory of the time integration.
     series_error : float
         Largest relative error of the compliance at time zero and from the shortest age on; zero where the memory is
         exact. Before that age it is less, relative to the compliance that has crept by then.
     note : str
-        What is modelled, in words.
-    deviation : float
-        Largest relative deviation of the series from the rows of a table that has none, beyond their noise.
+        The model in words.
+    misfit : float
+        Largest relative deviation of the series from the rows of a table, zero if it is within their noise.
     """
 
     memory: Memory
     series_error: float
     note: str
-    deviation: float = 0.0
+    misfit: float = 0.0
 
     @property
-    def material(self) -> Material:
-        """What is pressed: the material, or the series in its place."""
+    def material(self) -> Prony:
+        """The Prony series that the solver uses: the material, or the series in its place."""
         return self.memory.material
 
     def warning(self, tolerance: float) -> str:
         """What to say of a series that is farther from the material than the tolerance; empty if it is not."""
-        off = max(self.series_error, self.deviation)
+        off = max(self.series_error, self.misfit)
         if off <= tolerance:
             return ""
         return (
@@ -81,15 +81,15 @@ def choose_memory(
     acts_on : {"displacement", "pressure"}
         The form that the memory takes; one of pressures may be one of both.
     shortest : float, optional
-        Shortest age at which the compliance is asked for, beside zero; a millionth of the program's length if not
-        given. [s]
+        Shortest time at which the compliance matters, apart from zero; default: a millionth of the program's length.
+        [s]
 
     Returns
     -------
     Choice
-        Exponentials: those of the material, if it is a series; else a series in its place, within a tenth of the
-        tolerance if there is one. A table that has none is made passive: what is pressed then is the positive series
-        nearest to it. For a program of jumps alone it has the material's instantaneous compliance, which is exact.
+        Exponentials: those of the material, if it is a series; otherwise a series in its place, within a tenth of
+        the tolerance if the material is passive. For a program of jumps alone it has the material's instantaneous
+        compliance, which is exact.
 
     Raises
     ------
@@ -98,25 +98,20 @@ def choose_memory(
     """
     material = complete(material)
     if isinstance(material, Prony):
-        return Choice(_recursive(material, acts_on, duration), 0.0, terms(material))
+        return Choice(_recursive(material, acts_on, duration), 0.0, _joined(terms(material), material.note))
     if duration == 0:
         jumped, note = at_once(material), "instantaneous compliance"
         return Choice(_recursive(jumped, acts_on, duration), 0.0, note if jumped.glassy else f"no {note}")
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
-    material.contact_compliance(duration)  # refuses what ends before
-    series = series_of(material, shortest, duration, SERIES_SHARE * tolerance)
-    said = [terms(series.prony)]
-    if series.pressed != series.prony:
-        said[0] += (
-            f" in place of the compliance, within {series.error:.1e} of it at once and from {series.shortest:.1g} s"
-        )
-    if series.repair:
-        said.append(series.repair)
-    return Choice(_recursive(series.prony, acts_on, duration), series.error, "; ".join(said), series.deviation)
+    found, error = series(material, shortest, duration, SERIES_SHARE * tolerance)
+    within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
+    active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
+    note = _joined(terms(found) + within * bool(error), material.note, active)
+    return Choice(_recursive(found, acts_on, duration), error, note, material.misfit)
 
 
-def at_once(material: Material) -> Prony:
-    """What stands for a material in a program of jumps, where nothing but its instantaneous compliance matters."""
+def at_once(material: Prony | Creep) -> Prony:
+    """Return the elastic material of a program of jumps, which needs the instantaneous compliance only."""
     glassy = float(material.contact_compliance(0.0)) * 2 / (1 - material.poisson)
     return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson)
 
@@ -127,7 +122,7 @@ def _recursive(series: Prony, acts_on: ActsOn, duration: float) -> Modes:
     return Modes(series, "both" if twice else acts_on, rules)
 
 
-def may_ring(material: Material, duration: float) -> bool:
+def may_ring(material: Prony, duration: float) -> bool:
     """Whether in some step pressure taken as linear would ring; if not, no step needs the state before the last."""
     if duration == 0:
         return False
@@ -137,9 +132,13 @@ def may_ring(material: Material, duration: float) -> bool:
 
 
 def terms(series: Prony) -> str:
-    """What a series consists of, in words."""
+    """Return the terms of a series in words."""
     if not series.times and not series.fluidity:
         return "no memory: elastic"
     count = len(series.times)
     exponentials = f"{count} exponential{'' if count == 1 else 's'}"
     return f"{exponentials} and a fluidity" if series.fluidity and count else exponentials if count else "a fluidity"
+
+
+def _joined(*notes: str) -> str:
+    return "; ".join(filter(None, notes))

@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Memory(Protocol):
     """What a march asks of a memory. ``field`` is ``v``, ``p`` or both, one upon the other, as ``acts_on`` says."""
 
     @property
-    def material(self) -> Material:
+    def material(self) -> Prony:
         """Whose past it is; of waves, that one of them by which steps are judged."""
         ...
 
@@ -74,7 +74,7 @@ class Memory(Protocol):
         ...
 
 
-def mean_compliance(material: Material, step: float) -> float:
+def mean_compliance(material: Prony, step: float) -> float:
     """Mean contact compliance over the first ``step`` of creep, ``int_0^h C / h``. [1/Pa]"""
     return float(material.mean_contact_compliance(0.0, step))
 

@@ -1,1 +1,1 @@
-"""Materials: creep compliances as a user states them, and the certified series that stand for them."""
+"""Linear viscoelastic materials, and the certified exponential series that the solver uses."""

@@ -22,7 +22,7 @@ def check_poisson(poisson: float) -> None:
 
 
 def tensile_to_shear(kind: Kind, poisson: float) -> float:
-    """Shear compliance over the compliance measured, ``2 (1 + nu)`` in tension; so the modulus measured over ``G``."""
+    """Return the shear compliance over the measured compliance: ``2 (1 + nu)`` in tension, one in shear."""
     check_poisson(poisson)
     if kind not in ("shear", "tensile"):
         wanted = "'shear' or 'tensile'"
@@ -31,7 +31,7 @@ def tensile_to_shear(kind: Kind, poisson: float) -> float:
 
 
 def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> float:
-    """The value, if it is a positive number, or zero where that is allowed."""
+    """Return the value if it is a positive number, or zero if zero is allowed."""
     good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
     if not good:
         wanted = f"a {'non-negative' if zero else 'positive'} number [{unit}]"
@@ -40,12 +40,12 @@ def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> flo
 
 
 def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
-    """Columns of a table of measurements as arrays.
+    """Return the columns of a table of measurements as arrays.
 
     Parameters
     ----------
     names : tuple of str
-        What each column holds, for the messages; the first is what the rows are taken at.
+        Names of the columns, for the messages; the first is the time or the frequency.
     columns : array_like
         As many numbers in each.
     ascending : bool

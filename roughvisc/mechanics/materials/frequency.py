@@ -1,33 +1,35 @@
-"""Creep seen in frequency: the complex contact compliance of a material under pressure that oscillates."""
+"""Complex contact compliance of a material under oscillating pressure."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.models import Material, Pair, PowerLaw, Prony
-from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.materials.series import series_of
+from roughvisc.mechanics.materials.creep import Creep, Material, complete, pair_creep, power_creep, series_creep
+from roughvisc.mechanics.materials.derived import pair
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.series import series
 
 Complex = NDArray[np.complex128]
 
-# Ages beyond those of the highest and the lowest frequency, over which a series must keep its error: a term whose time
-# is a hundred times off has a hundredth of its loss.
+# A series must keep its error to times so many times shorter and longer than the frequencies need: a term whose time is
+# a hundred times off has a hundredth of its loss.
 _BEYOND = 100.0
 
 
 def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
-    r"""Displacement over pressure where both oscillate as ``exp(i w t)``.
+    r"""Return displacement over pressure where both oscillate as ``exp(i w t)``.
 
     Parameters
     ----------
     material : Material
-        A series and a power law have it in closed form, and so has a pair of these; anything else is taken by its
-        certified series, see :func:`over_frequencies`.
+        A series, a power law, and a pair of these have closed forms; any other material is replaced by a series, see
+        :func:`over_frequencies`.
     frequency : array_like
         Angular frequencies ``w``, of either sign. [1/s]
 
@@ -35,13 +37,13 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     -------
     ndarray of complex
         ``C*(w)``: conjugate for frequencies of opposite sign, its imaginary part not positive for positive ones. At
-        zero the compliance after endless creep: real, or infinite where the material flows. [1/Pa]
+        zero the compliance after endless creep: real, or infinite if the material flows. [1/Pa]
 
     Raises
     ------
     InputError
-        If a material without closed form is asked for at zero frequency alone, or a table ends before the times
-        that the frequencies need.
+        If the only frequency is zero for a material without closed form, or a table ends before the times that the
+        frequencies need.
 
     Notes
     -----
@@ -64,38 +66,51 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     """
     w = np.asarray(frequency, dtype=float)
     closed = over_frequencies(material, w)
-    if isinstance(closed, Pair):
-        return complex_compliance(closed.a, w) + complex_compliance(closed.b, w)
-    return _of_power_law(closed, w) if isinstance(closed, PowerLaw) else _of_series(closed, w)
+    if isinstance(closed, Prony):
+        return _of_series(closed, w)
+    w = w * closed.time_factor
+    if closed.function is pair_creep:
+        return np.asarray(sum(complex_compliance(one, w) for one in closed.parameters) / closed.modulus_factor)
+    found = 0.5 * (1 - closed.poisson) / closed.modulus_factor * _of_power_law(w, *closed.parameters)
+    return _endless(found, w == 0)
 
 
-def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Prony | PowerLaw | Pair:
-    """What stands for a material at some frequencies, with a complex compliance in closed form.
+def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Prony | Creep:
+    """Return a material with a closed form of the complex compliance that replaces another one at some frequencies.
 
     Parameters
     ----------
     material : Material
-        A series, a power law and a pair of these stand for themselves; anything else has a certified series fitted.
+        A series, a power law and a pair of these are returned unchanged. Measured creep is replaced by the series
+        fitted to it, any other material by a certified series.
     frequency : array_like
         Angular frequencies, of either sign. [1/s]
     tolerance : float
-        Relative error of a series in place of the material.
+        Relative error of a series that replaces the material.
 
     Raises
     ------
     InputError
         As :func:`complex_compliance`.
     """
-    if isinstance(material, Pair):
-        return Pair(*(over_frequencies(body, frequency, tolerance) for body in (material.a, material.b)))
-    if isinstance(material, Prony | PowerLaw):
+    material = complete(material)
+    if isinstance(material, Prony) or material.function is power_creep:
         return material
     size = np.abs(np.asarray(frequency, dtype=float))
+    if material.function is pair_creep:
+        factors = material.time_factor, material.modulus_factor
+        bodies = [over_frequencies(one, size * factors[0], tolerance) for one in material.parameters]
+        both = pair(*bodies)
+        return both.scaled(*factors) if isinstance(both, Prony) else replace(material, parameters=tuple(bodies))
     size = size[size > 0]
     if not size.size:
         raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
-    return series_of(complete(material), shortest, longest, tolerance).prony
+    if material.function is not series_creep:
+        return series(material, shortest, longest, tolerance)[0]
+    material.creep_compliance(longest)  # refuses a table that ends before
+    fitted: Prony = material.parameters[0]
+    return fitted.scaled(material.time_factor, material.modulus_factor)
 
 
 def _of_series(material: Prony, w: NDArray[np.float64]) -> Complex:
@@ -106,13 +121,15 @@ def _of_series(material: Prony, w: NDArray[np.float64]) -> Complex:
     return _endless(0.5 * (1 - material.poisson) * total, (w == 0) & (material.fluidity > 0))
 
 
-def _of_power_law(material: PowerLaw, w: NDArray[np.float64]) -> Complex:
-    size, exponent = np.where(w == 0, 1.0, np.abs(w) * material.time_scale), material.exponent
+def _of_power_law(
+    w: NDArray[np.float64], glassy: float, coefficient: float, exponent: float, time_scale: float
+) -> Complex:
+    """Return the complex shear compliance of a power law; at zero frequency a number without meaning. [1/Pa]"""
+    size = np.where(w == 0, 1.0, np.abs(w) * time_scale)
     turned = math.cos(math.pi / 2 * exponent) - 1j * np.sign(w) * math.sin(math.pi / 2 * exponent)
-    creep = material.coefficient * math.gamma(1 + exponent) * size**-exponent * turned
-    return _endless(0.5 * (1 - material.poisson) * (material.glassy + creep), w == 0)
+    return np.asarray(glassy + coefficient * math.gamma(1 + exponent) * size**-exponent * turned)
 
 
 def _endless(compliance: NDArray[Any], where: NDArray[np.bool_]) -> Complex:
-    """The compliance, infinite where creep goes on without end."""
+    """Return the compliance, infinite where creep has no end."""
     return np.asarray(np.where(where, complex(math.inf, 0.0), compliance))

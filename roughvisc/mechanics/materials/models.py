@@ -1,4 +1,4 @@
-"""Linear viscoelastic materials: creep compliances ``J(t)`` and what the contact needs of them.
+"""Materials of springs and dashpots.
 
 The half-space enters the contact through one function, the contact compliance
 ``C(t) = 1/E*(t) = (1 - nu) J(t) / 2`` with the shear creep compliance ``J``; two deformable bodies add theirs.
@@ -9,52 +9,22 @@ with which it changes in time: see :func:`roughvisc.mechanics.materials.relaxati
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
-from roughvisc.mechanics.materials.measured import from_creep_table, from_dynamic, from_relaxation_table
-from roughvisc.mechanics.materials.power_law import PowerLaw
-from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
-from roughvisc.mechanics.materials.protocol import Material, complete
-from roughvisc.mechanics.materials.relaxation import from_relaxation, in_volume
-from roughvisc.mechanics.materials.tabulated import Tabulated
-from roughvisc.notebook import table
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.relaxation import in_volume
 from roughvisc.units import Quantity, quantities
-
-__all__ = [
-    "Material",
-    "Pair",
-    "PowerLaw",
-    "Prony",
-    "Tabulated",
-    "elastic",
-    "from_creep_table",
-    "from_dynamic",
-    "from_relaxation",
-    "from_relaxation_table",
-    "kelvin_voigt",
-    "maxwell",
-    "one_less_mean_decay",
-    "pair",
-    "zener",
-]
-
-Array = NDArray[np.float64]
 
 
 def _spring(
     shear: float | None, young: float | None, poisson: float | None, bulk_modulus: float | None, part: str = ""
 ) -> float:
-    """Shear modulus of a spring that is stated by it or by its Young's modulus: ``G = E / (2 (1 + nu))``. [Pa]
+    """Return the shear modulus of a spring stated by either modulus: ``G = E / (2 (1 + nu))``. [Pa]
 
     Parameters
     ----------
     shear, young : float or None
-        One of them. [Pa]
+        Exactly one modulus. [Pa]
     poisson, bulk_modulus : float or None
         Behaviour in volume of the material.
     part : str
@@ -212,7 +182,7 @@ def zener(
     Parameters
     ----------
     shear_modulus, young_modulus : float or str
-        Exactly one: ``G`` of the spring, the modulus at once, or its ``E = 2 G (1 + nu)``. [Pa]
+        Exactly one: ``G`` of the spring, the instantaneous modulus, or its ``E = 2 G (1 + nu)``. [Pa]
     kelvin_modulus, kelvin_young_modulus : float or str
         Exactly one: ``G_K`` of the Kelvin element's spring, or its ``E_K = 2 G_K (1 + nu)``. [Pa]
     kelvin_viscosity : float or str
@@ -242,92 +212,3 @@ def zener(
     kelvin_viscosity = check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
     shear = Prony(1 / modulus, 0.0, (1 / retarded,), (kelvin_viscosity / retarded,))
     return in_volume(shear, poisson, bulk_modulus)
-
-
-#: What a pair stands for.
-TWO_BODIES = "a pair of bodies"
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two deformable bodies pressed on each other; made by :func:`pair`."""
-
-    a: Material
-    b: Material
-
-    def __repr__(self) -> str:
-        """As it was built."""
-        return f"pair({self.a!r}, {self.b!r})"
-
-    def _repr_html_(self) -> str:
-        return table("pair", [("a", repr(self.a)), ("b", repr(self.b))])
-
-    @property
-    def poisson(self) -> float:
-        """A half, as for a series that stands for two bodies; each body has its own."""
-        return 0.5
-
-    @property
-    def stands_for(self) -> str:
-        """No one body."""
-        return TWO_BODIES
-
-    @property
-    def note(self) -> str:
-        """The notes of both."""
-        return "; ".join(f"{name}: {body.note}" for name, body in (("a", self.a), ("b", self.b)) if body.note)
-
-    def creep_compliance(self, t: ArrayLike) -> Array:
-        """Shear creep compliance of one incompressible body that would make the same contact. [1/Pa]"""
-        return 4 * self.contact_compliance(t)
-
-    def contact_compliance(self, t: ArrayLike) -> Array:
-        """Sum of the contact compliances. [1/Pa]"""
-        return self.a.contact_compliance(t) + self.b.contact_compliance(t)
-
-    def contact_integral(self, t: ArrayLike) -> Array:
-        """Its first antiderivative. [s/Pa]"""
-        return self.a.contact_integral(t) + self.b.contact_integral(t)
-
-    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
-        """Its mean over ``[s, s + h]``. [1/Pa]"""
-        return self.a.mean_contact_compliance(s, h) + self.b.mean_contact_compliance(s, h)
-
-
-def pair(a: Material, b: Material) -> Prony | Pair:
-    """Two deformable bodies: their contact compliances add.
-
-    Parameters
-    ----------
-    a, b : Material
-        The two materials, in any order.
-
-    Returns
-    -------
-    Prony or Pair
-        One series, with a Poisson ratio of 0.5, if both are series.
-
-    Examples
-    --------
-    >>> float(pair(elastic(2e6, 0.3), maxwell(1e6, 1e6)).contact_compliance(3.0))  # 0.35/2e6 + 0.25 (1 + 3)/1e6
-    1.175e-06
-    """
-    both = Pair(complete(a), complete(b))
-    if not (isinstance(a, Prony) and isinstance(b, Prony)):
-        return both
-    glassy, fluidity = 0.0, 0.0
-    compliances: dict[float, float] = {}
-    for body in (a, b):
-        share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body
-        glassy += share * body.glassy
-        fluidity += share * body.fluidity
-        for compliance, time in zip(body.compliances, body.times, strict=True):
-            compliances[time] = compliances.get(time, 0.0) + share * compliance
-    return Prony(
-        glassy,
-        fluidity,
-        tuple(compliances.values()),
-        tuple(compliances),
-        note=both.note,
-        stands_for=both.stands_for,
-    )

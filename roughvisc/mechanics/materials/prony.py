@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.secular import merged, secular_roots
-from roughvisc.mechanics.materials.words import Built, PrintedAsBuilt, as_built
+from roughvisc.mechanics.materials.words import in_words
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @quantities(glassy="1/Pa", fluidity="1/(Pa s)", compliances="1/Pa", times="s")
 @dataclass(frozen=True, repr=False)
-class Prony(PrintedAsBuilt):
+class Prony:
     r"""Exponential (Prony) series of the shear creep compliance.
 
     .. math:: J(t) = J_0 + \varphi t + \sum_i J_i \left(1 - e^{-t/\tau_i}\right)
@@ -39,7 +39,7 @@ class Prony(PrintedAsBuilt):
     note : str
         How a fitted series was found: number of terms, misfit. Ignored in comparisons.
     stands_for : str
-        What the series represents, if it is not one body with this Poisson ratio; otherwise empty.
+        Name of the bodies if the series is not one body with this Poisson ratio; otherwise empty.
 
     Raises
     ------
@@ -70,8 +70,8 @@ class Prony(PrintedAsBuilt):
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
             raise InputError("all compliances are zero: a rigid material cannot be pressed")
 
-    def _built(self) -> Built:
-        """As springs and dashpots where it is a model of few of them, else as the series."""
+    def __repr__(self) -> str:
+        """The constructor of springs and dashpots that makes the series, if there is one; otherwise the series."""
         parameters: dict[str, tuple[Any, str]]
         name, spring = "Prony", (1 / self.glassy if self.glassy else np.inf, "Pa")
         parameters = {"glassy": (self.glassy, "1/Pa")}
@@ -88,7 +88,7 @@ class Prony(PrintedAsBuilt):
         else:
             parameters |= {"fluidity": (self.fluidity, "1/(Pa s)")} if self.fluidity else {}
             parameters |= {"compliances": (self.compliances, "1/Pa"), "times": (self.times, "s")} if self.times else {}
-        return as_built(name, self.poisson, self.note, **parameters)
+        return in_words(name, self.poisson, self.note, **parameters)
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""
@@ -119,6 +119,17 @@ class Prony(PrintedAsBuilt):
             risen = np.exp(-age) * risen - np.expm1(-age)
         retarded = np.add.reduce(compliances * risen, axis=-1)
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
+
+    def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
+        """Return the series with all times and all moduli multiplied by a factor each."""
+        return replace(
+            self,
+            glassy=self.glassy / modulus_factor,
+            fluidity=self.fluidity / (time_factor * modulus_factor),
+            compliances=tuple(one / modulus_factor for one in self.compliances),
+            times=tuple(time_factor * one for one in self.times),
+            note="; ".join(filter(None, (self.note, note))),
+        )
 
     @cached_property
     def _terms(self) -> tuple[Array, Array]:
@@ -178,7 +189,7 @@ def one_less_mean_decay(x: ArrayLike) -> Array:
 
 
 def by_size(x: Array, limit: float, small: Callable[[Array], Array], large: Callable[[Array], Array]) -> Array:
-    """One form of a function below a limit and another one from there on, each where it is asked for alone."""
+    """Evaluate one form of a function below a limit and another form above it, each only for its own arguments."""
     below = x < limit
     count = np.count_nonzero(below)
     if count == below.size:

@@ -9,29 +9,35 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-#: a term that nowhere makes up more of the target than this is left out
+#: A term that nowhere makes up more of the target than this is left out.
 _UNSEEN = 1e-10
+#: Rows above which they are reduced first.
+_MANY = 1000
 
 
 def lattice(shortest: float, longest: float, per_decade: float) -> Array:
-    """Times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
+    """Return times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
     count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
     return np.geomspace(shortest, longest, count)
 
 
 def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
-    """Non-negative weights of the columns whose sum comes nearest to the target, in least squares; mostly zeros.
+    """Return the non-negative weights of the columns whose sum fits the target in least squares; mostly zeros.
 
     Parameters
     ----------
     columns : ndarray, shape (rows, terms)
     target : ndarray, shape (rows,)
     scale : ndarray, shape (rows,)
-        Positive: what the misfit of a row counts relative to.
+        Positive: the misfit of a row is relative to it.
     """
     scaled = columns / scale[:, None]
     norms = np.sqrt(np.sum(scaled**2, axis=0))
     norms[norms == 0] = 1.0
-    weights, _ = scipy.optimize.nnls(scaled / norms, target / scale, maxiter=50 * columns.shape[1])
+    matrix, wanted = scaled / norms, target / scale
+    if wanted.size > _MANY:  # the triangular factor has the same squared misfit up to a constant
+        factor: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, wanted]), mode="r"))
+        matrix, wanted = factor[:, :-1], factor[:, -1]
+    weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
     seen = np.abs(scaled / norms).max(axis=0) * weights
     return np.where(seen > _UNSEEN, weights / norms, 0.0)

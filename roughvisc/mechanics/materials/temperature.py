@@ -13,7 +13,7 @@ from roughvisc.units import Quantity, quantities, quantity
 
 
 @quantities(temperature="K", reference_temperature="K")
-def wlf_shift(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: float | str) -> float:
+def wlf(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: float | str) -> float:
     r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
 
     Parameters
@@ -48,7 +48,7 @@ def wlf_shift(temperature: Quantity, reference_temperature: Quantity, c1: float,
 
     Examples
     --------
-    >>> wlf_shift(298.15, 298.15, 17.44, 51.6)  # at the reference temperature nothing is shifted
+    >>> wlf(298.15, 298.15, 17.44, 51.6)  # at the reference temperature nothing is shifted
     1.0
     """
     check_number("temperature", temperature, "K")
@@ -66,7 +66,7 @@ def wlf_shift(temperature: Quantity, reference_temperature: Quantity, c1: float,
 
 
 @quantities(temperature="K", reference_temperature="K", activation_energy="J/mol")
-def arrhenius_shift(temperature: Quantity, reference_temperature: Quantity, activation_energy: Quantity) -> float:
+def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation_energy: Quantity) -> float:
     r"""Shift factor of a thermally activated process, after Arrhenius.
 
     Parameters
@@ -98,7 +98,7 @@ def arrhenius_shift(temperature: Quantity, reference_temperature: Quantity, acti
 
     Examples
     --------
-    >>> round(arrhenius_shift(283.15, 293.15, 80e3), 3)  # 10 K colder
+    >>> round(arrhenius(283.15, 293.15, 80e3), 3)  # 10 K colder
     3.187
     """
     check_number("temperature", temperature, "K")
@@ -108,6 +108,6 @@ def arrhenius_shift(temperature: Quantity, reference_temperature: Quantity, acti
 
 
 def _power(base: float, exponent: float) -> float:
-    """A power, infinite where it is beyond all numbers."""
+    """Return a power, infinite beyond the largest number."""
     with np.errstate(over="ignore", under="ignore"):
         return float(np.power(base, exponent))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from roughvisc.mechanics.arrays import lowest
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.hereditary.memory import Memory, mean_compliance, old_weight
-from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program, Slide
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ class Scene:
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at the highest peak, which may lie between the cells; any finite number
         where absent. [m]
-    material, memory : Material, Memory
+    material, memory : Prony, Memory
         The material and the form in which its past is kept.
     program : Program
         What is prescribed, when.
@@ -58,7 +58,7 @@ class Scene:
 
     operator: Operator
     gap: Array
-    material: Material
+    material: Prony
     memory: Memory
     program: Program
     times: tuple[float, ...] | None = None

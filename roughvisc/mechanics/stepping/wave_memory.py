@@ -20,12 +20,19 @@ from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.layer import LayeredBody
 from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.wave_series import Strata, WaveSeries, wave_series
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, SHORTEST_AGE, Choice, at_once, choose_memory, may_ring
+from roughvisc.mechanics.hereditary.choice import (
+    SERIES_SHARE,
+    SHORTEST_AGE,
+    Choice,
+    at_once,
+    choose_memory,
+    may_ring,
+)
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
+from roughvisc.mechanics.materials.creep import Creep, complete
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.materials.series import series_of
+from roughvisc.mechanics.materials.series import series
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[Any]
@@ -241,14 +248,11 @@ def choose_body_memory(
         )
     share = SERIES_SHARE * tolerance
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
-    series = [
-        series_of(complete(one), shortest, duration, _MATERIALS * share) if duration > 0 else None
-        for one in body.materials
+    given = [complete(one) for one in body.materials]
+    found = [
+        series(one, shortest, duration, _MATERIALS * share) if duration > 0 else (at_once(one), 0.0) for one in given
     ]
-    materials = tuple(
-        at_once(one) if found is None else found.prony for one, found in zip(body.materials, series, strict=True)
-    )
-    of_materials = max((found.error for found in series if found is not None), default=0.0)
+    materials, of_materials = tuple(one for one, _ in found), max(error for _, error in found)
     waves = wave_series(Strata(body.thicknesses, materials), shortest, duration, share - of_materials)
     memory = WaveMemory(waves, duration, operator)
     error = waves.error + of_materials
@@ -261,6 +265,5 @@ def choose_body_memory(
             f"share, each with compliances of its own, within {error:.1e} of them from {shortest:.1g} s on"
         )
     )
-    repairs = [found.repair for found in series if found is not None and found.repair]
-    deviation = max((found.deviation for found in series if found is not None), default=0.0)
-    return Choice(memory, error, "; ".join([note, *repairs]), deviation)
+    misfit = max(one.misfit if isinstance(one, Creep) else 0.0 for one in given)
+    return Choice(memory, error, "; ".join(filter(None, [note, *(one.note for one in given)])), misfit)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from roughvisc.mechanics.materials.models import Material
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.topography.grid import nominal_area
 

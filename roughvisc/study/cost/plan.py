@@ -23,7 +23,7 @@ from roughvisc.experiment.resources import PART, PROCESS, Available, amount, cor
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.materials.protocol import complete
+from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
 from roughvisc.notebook import table
 from roughvisc.problem import Problem

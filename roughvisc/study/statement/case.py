@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from roughvisc.experiment.protocol import Experiment
     from roughvisc.mechanics.bodies.body import Body
-    from roughvisc.mechanics.materials.models import Material
+    from roughvisc.mechanics.materials.creep import Material
     from roughvisc.mechanics.stepping.program import Program
     from roughvisc.settings import Settings
 

@@ -103,7 +103,7 @@ def test_body_of_the_users_own__that_does_not_separate_is_refused():
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("speed", [2e-3, 0.1])
 def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, turned):
-    layer, base = rv.zener(3e6, 1e6, 1e5, poisson=0.3), rv.PowerLaw(1e-8, 3e-7, 0.4, poisson=0.45)
+    layer, base = rv.zener(3e6, 1e6, 1e5, poisson=0.3), rv.power_law(1e-8, 3e-7, 0.4, poisson=0.45)
     thickness, period, amplitude, pressure = 2e-4, 1e-3, 1e-7, 1e5
     height = rv.wavy(amplitude=amplitude, wavelength=period, size=period, shape=(45, 3), waves=1)
     direction = "x"

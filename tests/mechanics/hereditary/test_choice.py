@@ -31,7 +31,7 @@ def test_series__is_its_own_memory(material, note):
 
 @pytest.mark.parametrize("exponent", [0.2, 0.5, 0.8])
 def test_power_law__has_a_certified_series(exponent):
-    material = rv.PowerLaw(0.1, 1.0, exponent)
+    material = rv.power_law(0.1, 1.0, exponent)
     choice = choose_memory(material, 10.0, 1e-3)
     assert isinstance(choice.memory, Modes)
     assert choice.series_error <= SERIES_SHARE * 1e-3
@@ -43,7 +43,7 @@ def test_power_law__has_a_certified_series(exponent):
 @pytest.mark.parametrize("exponent", [0.1, 0.5])
 @pytest.mark.parametrize("glassy", [0.0, 0.01, 0.3])
 def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glassy):
-    material = rv.PowerLaw(glassy, 1.0, exponent)
+    material = rv.power_law(glassy, 1.0, exponent)
     choice = choose_memory(material, 1e4, 1e-3, shortest=1e-7)
     series = choice.memory.material
     assert series.glassy == glassy
@@ -53,30 +53,27 @@ def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glas
     early = np.geomspace(1e-12, 1e-7, 200)
     crept = float(material.contact_compliance(1e-7) - material.contact_compliance(0.0))
     assert np.abs(series.contact_compliance(early) - material.contact_compliance(early)).max() <= 1.001 * crept
-    assert choice.note.endswith(f"within {choice.series_error:.1e} of it at once and from 1e-07 s")
-
-
-def percentages(note):
-    return [float(number) / 100 for number in re.findall(r"([\d.]+) %", note)]
+    assert choice.note.endswith(f"within {choice.series_error:.1e} of it at time zero and from 1e-07 s")
 
 
 @pytest.mark.parametrize("first", [(), (0.0,)])
-def test_noisy_table__is_made_passive_and_says_how_far_off_the_rows_are(first):
+def test_noisy_table__says_how_far_off_the_rows_are(first):
     t = np.append(first, ROWS)
     raw = np.append(np.zeros(len(first)), ROWS**0.4 * NOISY)
-    material = rv.Tabulated(t, raw, noise=0.1)
+    material = rv.creep_table(t, raw, noise=0.1)
     choice = choose_memory(material, 10.0, 1e-3)
-    assert isinstance(choice.memory, Modes)
-    assert choice.series_error == 0
-    assert choice.material is choice.memory.material
+    assert choice.series_error <= SERIES_SHARE * 1e-3
     assert choice.material.glassy == material.creep_compliance(0.0)
-    off = (choice.material.creep_compliance(t) - raw) / np.where(raw > 0, raw, 1.0)
-    assert percentages(choice.note) == pytest.approx([np.abs(off).max(), np.sqrt(np.mean(off**2))], rel=0.05)
-    assert np.abs(off).max() < 0.05, "noise of 1 %, evened out"
+    off = material.creep_compliance(ROWS) / (ROWS**0.4 * NOISY) - 1
+    stated = re.search(r"largest misfit ([\d.]+), rms ([\d.]+) ", choice.note)
+    assert [float(one) for one in stated.groups()] == pytest.approx(
+        [np.abs(off).max(), np.sqrt(np.mean(off**2))], rel=0.05
+    )
+    assert 0.005 < np.sqrt(np.mean(off**2)) < 0.02, "noise of 1 %, evened out"
 
 
 def test_table_shorter_than_the_program__is_refused():
-    material = rv.Tabulated(tuple(ROWS), tuple(0.5 + ROWS**0.4))
+    material = rv.creep_table(tuple(ROWS), tuple(0.5 + ROWS**0.4))
     with pytest.raises(rv.InputError, match="the table ends at 10 s"):
         choose_memory(material, 11.0, 1e-3)
 
@@ -89,9 +86,9 @@ def fluid(relaxation):
 @pytest.mark.parametrize(
     "material",
     [
-        rv.PowerLaw(0.1, 1.0, 0.3, poisson=0.2),
-        rv.Tabulated((0.0, 1.0, 2.0), (0.3, 1.0, 2.0)),
-        rv.pair(rv.PowerLaw(0.1, 1.0, 0.3, poisson=0.3), rv.zener(1.0, 1.0, 1.0)),
+        rv.power_law(0.1, 1.0, 0.3, poisson=0.2),
+        rv.creep_table((0.0, 1.0, 2.0), (0.3, 1.0, 2.0)),
+        rv.pair(rv.power_law(0.1, 1.0, 0.3, poisson=0.3), rv.zener(1.0, 1.0, 1.0)),
     ],
     ids=lambda material: type(material).__name__,
 )
@@ -104,7 +101,7 @@ def test_jumps_alone__ask_for_the_instantaneous_compliance_only(material):
 
 
 def test_jumps_alone__of_a_material_without_instantaneous_compliance_find_none():
-    choice = choose_memory(rv.PowerLaw(0.0, 1.0, 0.3), 0.0, 1e-3)
+    choice = choose_memory(rv.power_law(0.0, 1.0, 0.3), 0.0, 1e-3)
     assert choice.note == "no instantaneous compliance"
     assert choice.material.contact_compliance(0.0) == 0
 
@@ -112,13 +109,13 @@ def test_jumps_alone__of_a_material_without_instantaneous_compliance_find_none()
 def test_table_far_from_any_passive_material__is_warned_of():
     """Creep that gathers speed; noise within what was said to be noise is none."""
     times = np.linspace(0.0, 1.0, 21)
-    choice = choose_memory(rv.Tabulated(times, 1 + 20 * np.maximum(times - 0.3, 0)), 1.0, 1e-3)
+    choice = choose_memory(rv.creep_table(times, 1 + 20 * np.maximum(times - 0.3, 0)), 1.0, 1e-3)
     rows = choice.material.creep_compliance(times) / (1 + 20 * np.maximum(times - 0.3, 0)) - 1
-    assert choice.deviation == pytest.approx(np.abs(rows).max(), rel=1e-12)
-    assert choice.deviation > 0.1
+    assert choice.misfit == pytest.approx(np.abs(rows).max(), rel=1e-12)
+    assert choice.misfit > 0.1
     assert "no passive material" in choice.warning(1e-3)
     assert choice.warning(1.0) == ""
-    noisy = choose_memory(rv.Tabulated(ROWS, ROWS**0.4 * NOISY, noise=0.1), 10.0, 1e-3)
+    noisy = choose_memory(rv.creep_table(ROWS, ROWS**0.4 * NOISY, noise=0.1), 10.0, 1e-3)
     assert noisy.warning(1e-3) == ""
 
 

@@ -30,7 +30,7 @@ def test_fluid__flows_without_end_at_zero_frequency():
 
 def test_power_law__is_the_transform_of_its_creep():
     """C*(w) = i w int_0^inf C(t) exp(-i w t) dt, with the path turned to where the integrand dies."""
-    material, w = rv.PowerLaw(0.5, 2.0, 0.3, time_scale=0.1, poisson=0.4), 1.7
+    material, w = rv.power_law(0.5, 2.0, 0.3, time_scale=0.1, poisson=0.4), 1.7
     creep = mpmath.quad(lambda s: (mpmath.mpf(s) / (mpmath.mpc(0, w) * 0.1)) ** 0.3 * mpmath.exp(-s), [0, 1, 50])
     expected = 0.3 * (0.5 + 2.0 * complex(creep))
     np.testing.assert_allclose(complex_compliance(material, [w, -w]), [expected, np.conj(expected)], rtol=1e-9)
@@ -40,7 +40,7 @@ def test_power_law__is_the_transform_of_its_creep():
 def test_table_and_own_material__come_near_the_series_that_they_sample():
     exact = rv.zener(1.0, 0.5, 0.5)
     t = np.geomspace(1e-6, 1e6, 1200)
-    table = rv.Tabulated(tuple(t), tuple(exact.creep_compliance(t)))
+    table = rv.creep_table(tuple(t), tuple(exact.creep_compliance(t)))
     w = np.array([0.0, 0.1, 1.0, 20.0])
     np.testing.assert_allclose(complex_compliance(table, w), complex_compliance(exact, w), rtol=2e-3)
 
@@ -55,7 +55,7 @@ def test_table_and_own_material__come_near_the_series_that_they_sample():
 
 
 def test_pair__adds_both():
-    a, b = rv.PowerLaw(0.5, 2.0, 0.3), rv.zener(1.0, 1.0, 1.0)
+    a, b = rv.power_law(0.5, 2.0, 0.3), rv.zener(1.0, 1.0, 1.0)
     np.testing.assert_allclose(
         complex_compliance(rv.pair(a, b), FREQUENCIES),
         complex_compliance(a, FREQUENCIES) + complex_compliance(b, FREQUENCIES),
@@ -63,12 +63,21 @@ def test_pair__adds_both():
 
 
 def test_shift__multiplies_the_frequency():
-    for material in (rv.zener(1.0, 1.0, 1.0), rv.PowerLaw(0.5, 2.0, 0.3)):
-        shifted = complex_compliance(rv.shifted(material, 7.0), FREQUENCIES)
+    for material in (rv.zener(1.0, 1.0, 1.0), rv.power_law(0.5, 2.0, 0.3)):
+        shifted = complex_compliance(rv.shift(material, 7.0), FREQUENCIES)
         np.testing.assert_allclose(shifted, complex_compliance(material, 7.0 * FREQUENCIES), rtol=1e-12)
 
 
 def test_zero_frequency_alone__of_a_table_is_refused():
-    table = rv.Tabulated((0.1, 1.0), (1.0, 1.1))
+    table = rv.creep_table((0.1, 1.0), (1.0, 1.1))
     with pytest.raises(InputError, match="frequency is zero throughout"):
         complex_compliance(table, 0.0)
+
+
+def test_frequencies_below_those_of_a_table__are_refused():
+    """A table of creep until 1 s says nothing of an oscillation of 1 rad/s, which needs a hundred times as long."""
+    t = np.geomspace(1e-6, 1.0, 60)
+    table = rv.creep_table(t, 1 + t**0.3)
+    assert complex_compliance(table, 1e3).imag < 0
+    with pytest.raises(InputError, match="the table ends at 1 s"):
+        complex_compliance(table, 1.0)

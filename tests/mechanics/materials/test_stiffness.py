@@ -5,8 +5,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.protocol import complete
-from roughvisc.mechanics.materials.scaled import stiffened
+from roughvisc.mechanics.materials.creep import complete
+from roughvisc.mechanics.materials.derived import stiffened
 
 
 class Own:
@@ -24,8 +24,8 @@ class Own:
 
 MATERIALS = {
     "prony": rv.Prony(2e-7, fluidity=1e-8, compliances=(3e-7, 1e-7), times=(0.1, 3.0), poisson=0.4),
-    "power_law": rv.PowerLaw(1e-7, 2e-7, 0.3),
-    "tabulated": rv.Tabulated((0.0, 1.0, 10.0), (1e-7, 3e-7, 5e-7)),
+    "power_law": rv.power_law(1e-7, 2e-7, 0.3),
+    "tabulated": rv.creep_table((0.0, 1.0, 10.0), (1e-7, 3e-7, 5e-7)),
     "pair": rv.pair(rv.zener(3e6, 1e6, 1e5), rv.elastic(1e7)),
     "own": Own(),
     "bulk": rv.maxwell(1e6, 1e5, bulk_modulus=1e9),

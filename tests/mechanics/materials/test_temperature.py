@@ -12,14 +12,14 @@ GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)
 
 def test_wlf__loses_half_its_first_constant_at_the_second():
     # T - Tr = c2: log10 a = -c1 c2 / (2 c2)
-    assert rv.wlf_shift(300.0 + 51.6, 300.0, 17.44, 51.6) == pytest.approx(10 ** (-17.44 / 2), rel=1e-13)
+    assert rv.wlf(300.0 + 51.6, 300.0, 17.44, 51.6) == pytest.approx(10 ** (-17.44 / 2), rel=1e-13)
     # halfway to the pole: T - Tr = -c2/2
-    assert rv.wlf_shift(300.0 - 20.0, 300.0, 3.0, 40.0) == pytest.approx(1e3, rel=1e-13)
+    assert rv.wlf(300.0 - 20.0, 300.0, 3.0, 40.0) == pytest.approx(1e3, rel=1e-13)
 
 
 def test_arrhenius__slope_over_the_inverse_temperature_is_the_activation_energy():
     inverse = np.array([1 / 250, 1 / 300, 1 / 400])
-    logarithms = np.log([rv.arrhenius_shift(1 / one, 300.0, 6e4) for one in inverse])
+    logarithms = np.log([rv.arrhenius(1 / one, 300.0, 6e4) for one in inverse])
     assert np.diff(logarithms) / np.diff(inverse) * GAS_CONSTANT == pytest.approx(6e4, rel=1e-9)
     assert logarithms[1] == 0
     assert logarithms[0] > 0 > logarithms[2]  # the cold is slow
@@ -40,10 +40,10 @@ MATERIALS = [
     rv.elastic(2e6, 0.3),
     rv.maxwell(1e6, 1e5),
     rv.zener(3e6, 1e6, 1e5, bulk_modulus=2e9),
-    rv.PowerLaw(1e-8, 1e-6, 0.3, 7.0, 0.4),
-    rv.Tabulated((0.5, 1.0, 30.0, 700.0), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
-    rv.Tabulated((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)),
-    rv.pair(rv.elastic(8e10, 0.3), rv.PowerLaw(1e-8, 1e-6, 0.5)),
+    rv.power_law(1e-8, 1e-6, 0.3, 7.0, 0.4),
+    rv.creep_table((0.5, 1.0, 30.0, 700.0), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
+    rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)),
+    rv.pair(rv.elastic(8e10, 0.3), rv.power_law(1e-8, 1e-6, 0.5)),
     Own(),
 ]
 
@@ -51,19 +51,16 @@ MATERIALS = [
 @pytest.mark.parametrize("material", MATERIALS, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("factor", [1e-3, 40.0])
 def test_shifted__is_the_material_in_reduced_time(material, factor):
-    moved, t = rv.shifted(material, factor), np.array([0.0, 1e-3, 0.4, 6.0, 500.0])
+    moved, t = rv.shift(material, factor), np.array([0.0, 1e-3, 0.4, 6.0, 500.0])
     assert moved.contact_compliance(factor * t) == pytest.approx(material.contact_compliance(t), rel=1e-13)
     integral = material.contact_integral(t)
     assert moved.contact_integral(factor * t) == pytest.approx(factor * integral, rel=1e-12, abs=0)
-    steps = np.array([0.1, 3.0, 80.0])
-    mean = (material.contact_integral(2.0 + steps) - material.contact_integral(2.0 * np.ones(3))) / steps
-    assert moved.mean_contact_compliance(2.0 * factor, factor * steps) == pytest.approx(mean, rel=1e-12)
     assert f"{factor:g} (time-temperature shift)" in moved.note
-    assert rv.shifted(moved, 1 / factor).contact_compliance(t) == pytest.approx(material.contact_compliance(t))
+    assert rv.shift(moved, 1 / factor).contact_compliance(t) == pytest.approx(material.contact_compliance(t))
 
 
 def test_shifted__a_table_ends_later_in_the_cold():
-    cold = rv.shifted(MATERIALS[5], 10.0)
+    cold = rv.shift(MATERIALS[5], 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
     with pytest.raises(rv.InputError, match="table ends at 7000 s"):
         cold.contact_compliance(7001.0)
@@ -78,7 +75,7 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
         times = slower * np.array([0.05, 0.1, 2.1])
         return rv.simulate(height, body, program, times=times, tolerance=1e-3, progress=False)
 
-    warm, cold = run(material, 1.0), run(rv.shifted(material, 10.0), 10.0)
+    warm, cold = run(material, 1.0), run(rv.shift(material, 10.0), 10.0)
     assert cold.approach.values == pytest.approx(warm.approach.values, rel=2e-3)
     assert cold.contact_area.values == pytest.approx(warm.contact_area.values)
 
@@ -86,13 +83,13 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (lambda: rv.wlf_shift(248.0, 300.0, 17.44, 51.6), "temperature is 248 K: expected above 248.4 K"),
-        (lambda: rv.wlf_shift(300.0, 300.0, -1.0, 51.6), "c1 is -1.0: expected a positive number"),
-        (lambda: rv.arrhenius_shift(-3.0, 300.0, 1e4), r"temperature is -3.0: expected a positive number \[K\]"),
-        (lambda: rv.shifted(MATERIALS[0], 0.0), "shift factor is 0.0: expected a number from 1e-30 to 1e30"),
-        (lambda: rv.shifted(MATERIALS[0], np.nan), "shift factor is nan"),
-        (lambda: rv.shifted(MATERIALS[0], "2"), "shift factor is '2'"),
-        (lambda: rv.shifted(3.0, 2.0), "material is a float"),
+        (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature is 248 K: expected above 248.4 K"),
+        (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "c1 is -1.0: expected a positive number"),
+        (lambda: rv.arrhenius(-3.0, 300.0, 1e4), r"temperature is -3.0: expected a positive number \[K\]"),
+        (lambda: rv.shift(MATERIALS[0], 0.0), "shift factor is 0.0: expected a number from 1e-30 to 1e30"),
+        (lambda: rv.shift(MATERIALS[0], np.nan), "shift factor is nan"),
+        (lambda: rv.shift(MATERIALS[0], "2"), "shift factor is '2'"),
+        (lambda: rv.shift(3.0, 2.0), "material is a float"),
     ],
 )
 def test_shift__refuses(wrong, said):

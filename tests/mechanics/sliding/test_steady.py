@@ -263,7 +263,7 @@ def test_not_converged__says_so():
     assert max(found.residual, found.friction_residual) > 1e-6
 
 
-@pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.PowerLaw(1e-7, 1e-6, 0.3)])
+@pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.power_law(1e-7, 1e-6, 0.3)])
 def test_endless_creep__is_refused_where_waves_stand_still(material):
     with refused("material"):
         slid(ROUGH, material, 0.1, LOAD)

@@ -227,7 +227,9 @@ def test_held_approach__takes_no_work_and_turns_what_is_stored_into_heat(name):
     assert dissipated[-1] > 0.3 * stored[0]
 
 
-@pytest.mark.parametrize("material", [rv.PowerLaw(0.0, 1.0, 0.3), rv.PowerLaw(0.001, 1.0, 0.3)], ids=["pure", "glassy"])
+@pytest.mark.parametrize(
+    "material", [rv.power_law(0.0, 1.0, 0.3), rv.power_law(0.001, 1.0, 0.3)], ids=["pure", "glassy"]
+)
 def test_step_load_on_hardly_any_compliance_at_once__works_by_what_it_sinks(material):
     """Contact grows many times over in the first step: no path within it would tell the work, the approach does."""
     force, times = 1e-3, (0.25, 1.0)

@@ -128,7 +128,7 @@ def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
     """At 40 degrees the curve of 20 degrees lies at a speed that is larger by the shift factor."""
     reference = rv.run(case(TEMPERATURES), tmp_path, progress=False)
     np.testing.assert_allclose(reference.reduced_speed, reference.speed)
-    factor = rv.arrhenius_shift(313.15, 293.15, 80e3)
+    factor = rv.arrhenius(313.15, 293.15, 80e3)
     faster = [speed / factor for speed in reference.speed.values.tolist()]
     warm = vary(case(TEMPERATURES), {"material.temperature": "40 degC", "friction.speeds": faster})
     shifted = rv.run(warm, tmp_path, progress=False)

@@ -20,10 +20,14 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import BASE, Body, sheet
 from roughvisc.mechanics.bodies.layer import layer
 from roughvisc.mechanics.bodies.sheet import Base
-from roughvisc.mechanics.materials import models as materials
 from roughvisc.mechanics.materials.checks import tensile_to_shear
-from roughvisc.mechanics.materials.scaled import LARGEST_SHIFT, shifted, stiffened
-from roughvisc.mechanics.materials.temperature import arrhenius_shift, wlf_shift
+from roughvisc.mechanics.materials.creep import Material, power_law
+from roughvisc.mechanics.materials.derived import LARGEST_SHIFT, pair, shift, stiffened
+from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
+from roughvisc.mechanics.materials.temperature import arrhenius, wlf
 from roughvisc.study.statement.schema.section import (
     FilePath,
     Section,
@@ -91,9 +95,9 @@ def shift_factor(stated: Mapping[str, Any]) -> float:
     at = given["temperature"], given["reference_temperature"]
     try:
         factor = (
-            wlf_shift(*at, given["wlf_c1"], given["wlf_c2"])
+            wlf(*at, given["wlf_c1"], given["wlf_c2"])
             if "wlf_c1" in given
-            else arrhenius_shift(*at, given["activation_energy"])
+            else arrhenius(*at, given["activation_energy"])
         )
     except InputError as error:
         raise refuse("temperature", str(error).replace("temperature is", "found", 1)) from error
@@ -148,13 +152,13 @@ _LATER = {("from_relaxation", "kind"): "shear"}
 _KIND = choice("shear", "tensile")
 
 #: name of a model -> what builds it, and the kind of each of its keys; the constructor's defaults hold here too
-MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
-    "elastic": (materials.elastic, {**_SPRING, **_VOLUME}),
-    "maxwell": (materials.maxwell, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
-    "kelvin_voigt": (materials.kelvin_voigt, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
-    "zener": (materials.zener, {**_SPRING, **_KELVIN, "kelvin_viscosity": VISCOSITY, **_VOLUME}),
+MODELS: dict[str, tuple[Callable[..., Material], dict[str, Any]]] = {
+    "elastic": (elastic, {**_SPRING, **_VOLUME}),
+    "maxwell": (maxwell, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
+    "kelvin_voigt": (kelvin_voigt, {**_SPRING, "viscosity": VISCOSITY, **_VOLUME}),
+    "zener": (zener, {**_SPRING, **_KELVIN, "kelvin_viscosity": VISCOSITY, **_VOLUME}),
     "from_relaxation": (
-        materials.from_relaxation,
+        from_relaxation,
         {
             "equilibrium": measured("Pa", least=0),
             "moduli": listed(MODULUS, "moduli [Pa]"),
@@ -164,7 +168,7 @@ MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
         },
     ),
     "prony": (
-        materials.Prony,
+        Prony,
         {
             "glassy": COMPLIANCE,
             "fluidity": measured("1/(Pa s)", least=0),
@@ -174,7 +178,7 @@ MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
         },
     ),
     "power_law": (
-        materials.PowerLaw,
+        power_law,
         {
             "glassy": COMPLIANCE,
             "coefficient": measured("1/Pa", above=0),
@@ -183,8 +187,8 @@ MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
             "poisson": POISSON,
         },
     ),
-    "tabulated": (
-        materials.from_creep_table,
+    "creep_table": (
+        creep_table,
         {
             "times": INSTANTS,
             "compliances": listed(COMPLIANCE, "compliances [1/Pa]"),
@@ -194,11 +198,11 @@ MODELS: dict[str, tuple[Callable[..., materials.Material], dict[str, Any]]] = {
         },
     ),
     "relaxation_table": (
-        materials.from_relaxation_table,
+        relaxation_table,
         {"times": INSTANTS, "moduli": listed(MODULUS, "moduli [Pa]"), "kind": _KIND, "poisson": POISSON},
     ),
-    "dynamic": (
-        materials.from_dynamic,
+    "dynamic_table": (
+        dynamic_table,
         {
             "frequencies": listed(measured("1", above=0), "frequencies [frequency_unit]"),
             "storage": listed(measured("Pa", least=0), "storage moduli [Pa]"),
@@ -234,7 +238,7 @@ class Column:
 
 #: model -> its keys that the columns of ``file`` may stand for
 COLUMNS: dict[str, dict[str, Column]] = {
-    "tabulated": {
+    "creep_table": {
         "times": Column("time", "s", "time_unit"),
         "compliances": Column("compliance", "1/Pa", "compliance_unit"),
     },
@@ -242,7 +246,7 @@ COLUMNS: dict[str, dict[str, Column]] = {
         "times": Column("time", "s", "time_unit"),
         "moduli": Column("modulus", "Pa", "modulus_unit"),
     },
-    "dynamic": {
+    "dynamic_table": {
         "frequencies": Column("frequency", "", "frequency_unit"),
         "storage": Column("storage", "Pa", "modulus_unit"),
         "loss": Column("loss", "Pa", "modulus_unit"),
@@ -262,7 +266,7 @@ class MaterialSection(Section):
         """What all its times are multiplied by at its temperature."""
         return shift_factor({key: getattr(self, key) for key in TEMPERATURE})
 
-    def build(self) -> materials.Material:
+    def build(self) -> Material:
         """The material itself, at its temperature."""
         constructor, kinds = MODELS[self.model]
         stated = {key: getattr(self, key) for key in kinds}
@@ -273,14 +277,14 @@ class MaterialSection(Section):
                 if value is not None
             }
         )
-        material = material if self.shift == 1 else shifted(material, self.shift)
+        material = material if self.shift == 1 else shift(material, self.shift)
         return material if self.modulus_factor == 1 else stiffened(material, self.modulus_factor)
 
     def body(self) -> Body:
         """What is made of it: a half-space, a sheet, or a layer on what its table ``on`` says."""
         return self._body_of(self.build())
 
-    def _body_of(self, material: materials.Material) -> Body:
+    def _body_of(self, material: Material) -> Body:
         """The body of the material, which may have taken a fit."""
         thickness, base = self.sheet["thickness"], self.sheet["base"]
         below: MaterialSection | None = getattr(self, "on", None)
@@ -380,7 +384,7 @@ def _with_columns(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
         raise refuse("file", f"found beside {key}: expected one of them")
     for key in (key for key in units if not isinstance(data.get(key, ""), str)):
         raise refuse(key, f"found {shown(data[key])}: expected a unit")
-    if data["model"] == "dynamic" and data.get("frequency_unit") not in FREQUENCY_UNITS:
+    if data["model"] == "dynamic_table" and data.get("frequency_unit") not in FREQUENCY_UNITS:
         found = f"found {shown(data['frequency_unit'])}" if "frequency_unit" in data else "missing"
         raise refuse("frequency_unit", f"{found}: expected {' or '.join(map(repr, FREQUENCY_UNITS))}")
     try:
@@ -425,6 +429,6 @@ _BELOW = Annotated[
 ]
 _SINGLE.update({name: _section(name) for name in MODELS})
 _BODY = one_of(MaterialSection, _SINGLE.values(), _by_model(_SINGLE), _TABLE, _TABLE)
-MODELS["pair"] = (materials.pair, {"a": _BODY, "b": _BODY})
+MODELS["pair"] = (pair, {"a": _BODY, "b": _BODY})
 SECTIONS = {**_SINGLE, "pair": _section("pair")}
 AnyMaterial = one_of(MaterialSection, SECTIONS.values(), _by_model(SECTIONS), _TABLE, "a [material] table with a model")

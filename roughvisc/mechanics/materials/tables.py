@@ -1,0 +1,336 @@
+"""Materials from measurements: creep, relaxation, or dynamic moduli, in shear or in tension.
+
+Each table is fitted by a positive series of exponentials (non-negative least squares), which is a passive material.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.checks import Kind, check_number, check_poisson, checked_rows, tensile_to_shear
+from roughvisc.mechanics.materials.creep import Creep, series_creep
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
+from roughvisc.mechanics.materials.words import in_words
+from roughvisc.units import Quantity, quantities, said
+
+Array = NDArray[np.float64]
+
+#: Terms per decade that are offered to a fit, in turn.
+_OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
+#: A fit with fewer terms may have an rms misfit larger by this factor than the smallest one.
+_FEWER = 1.1
+#: No rheometer measures better than this rms misfit. Terms of creep are chosen later, for a program.
+_ACCURATE, _EXACT = 2e-4, 1e-7
+#: Rows per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the differences
+#: between neighbouring terms next to the misfit of the rows.
+_FEW, _SMOOTH, _STEPS = 4, 3, 0.01
+#: Terms are offered beyond the first and the last row by these factors: a slower one is a plateau, a faster one is
+#: not seen.
+_FASTER, _SLOWER = 10.0, 3.0
+#: Largest ratio of the times of neighbouring rows without a warning.
+_DECADE = 10.0 * (1 + 1e-9)
+
+
+@quantities(times="s", compliances="1/Pa")
+def creep_table(
+    times: Sequence[Quantity],
+    compliances: Sequence[Quantity],
+    kind: Kind = "shear",
+    noise: float = 0.0,
+    poisson: float = 0.5,
+) -> Creep:
+    """Material from a creep test: ``J(t)`` in shear, or ``D(t)`` in tension with ``J = 2 (1 + nu) D``.
+
+    Parameters
+    ----------
+    times : sequence of float or str
+        Times in increasing order; the first may be zero. [s]
+    compliances : sequence of float or str
+        ``J`` or ``D`` at these times. [1/Pa]
+    kind : {"shear", "tensile"}
+        Kind of the compliance.
+    noise : float
+        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Deviations of the fit from
+        the rows by less than it are not warned of.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Creep
+        A positive series of exponentials fitted to the rows, up to the last row and not beyond. Its ``note`` states
+        the number of terms and the misfit.
+
+    Raises
+    ------
+    InputError
+        If a row is negative, not finite, not in increasing order of time, zero after time zero, or lower than an
+        earlier one by more than the noise; the message names the row, counted from 0. Programs longer than the table
+        are refused later.
+
+    Notes
+    -----
+    A compliance at time zero is the instantaneous compliance. Before a first row at a later time, the first decade of
+    rows is extrapolated to time zero as a power of time or by a decade of logarithmic creep, whichever falls less, and
+    to a tenth of the first row at least.
+    """
+    factor = tensile_to_shear(kind, poisson)
+    t, values = checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
+    check_number("noise", noise, "1", zero=True)
+    check_poisson(poisson)
+    for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
+        raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
+    ascending = _ascending(t, values, noise)
+    later = t > 0
+    rows, measured = t[later], values[later]
+    glassy = float(ascending[0]) if t[0] == 0 else _instantaneous(rows, ascending)
+
+    def columns(tau: Array) -> Array:
+        return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
+
+    weights, tau = _fitted(columns, rows, measured, measured - glassy, measured, _EXACT)
+    misfit = (glassy + columns(tau) @ weights) / measured - 1
+    note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
+    if t[0] > 0:
+        note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
+    fitted = Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:].tolist()), tuple(tau.tolist()))
+    largest = float(np.abs(misfit).max())
+    stated: dict[str, tuple[Any, str]] = {"times": (t.tolist(), "s"), "compliances": (values.tolist(), "1/Pa")}
+    stated |= {"noise": (noise, "1")} if noise else {}
+    return Creep(
+        series_creep,
+        (fitted,),
+        poisson,
+        float(t[-1]),
+        label=in_words("creep_table", poisson, "", **stated),
+        note=note,
+        warning=_gap("creep", rows),
+        misfit=largest if largest > noise else 0.0,
+    )
+
+
+@quantities(times="s", moduli="Pa")
+def relaxation_table(
+    times: Sequence[Quantity], moduli: Sequence[Quantity], kind: Kind = "shear", poisson: float = 0.5
+) -> Prony:
+    """Material from a relaxation test, by a positive series of exponentials.
+
+    Parameters
+    ----------
+    times : sequence of float or str
+        Times in increasing order; the first may be zero. [s]
+    moduli : sequence of float or str
+        ``G`` or ``E`` at these times. [Pa]
+    kind : {"shear", "tensile"}
+        Kind of the modulus; ``G = E / (2 (1 + nu))``.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Prony
+        Its ``note`` states the number of terms, the misfit at the rows, and the measured times.
+
+    Raises
+    ------
+    InputError
+        If a row is negative, not finite, or not in increasing order of time; the row is named, counted from 0.
+
+    Notes
+    -----
+    ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
+    ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.from_relaxation`, which is exact. Outside the
+    measured times its slowest and its fastest terms determine the series.
+    """
+    t, values = checked_rows(("time", "modulus"), times, moduli)
+    for row in np.flatnonzero(values == 0)[:1]:
+        raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
+    shear = values / tensile_to_shear(kind, poisson)
+    later = t > 0
+
+    def columns(theta: Array) -> Array:
+        return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
+
+    fitted, theta = _fitted(columns, t[later], shear[later], shear, shear, _ACCURATE)
+    misfit = columns(theta) @ fitted / shear - 1
+    note = _note(theta.size + 1, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
+    return _relaxing(fitted, theta, poisson, note)
+
+
+@quantities(storage="Pa", loss="Pa")
+def dynamic_table(
+    frequencies: Sequence[float],
+    storage: Sequence[Quantity],
+    loss: Sequence[Quantity],
+    *,
+    frequency_unit: Literal["rad/s", "Hz"],
+    shift_factors: ArrayLike | None = None,
+    kind: Kind = "shear",
+    poisson: float = 0.5,
+) -> Prony:
+    """Material from dynamic moduli, a master curve if shift factors are given, by a positive series.
+
+    Parameters
+    ----------
+    frequencies : sequence of float
+        Frequencies in any order; several temperatures may overlap. [`frequency_unit`]
+    storage, loss : sequence of float or str
+        ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
+    frequency_unit : {"rad/s", "Hz"}
+        Angular frequency, or cycles per second. There is no default, because the wrong one changes all times by the
+        factor 2 pi.
+    shift_factors : sequence of float, optional
+        ``a_T`` of each row (or one for all), the factor for its frequency.
+    kind : {"shear", "tensile"}
+        Which moduli; ``G = E / (2 (1 + nu))``.
+    poisson : float
+        Poisson ratio, constant in time.
+
+    Returns
+    -------
+    Prony
+        Its ``note`` states the number of terms, the misfit at the rows, and the measured frequencies.
+
+    Raises
+    ------
+    InputError
+        If a number is negative or not finite, or a frequency or a shift factor is not positive; the row is named.
+
+    Notes
+    -----
+    ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
+    are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
+    it is smaller. A large misfit means that the two moduli do not belong to one passive material.
+    """
+    if frequency_unit not in ("rad/s", "Hz"):
+        raise InputError(f"frequency_unit is {frequency_unit!r}: expected 'rad/s' or 'Hz'")
+    given = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    factors = np.ones(given.size) if shift_factors is None else np.asarray(shift_factors, dtype=float)
+    factors = np.full(given.size, float(factors)) if factors.ndim == 0 else factors
+    names = ("frequency", "storage modulus", "loss modulus", "shift factor")
+    given, elastic, viscous, factors = checked_rows(names, given, storage, loss, factors, ascending=False)
+    omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
+    for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
+        raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
+    factor = tensile_to_shear(kind, poisson)
+    elastic, viscous = elastic / factor, viscous / factor
+    least = 1e-3 * np.hypot(elastic, viscous)
+    target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
+
+    def columns(theta: Array) -> Array:
+        x = omega[:, None] * theta
+        in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
+        return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
+
+    fitted, theta = _fitted(columns, 1 / omega, np.hypot(elastic, viscous), target, scale, _ACCURATE)
+    misfit = (columns(theta) @ fitted - target) / scale
+    span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
+    note = _note(theta.size + 1, omega.size, misfit, span, _gap("dynamic", np.unique(1 / omega)))
+    return _relaxing(fitted, theta, poisson, note)
+
+
+def _fitted(
+    columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, accurate: float
+) -> tuple[Array, Array]:
+    """Return the non-negative weights of a series and its times. [s]
+
+    Parameters
+    ----------
+    columns : callable
+        Function of the times; the first of its columns has no time. It is fitted to `target`, relative to `scale`.
+    at, course : ndarray
+        Times of the measurements [s] and their values, by which the size of a term is judged.
+    accurate : float
+        An rms misfit below which nothing is gained.
+
+    Notes
+    -----
+    The fit with the fewest terms among those with about the smallest misfit. Few rows can be met in many ways: then
+    the spectrum with small differences between neighbouring terms is taken.
+    """
+    order = np.argsort(at)
+    at, course = at[order], course[order]
+    within = float(at[0]) / _FASTER, float(at[-1]) * _SLOWER
+    fits = []
+    sparse = np.unique(at).size - 1 < _FEW * np.log10(at[-1] / at[0])
+    for per_decade in (_SMOOTH,) if sparse else _OFFERED:
+        times = lattice(*within, per_decade)
+        offered = columns(times)
+        steps = np.diff(np.diag(_STEPS / np.interp(np.log(times), np.log(at), course)), axis=0)[: sparse * times.size]
+        rows = np.vstack([offered / scale[:, None], np.pad(steps, ((0, 0), (1, 0)))])
+        weights = nonnegative(rows, np.append(target / scale, np.zeros(len(steps))), np.ones(len(rows)))
+        rms = float(np.sqrt(np.mean(((offered @ weights - target) / scale) ** 2)))
+        used = np.flatnonzero(weights[1:])
+        fits.append((rms, np.append(weights[0], weights[1:][used]), times[used]))
+    enough = max(_FEWER * min(rms for rms, _, _ in fits), accurate)
+    _, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)
+    return weights, times
+
+
+def _relaxing(fitted: Array, theta: Array, poisson: float, note: str) -> Prony:
+    """Return the material of an equilibrium modulus and of moduli [Pa] with their times. [s]"""
+    found = from_relaxation(float(fitted[0]), fitted[1:].tolist(), theta.tolist(), poisson)
+    return dataclasses.replace(found, note=note)
+
+
+def _note(terms: int, rows: int, misfit: Array, span: str, gap: str = "") -> str:
+    rms = float(np.sqrt(np.mean(misfit**2)))
+    fit = f"{terms} terms fitted to {rows} rows, largest misfit {np.abs(misfit).max():.2g}, rms {rms:.2g} (relative)"
+    return "; ".join(filter(None, (f"{fit}, {span}", gap)))
+
+
+def _gap(kind: str, times: Array) -> str:
+    """Warn of neighbouring rows more than a decade apart; empty if there are none.
+
+    Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones.
+    """
+    ratio, before, after = max(((b / a, a, b) for a, b in pairwise(times.tolist())), default=(1.0, 0.0, 0.0))
+    if not ratio > _DECADE:
+        return ""
+    return (
+        f"The {kind} table has no row between {said(before, 's')} and {said(after, 's')}, more than a decade: the "
+        "material between them is a guess, and stated errors do not include it. Use at least one row per decade."
+    )
+
+
+def _instantaneous(times: Array, compliances: Array) -> float:
+    """Return the compliance at time zero of a table that begins later, [1/Pa], from the course of its first decade.
+
+    The course is a power law ``J(0) + a t^alpha`` through both ends and the middle of the decade, or logarithmic creep
+    that began a decade earlier, whichever falls less. An exponent above one counts as one.
+    """
+    first, span = float(compliances[0]), min(10.0, times[-1] / times[0])
+    at = np.log(times[0]) + np.log(span) * np.array([0.5, 1.0])
+    middle, end = (float(value) for value in np.interp(at, np.log(times), compliances))
+    ratio = min((end - middle) / (middle - first), np.sqrt(span)) if middle > first else np.sqrt(span)
+    power = (middle - first) / (ratio - 1) if ratio > 1 else np.inf
+    logarithmic = (end - first) / np.log(span) * (1 + np.log(10))
+    return first - min(power, logarithmic, 0.9 * first)
+
+
+def _ascending(times: Array, compliances: Array, noise: float) -> Array:
+    """Return the compliances made to increase by isotonic regression. [1/Pa]"""
+    highest = np.maximum.accumulate(compliances)
+    drops = 1 - compliances / np.where(highest > 0, highest, 1.0)
+    drops[highest == 0] = 0.0
+    for row in np.flatnonzero(drops > noise)[:1]:
+        raise InputError(
+            f"table row {row}: compliance {compliances[row]:g} 1/Pa at {times[row]:g} s is {drops[row]:.2%} below an "
+            f"earlier row, noise is {noise:g}: expected an ascending compliance, or a larger noise"
+        )
+    if not drops.any():
+        return compliances
+    # equal weights of relative deviations; a compliance of zero comes first and does not move
+    weights = (highest[-1] / np.where(compliances > 0, compliances, highest[-1])) ** 2
+    return np.maximum.accumulate(scipy.optimize.isotonic_regression(compliances, weights=weights).x)

@@ -1,0 +1,341 @@
+"""Materials from measurements: known materials are found again, in shear, in tension, and along a master curve."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import examples
+from support import refused
+
+import roughvisc as rv
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.series import series
+
+# --- creep ----------------------------------------------------------------------------------------------------------
+
+ROWS = np.geomspace(1e-3, 1e3, 60)
+CREEP = {
+    "power": lambda t: 0.5 + t**0.3,
+    "stretched": lambda t: 1 - 5 * np.expm1(-(t**0.4)),
+    "logarithm": lambda t: 1 + 0.3 * np.log1p(t / 1e-2),
+    "one exponential": lambda t: 1 - 4 * np.expm1(-t / 0.37),
+}
+
+
+def off(material, curve, t=None):
+    """Largest relative deviation of the creep compliance from a curve."""
+    t = np.geomspace(1e-3, 1e3, 500) if t is None else t
+    return float(np.abs(material.creep_compliance(t) / curve(t) - 1).max())
+
+
+def stated_misfit(material):
+    return float(re.search(r"largest misfit ([\d.e+-]+)", material.note)[1])
+
+
+@pytest.mark.parametrize("name", CREEP)
+@pytest.mark.parametrize(("rows", "most"), [(7, 0.03), (13, 6e-3), (25, 1e-3), (60, 1e-3)])
+def test_creep_table__finds_the_creep_between_the_rows(name, rows, most):
+    """From a row a decade on; the rows themselves are met as stated."""
+    t = np.geomspace(1e-3, 1e3, rows)
+    material = rv.creep_table(t, CREEP[name](t))
+    assert off(material, CREEP[name]) < most
+    assert off(material, CREEP[name], t) == pytest.approx(stated_misfit(material), rel=0.06, abs=1e-12)
+    assert material.misfit == pytest.approx(stated_misfit(material), rel=0.06, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", CREEP)
+@pytest.mark.parametrize("seed", range(3))
+def test_creep_table__finds_the_curve_below_the_noise(name, seed):
+    """The rows are off by the noise, the curve that they were made from by less; with few terms."""
+    noise = 1 + 0.03 * np.random.default_rng(seed).standard_normal(ROWS.size)
+    material = rv.creep_table(ROWS, CREEP[name](ROWS) * noise, noise=0.4)
+    found = material.creep_compliance(ROWS)
+    assert np.sqrt(np.mean((found / (CREEP[name](ROWS) * noise) - 1) ** 2)) == pytest.approx(0.03, rel=0.35)
+    assert np.sqrt(np.mean((found / CREEP[name](ROWS) - 1) ** 2)) < 0.02
+    assert material.misfit == 0, "within the noise"
+    terms = [len(series(material, 1e-3, 1e3, tolerance)[0].times) for tolerance in (1e-3, 1e-5)]
+    assert max(terms) <= 15
+
+
+def test_creep_table__is_the_same_material_whatever_the_tolerance():
+    """A stricter tolerance comes nearer to one curve, and never to another."""
+    noise = 1 + 0.03 * np.random.default_rng(2).standard_normal(ROWS.size)
+    material = rv.creep_table(ROWS, CREEP["power"](ROWS) * noise, noise=0.4)
+    found = {tolerance: series(material, 1e-3, 1e3, tolerance)[0] for tolerance in (1e-2, 1e-3, 1e-12)}
+    for tolerance in (1e-2, 1e-3):
+        assert off(found[tolerance], found[1e-12].creep_compliance) <= tolerance
+
+
+def test_creep_table__has_about_the_least_largest_deviation():
+    """A jump from 1 to 3 between neighbouring rows: no ascending curve without it is nearer than half way, 50 %."""
+    times = np.array([0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9])
+    material = rv.creep_table(times, (0.0, 1.0, 3.0, 3.0))
+    assert 0.5 <= material.misfit < 1.2
+
+
+#: creep -> its compliance at time zero
+BEGINNINGS = {
+    "power": (lambda t: 2 + t**0.5, 2.0),
+    "almost all at once": (lambda t: 2 - np.exp(-t / 0.4), 1.0),
+    "stretched": (lambda t: 1 - 5 * np.expm1(-(t**0.4)), 1.0),
+}
+
+
+@pytest.mark.parametrize("name", BEGINNINGS)
+def test_before_the_first_row__creep_goes_on_as_it_does_after(name):
+    creep, at_once = BEGINNINGS[name]
+    t = np.geomspace(1e-3, 10.0, 60)
+    table = rv.creep_table(t, creep(t))
+    assert float(table.creep_compliance(0.0)) == pytest.approx(at_once, rel=0.04, abs=0)
+    early = np.geomspace(1e-5, 1e-3, 50)
+    assert table.creep_compliance(early) == pytest.approx(creep(early), rel=0.08, abs=0)
+    assert "nothing was measured before 0.001 s: instantaneous compliance of " in table.note
+
+
+def test_before_the_first_row__a_logarithm_goes_on_for_a_decade():
+    t = np.geomspace(2.0, 2e3, 20)
+    first = 5 + 0.1 * np.log(2)
+    table = rv.creep_table(t, 5.0 + 0.1 * np.log(t))
+    assert float(table.creep_compliance(0.0)) == pytest.approx(first - 0.1 * (1 + np.log(10)), rel=1e-12, abs=0)
+    assert rv.creep_table((2.0, 4.0), (5.0, 5.0)).creep_compliance(0.0) == 5.0
+    assert rv.creep_table((2.0, 4.0), (5.0, 15.0)).creep_compliance(0.0) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda table, t: table.creep_compliance([1.0, t]),
+        lambda table, t: table.contact_compliance(t),
+        lambda table, t: table.contact_integral(t),
+        lambda table, t: series(table, 1.0, t, 1e-3),
+        lambda table, t: rv.pair(table, rv.elastic(1.0)).contact_compliance(t),
+    ],
+)
+def test_creep_table__is_not_extrapolated(ask):
+    table = rv.creep_table((0.0, 1.0, 100.0), (1.0, 3.0, 7.0), poisson=0.0)
+    ask(table, 100.0 * (1 + 1e-13))  # rounding of a sum of steps
+    with pytest.raises(InputError, match=r"and the table ends at 100 s"):
+        ask(table, 101.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "compliances", "message"),
+    [
+        ((0, 1, 2), (1, -2, 3), r"table row 1: compliance is -2: expected a finite number, not negative"),
+        ((0, 1, 2), (1, 2, np.nan), r"table row 2: compliance is nan"),
+        ((0, np.inf, 2), (1, 2, 3), r"table row 1: time is inf"),
+        ((-1, 1, 2), (1, 2, 3), r"table row 0: time is -1"),
+        ((0, 2, 1), (1, 2, 3), r"table row 2: time 1 after 2: expected ascending time"),
+        ((0, 2, 2), (1, 2, 3), r"table row 2: time 2 after 2"),
+        ((0, 1), (1, 2, 3), r"table has 2 of time, 3 of compliance: expected as many, at least two"),
+        ((1,), (1,), r"at least two"),
+        ((0, 1, 2), (1, 2, 1.9), r"table row 2: compliance 1\.9 1/Pa at 2 s is 5\.00% below an earlier row"),
+        ((0, 1, 2), (0, 0, 4), r"table row 1: compliance is 0 at 1 s: expected a positive compliance"),
+    ],
+)
+def test_bad_table__names_the_row(times, compliances, message):
+    with pytest.raises(InputError, match=message):
+        rv.creep_table(times, compliances)
+
+
+@pytest.mark.parametrize(("key", "found"), [("noise", -0.1), ("noise", np.nan), ("poisson", 0.6), ("kind", "bulk")])
+def test_bad_number__is_named(key, found):
+    with refused(key, found):
+        rv.creep_table((0, 1), (1, 2), **{key: found})
+
+
+def test_noise__counts_from_the_largest_earlier_row():
+    """Small decreases that add up are no noise."""
+    with pytest.raises(InputError, match="table row 3"):
+        rv.creep_table((0, 1, 2, 3), (1.0, 0.996, 0.992, 0.988), noise=0.01)
+    rv.creep_table((0, 1, 2, 3), (1.0, 0.996, 0.992, 0.988), noise=0.02)
+
+
+@given(st.lists(st.floats(0.96, 1.04), min_size=4, max_size=30), st.floats(0.05, 0.9))
+@examples(60)
+def test_noisy_table__ascends_within_the_noise(noise, exponent):
+    t = np.geomspace(1e-3, 1e3, len(noise))
+    raw = t**exponent * np.array(noise)
+    table = rv.creep_table(t, raw, noise=0.08)
+    assert np.abs(table.creep_compliance(t) / raw - 1).max() <= 0.09
+    sampled = table.creep_compliance(np.geomspace(1e-4, 1e3, 500))
+    assert (np.diff(sampled) >= -1e-15 * sampled[1:]).all()
+
+
+def test_creep_table__is_a_plain_value():
+    a, b = rv.creep_table([0, 1], [1, 2]), rv.creep_table(np.array([0.0, 1.0]), (1, 2))
+    assert a == b
+    assert hash(a) == hash(b)
+    assert a != rv.creep_table((0, 1), (1, 3))
+
+
+def test_creep_table__in_tension():
+    t, shear = (0.0, 1.0, 2.0), (1.0, 2.0, 3.0)
+    tensile = rv.creep_table(t, np.array(shear) / (2 * 1.3), kind="tensile", poisson=0.3)
+    exact = rv.creep_table(t, shear, poisson=0.3)
+    assert tensile.creep_compliance(t) == pytest.approx(exact.creep_compliance(t), rel=1e-6)
+    assert tensile.poisson == 0.3
+
+
+# --- relaxation and dynamic moduli ----------------------------------------------------------------------------------
+
+EQUILIBRIUM, MODULI, TIMES = 1e5, np.array([3e6, 2e6, 5e5]), np.array([2e-3, 0.07, 4.0])
+EXACT = rv.from_relaxation(EQUILIBRIUM, MODULI, TIMES, poisson=0.4)
+SPAN = np.geomspace(1e-3, 10.0, 300)
+
+
+def relaxation(t):
+    return EQUILIBRIUM + np.exp(-np.asarray(t)[:, None] / TIMES) @ MODULI
+
+
+def dynamic(omega):
+    x = omega[:, None] * TIMES
+    return EQUILIBRIUM + x**2 / (1 + x**2) @ MODULI, x / (1 + x**2) @ MODULI
+
+
+def distance(material, t=SPAN):
+    return np.abs(material.contact_compliance(t) / EXACT.contact_compliance(t) - 1).max()
+
+
+def modulus(material, t):
+    equilibrium, moduli, times = material.relaxation_spectrum()
+    return equilibrium + np.exp(-t[:, None] / times) @ moduli
+
+
+@pytest.mark.parametrize("first", [(), (0.0,)])
+def test_relaxation_table__finds_the_creep(first):
+    t = np.append(first, np.geomspace(1e-4, 100.0, 80))
+    material = rv.relaxation_table(t, relaxation(t), poisson=0.4)
+    assert distance(material) < 5e-3
+    assert stated_misfit(material) < 0.01
+    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to {t.size} rows")
+    assert material.note.endswith(f"times {t[0]:g} to 100 s")
+    # the misfit stated is that of the rows
+    misfit = np.abs(modulus(material, t) / relaxation(t) - 1).max()
+    assert stated_misfit(material) == pytest.approx(misfit, rel=0.06, abs=0)
+
+
+def test_relaxation_table__in_tension():
+    t = np.geomspace(1e-4, 100.0, 60)
+    shear = rv.relaxation_table(t, relaxation(t), poisson=0.3)
+    tensile = rv.relaxation_table(t, 2.6 * relaxation(t), kind="tensile", poisson=0.3)
+    assert tensile.contact_compliance(SPAN) == pytest.approx(shear.contact_compliance(SPAN), rel=1e-6, abs=0)
+
+
+def test_relaxation_table__of_one_exponential_needs_few_terms():
+    t = np.geomspace(1e-3, 1e3, 50)
+    generator = np.random.default_rng(5)
+    noisy = (1 + np.exp(-t / 0.37)) * (1 + 0.01 * generator.standard_normal(50))
+    material = rv.relaxation_table(t, noisy)
+    assert len(material.times) <= 3
+    exact = rv.from_relaxation(1.0, (1.0,), (0.37,))
+    assert material.creep_compliance(t) == pytest.approx(exact.creep_compliance(t), rel=0.03, abs=0)
+
+
+@pytest.mark.parametrize(("noise", "most"), [(0.0, 24), (0.01, 18), (0.03, 18)])
+def test_relaxation_table__spends_few_terms(noise, most):
+    """A wide spectrum over 8 decades: some two terms a decade, each of them a field to remember."""
+    t = np.geomspace(1e-4, 1e4, 100)
+    exact = 1e5 + 1e6 * t**-0.3
+    material = rv.relaxation_table(t, exact * (1 + noise * np.random.default_rng(1).standard_normal(100)))
+    assert len(material.times) <= most
+    assert modulus(material, t) == pytest.approx(exact, rel=max(2 * noise, 1e-3))
+
+
+WIDE = {
+    "power": lambda t: 1e5 + 1e6 * t**-0.3,
+    "stretched": lambda t: 1e5 + 2e6 * np.exp(-((t / 0.1) ** 0.4)),
+    "logarithm": lambda t: 2e6 / (1 + 0.3 * np.log1p(t / 1e-4)),
+}
+
+
+@pytest.mark.parametrize(("rows", "most"), [(6, 0.05), (12, 4e-3), (30, 1e-3)])
+@pytest.mark.parametrize("name", WIDE)
+def test_relaxation_table__follows_a_wide_spectrum_between_few_rows(name, rows, most):
+    """The terms that meet the rows with the fewest would be up to 33 % off."""
+    t, between = np.geomspace(1e-4, 1e2, rows), np.geomspace(1e-4, 1e2, 500)
+    material = rv.relaxation_table(t, WIDE[name](t))
+    assert np.abs(modulus(material, between) / WIDE[name](between) - 1).max() <= most
+
+
+def test_relaxation_table__says_where_rows_are_missing():
+    t = np.array([1e-3, 1e-2, 1.0, 10.0])
+    assert "no row between 10 ms and 1 s, more than a decade" in rv.relaxation_table(t, relaxation(t)).note
+
+
+def test_relaxation_table__of_an_elastic_material_is_elastic():
+    material = rv.relaxation_table([0.0, 1.0, 2.0], [2.0, 2.0, 2.0])
+    assert material.times == ()
+    assert material.glassy == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("rad/s", 1.0), ("Hz", 2 * np.pi)])
+def test_dynamic_table__finds_the_creep(unit, factor):
+    omega = np.geomspace(1e-2, 1e4, 60)
+    material = rv.dynamic_table(omega / factor, *dynamic(omega), frequency_unit=unit, poisson=0.4)
+    assert distance(material) < 0.01
+    assert stated_misfit(material) < 0.02
+    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to 60 rows")
+    assert material.note.endswith("frequencies 0.01 to 10000 rad/s")
+
+
+def test_dynamic_table__shift_factors_make_a_master_curve():
+    """Three temperatures, each over two decades, in any order."""
+    window = np.geomspace(1.0, 100.0, 15)
+    shifts = np.repeat([1.0, 1e-2, 1e2], 15)
+    frequencies = np.tile(window, 3)
+    material = rv.dynamic_table(
+        frequencies, *dynamic(frequencies * shifts), frequency_unit="rad/s", shift_factors=shifts, poisson=0.4
+    )
+    assert distance(material) < 0.01
+    assert material.note.endswith("frequencies 0.01 to 10000 rad/s")
+    same = rv.dynamic_table(window, *dynamic(window * 10), frequency_unit="rad/s", shift_factors=10.0, poisson=0.4)
+    assert same == rv.dynamic_table(window * 10, *dynamic(window * 10), frequency_unit="rad/s", poisson=0.4)
+
+
+def test_dynamic_table__in_tension():
+    omega = np.geomspace(1e-2, 1e4, 60)
+    shear = rv.dynamic_table(omega, *dynamic(omega), frequency_unit="rad/s", poisson=0.4)
+    storage, loss = dynamic(omega)
+    tensile = rv.dynamic_table(omega, 2.8 * storage, 2.8 * loss, frequency_unit="rad/s", kind="tensile", poisson=0.4)
+    assert tensile.contact_compliance(SPAN) == pytest.approx(shear.contact_compliance(SPAN), rel=1e-6, abs=0)
+
+
+def test_dynamic_table__fits_the_loss_as_well():
+    """Storage moduli alone leave the loss open; a loss that contradicts them shows in the misfit."""
+    omega = np.geomspace(1e-2, 1e4, 60)
+    storage, loss = dynamic(omega)
+    assert stated_misfit(rv.dynamic_table(omega, storage, 3 * loss, frequency_unit="rad/s")) > 0.3
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: rv.creep_table((0, 1), (1, 2), kind="tensile", poisson=0.7), r"poisson is 0\.7"),
+        (lambda: rv.creep_table((0, 1), (1, -2), kind="tensile"), r"table row 1: compliance is -6"),
+        (lambda: rv.relaxation_table((0, 1, 1), (3, 2, 1)), r"table row 2: time 1 after 1: expected ascending time"),
+        (lambda: rv.relaxation_table((0, 1), (1, 0)), r"table row 1: modulus is 0: expected a positive modulus"),
+        (lambda: rv.relaxation_table((0, 1), (1, np.nan)), r"table row 1: modulus is nan"),
+        (lambda: rv.dynamic_table((1, 2), (1, 2), (1, 2), frequency_unit="1/s"), r"frequency_unit is '1/s'"),
+        (lambda: rv.dynamic_table((1, 0), (1, 2), (1, 2), frequency_unit="Hz"), r"table row 1: a frequency, a shift"),
+        (lambda: rv.dynamic_table((1, 2), (0, 2), (0, 2), frequency_unit="Hz"), r"table row 0: .* both moduli are 0"),
+        (lambda: rv.dynamic_table((1, 2), (1, 2), (1, -2), frequency_unit="Hz"), r"table row 1: loss modulus is -2"),
+        (
+            lambda: rv.dynamic_table((1, 2), (1, 2), (1, 2), frequency_unit="Hz", shift_factors=(1,)),
+            r"2 of frequency, 2 of storage modulus, 2 of loss modulus, 1 of shift factor: expected as many",
+        ),
+    ],
+)
+def test_bad_input__is_named(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_many_rows__are_fitted_as_few_are():
+    """Thousands of rows of one curve, taken linearly in time, are the curve."""
+    t = np.linspace(1e-2, 10.0, 3001)
+    assert off(rv.creep_table(t, CREEP["stretched"](t)), CREEP["stretched"], t) < 1e-4
+    material = rv.relaxation_table(t, WIDE["stretched"](t))
+    assert np.abs(modulus(material, t) / WIDE["stretched"](t) - 1).max() < 2e-3
