@@ -59,8 +59,9 @@ def simulate(
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the given
         grid, absent cells included.
-    boundary : {"auto", "free", "periodic"}
-        ``free`` for an indenter, ``periodic`` for a nominally flat scan. ``auto`` is ``free`` for the indenters of
+    boundary : {"auto", "free", "periodic", "mirror"}
+        ``free`` for an indenter; ``mirror`` for a nominally flat scan, which then repeats with its mirror images;
+        ``periodic`` for one that repeats as it is. ``auto`` is ``free`` for the indenters of
         this package, and ``periodic`` for its waves, its self-affine roughness and any surface with its mirror images
         (:func:`roughvisc.mirror`), as long as their heights are unchanged; any other surface needs an explicit choice.
     tolerance : float
@@ -142,6 +143,7 @@ def friction(
     load: Quantity | None = None,
     pressure: Quantity | None = None,
     direction: Direction = "x",
+    boundary: Boundary = Settings.boundary,
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] = (),
     grid_error: bool = Settings.grid_error,
@@ -164,6 +166,9 @@ def friction(
         Load [N] or nominal pressure [Pa]: one of them.
     direction : {"x", "-x", "y", "-y"}
         In which the profile moves.
+    boundary : {"auto", "periodic", "mirror"}
+        ``mirror``: the surface is unfolded first, by :func:`roughvisc.mirror`, and the result has four times the cells;
+        expects a nominal pressure. ``auto`` is ``periodic``.
     tolerance : float
         Tolerance on the iteration errors of pressure (L1, over the load) and friction (relative).
     fields : sequence of str
@@ -211,11 +216,7 @@ def friction(
     1
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
-    settings = Settings(
-        tolerance=tolerance,
-        fields=fields,
-        grid_error=grid_error,
-    )
+    settings = Settings(boundary=boundary, tolerance=tolerance, fields=fields, grid_error=grid_error)
     problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
     return _warned(found.assign_attrs(title="Steady sliding"), 4)

@@ -49,14 +49,14 @@ class Problem:
         found = known_boundary(self.settings, only, partial(boundary_of, self.height))
         if found is None:
             name = self.height.attrs.get("source_file", "height")
-            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.format(mirror='rv.mirror').replace(' = ', '=')}")
+            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
         return self.on(self.height, boundary=found)
 
     def check_cells(self) -> None:
         """Refuse a surface on whose cells the body's kernel is not accurate in free space.
 
-        With periodic boundaries the transfer function is exact on any cells. Coarser copies of a surface are not
-        refused.
+        With periodic and mirror boundaries the transfer function is exact on any cells. Coarser copies of a surface are
+        not refused.
         """
         if self.settings.boundary == "free":
             dx, dy = spacing(self.height, "height")

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.mechanics.grid import transform_library
 
 Array = NDArray[Any]
 #: Writes the field of a row to an array of zeros, and gives that.

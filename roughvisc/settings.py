@@ -21,7 +21,7 @@ from roughvisc.units import in_si, quantity, range_in_words, within
 from roughvisc.variables import FIELDS
 
 #: ``auto`` becomes one of the others by :func:`known_boundary`
-Boundary = Literal["auto", "free", "periodic"]
+Boundary = Literal["auto", "free", "periodic", "mirror"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
 TimeStep = float | str | Literal["auto"]
@@ -175,8 +175,9 @@ class Settings(Numerics):
 
     boundary: Boundary = setting(
         "auto",
-        "free space, for an indenter; periodic, for a nominally flat scan; auto: the one that the surface was made for",
-        '"periodic"',
+        "free space, for an indenter; periodic or mirror, for a nominally flat scan that repeats as it is or with its "
+        "mirror images; auto: the one that the surface was made for",
+        '"mirror"',
         in_attributes=True,
         always_in_key=True,
     )
@@ -246,15 +247,15 @@ WORD_OR_NUMBER: dict[str, str] = {
 #: What is said of ``auto`` where nothing tells the boundary, as a study file has it; in Python ``=`` has no spaces.
 OPEN_BOUNDARY = """\
 is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
-  a nominally flat scan that stands for a larger surface: boundary = "periodic"; if opposite borders differ much, \
-mirror it first ({mirror})
+  a nominally flat scan that stands for a larger surface: boundary = "mirror"; boundary = "periodic" if it \
+repeats as it is
   an indenter or a single bump whose contact stays inside: boundary = "free"
   a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
 
 
 def known_boundary(
     stated: Any, only: Literal["free", "periodic"] | None, made_for: Callable[[], Literal["free", "periodic"] | None]
-) -> Literal["free", "periodic"] | None:
+) -> Literal["free", "periodic", "mirror"] | None:
     """Boundary of a solve: the one that is stated, or what ``auto`` stands for; None where it has to be stated.
 
     Parameters

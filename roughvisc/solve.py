@@ -71,6 +71,7 @@ def solve(
     )
     for name, found, why in experiment.unsupported(problem.settings):
         raise InputError(f"{name} is {found!r}: {why}")
+    problem = experiment.prepared(problem)
     problem.check_cells()
     height, settings, count = problem.height, problem.settings, threads_for(threads)
     again = settings.grid_error and not experiment.states_grid_error

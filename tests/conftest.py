@@ -19,7 +19,7 @@ import strategies  # noqa: F401  (loads the profile of the random examples)
 from matplotlib.figure import Figure
 
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.study.execution import run as run_module
 
 
@@ -27,13 +27,13 @@ from roughvisc.study.execution import run as run_module
 def solved_on(monkeypatch):
     """Shapes of the grids that were solved on, in order."""
     shapes = []
-    begin = Operator.__init__
+    begin = Grid.__init__
 
     def noted(self, shape, *rest, **named):
         shapes.append(shape)
         begin(self, shape, *rest, **named)
 
-    monkeypatch.setattr(Operator, "__init__", noted)
+    monkeypatch.setattr(Grid, "__init__", noted)
     return shapes
 
 

@@ -7,7 +7,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary
@@ -112,7 +112,7 @@ def scene(material, program, *, shape=(31, 28), size=1.6, **settings):
     gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * UNIT_RADIUS)
     boundary = settings.pop("boundary", "free")
     acts_on = settings.pop("acts_on", "displacement")
-    return Scene(Operator(shape, spacing, boundary), gap, material, Modes(material, acts_on), program, **settings)
+    return Scene(Grid(shape, spacing, boundary), gap, material, Modes(material, acts_on), program, **settings)
 
 
 STEP_LOAD = rv.Program().load(0.05, over=0).hold(2.0)

@@ -3,7 +3,7 @@
 import pytest
 from references.closed_cases import CASES
 
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 
 
@@ -27,8 +27,8 @@ def test_expected_errors__shrink_with_the_grid_down_to_the_tolerance():
 
 def scaled_displacement(monkeypatch):
     """A kernel one per cent too soft."""
-    sound = Operator.displacement
-    monkeypatch.setattr(Operator, "displacement", lambda self, *given: 1.01 * sound(self, *given))
+    sound = Grid.displacement
+    monkeypatch.setattr(Grid, "displacement", lambda self, *given: 1.01 * sound(self, *given))
 
 
 def forgetful_recursion(monkeypatch):

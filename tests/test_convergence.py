@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -41,7 +41,7 @@ def run(material, program, times, shape=(19, 17)):
     gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * radius)
     program = scaled(program, load)
     memory = choose_memory(material, DURATION, 1e-7).memory
-    scene = Scene(Operator(shape, spacing), gap, material, memory, program, tuple(times), 1e-9, time_step=1e9)
+    scene = Scene(Grid(shape, spacing), gap, material, memory, program, tuple(times), 1e-9, time_step=1e9)
     steps = [s for s in march(scene) if np.isclose(s.shown.time, COMMON, rtol=0, atol=1e-9).any()]
     unique = {round(s.shown.time, 9): s.shown for s in steps}
     assert len(unique) == COMMON.size

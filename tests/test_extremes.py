@@ -2,7 +2,6 @@
 
 import logging
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.mechanics.bodies import operator as operators
+from roughvisc.mechanics import grid as grids
 from roughvisc.mechanics.closed_forms import growing_contact
 
 long = pytest.mark.long
@@ -449,14 +448,11 @@ def test_fields_not_kept__are_neither_stored_nor_paid_for():
 
 
 def test_periodic__is_not_padded(monkeypatch):
-    sizes = set()
-    sound = operators.transforms(mirrored=False)
-    watched = replace(
-        sound,
-        of_field=lambda field, **kw: sizes.add(field.shape) or sound.of_field(field, **kw),
-        of_rows=lambda *a, **kw: pytest.fail("a padded transform"),
-    )
-    monkeypatch.setattr(operators, "transforms", lambda mirrored: watched)
+    sizes, sound = set(), grids.transforms()
+    watched = grids.transforms()
+    watched.waves = lambda field: sizes.add(field.shape) or sound.waves(field)
+    watched.rows = lambda *given: pytest.fail("a padded transform")
+    monkeypatch.setattr(grids, "transforms", lambda *given: watched)
     simulate(ROUGH, ZENER, rv.Program().load(1e-3, over=0.1), boundary="periodic")
     assert sizes == {ROUGH.shape}
 

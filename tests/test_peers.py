@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support import rough_gap
 
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 
 tamaas = pytest.importorskip("tamaas")
 
@@ -35,6 +35,6 @@ def test_rough_contact__agrees_with_tamaas(boundary, mean):
     # even sizes: on odd ones Tamaas 2.9 takes the highest wave number for a Nyquist one (displacement off by 5e-5)
     gap = rough_gap((64, 64), slope=0.7)
     expected = tamaas_pressure(gap, mean, boundary)
-    state = solve_contact(Operator(gap.shape, (1.0, 1.0), boundary), gap, load=mean * gap.size, tolerance=1e-12)
+    state = solve_contact(Grid(gap.shape, (1.0, 1.0), boundary), gap, load=mean * gap.size, tolerance=1e-12)
     assert np.sum(np.abs(state.pressure - expected)) < 1e-8 * np.sum(expected)
     assert np.mean(state.pressure > 0) == pytest.approx(np.mean(expected > 0), abs=0.5 / gap.size)

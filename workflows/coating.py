@@ -23,8 +23,10 @@ PRESSURE = 1e5  # Pa
 
 
 def main(cells=80, figure="coating.png", speeds=SPEEDS):
-    height = rv.mirror(rv.resample(rv.open_scan(SCAN), (cells, 8 * cells // 5)))
-    curves = {one: rv.friction(height, body(one), pressure=PRESSURE, speeds=speeds) for one in THICKNESSES}
+    height = rv.resample(rv.open_scan(SCAN), (cells, 8 * cells // 5))
+    curves = {
+        one: rv.friction(height, body(one), pressure=PRESSURE, speeds=speeds, boundary="mirror") for one in THICKNESSES
+    }
     fig = Figure(figsize=(11, 3.4), layout="constrained")
     compliance, friction, area = fig.subplots(1, 3)
     draw_compliance(fig, compliance)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import remade
 from roughvisc.topography.resampling import resample
@@ -44,8 +44,8 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
         Of the surface. [m]
     factor : float
         How many times longer the cells are.
-    boundary : {"free", "periodic"}
-        Of the run: with "periodic" every surface repeats.
+    boundary : {"free", "periodic", "mirror"}
+        Of the run: with "periodic" every surface repeats, with "mirror" it does with its mirror images.
     """
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
@@ -54,7 +54,7 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
 
 def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Boundary) -> xr.DataArray:
     """A surface with the waves that a coarser grid can hold. [m]"""
-    return resample(height, shape, periodic=True if boundary == "periodic" else None)
+    return resample(height, shape, periodic={"periodic": True, "mirror": False}.get(boundary))
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:

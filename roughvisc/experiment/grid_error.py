@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser, pressure_distance
 from roughvisc.mechanics.contact.neighbours import neighbours
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.indenters import grown
 from roughvisc.variables.axes import AXES, axis_of
 from roughvisc.variables.grid_errors import GRID_ERROR
@@ -236,7 +237,7 @@ def _left_open(dataset: xr.Dataset, row: int) -> tuple[float, float, float]:
     if not contact.any():
         return 0.0, 0.0, 0.0
     present = np.isfinite(dataset["height"].values)
-    at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"] == "periodic")
+    at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"])
     counted = counting_error(contact, faces)
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
@@ -303,10 +304,10 @@ def counting_error(contact: Mask, faces: int) -> float:
     return _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
 
 
-def _edge(contact: Mask, free: Mask, periodic: bool) -> tuple[Mask, Mask, int, int]:
+def _edge(contact: Mask, free: Mask, boundary: Boundary) -> tuple[Mask, Mask, int, int]:
     """Cells in contact beside present cells out of contact, and beside none at all; faces to either."""
     at_edge, at_end, faces, ends = np.zeros_like(contact), np.zeros_like(contact), 0, 0
-    for beside, material in zip(neighbours(free, periodic), neighbours(free | contact, periodic), strict=True):
+    for beside, material in zip(neighbours(free, boundary), neighbours(free | contact, boundary), strict=True):
         here = contact & beside
         faces += int(np.count_nonzero(here))
         at_edge |= here

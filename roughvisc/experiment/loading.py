@@ -25,7 +25,7 @@ from roughvisc.experiment.notes import (
     tolerance_note,
     wake_note,
 )
-from roughvisc.experiment.profile import Profile, quarter, unfold, uses_window
+from roughvisc.experiment.profile import Profile, uses_window
 from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.resources import least_rows, march_bytes, require_memory
 from roughvisc.experiment.scene import build_scene, kept_times, memory_options, slide_note, snap_to_cells
@@ -198,9 +198,7 @@ class LoadingRows(Rows):
         height, body, settings = problem.height, problem.body, problem.settings
         self._problem, self._settings, self._start = problem, settings, state
         require_memory(problem, program, in_memory=in_memory)
-        self.profile = Profile(
-            height, settings.missing, follow=uses_window(settings), mirror=not program.slides, kernel=body.kernel
-        )
+        self.profile = Profile(height, settings.missing, follow=uses_window(settings), kernel=body.kernel)
         self._scene, self._choice = build_scene(self.profile, body, program, settings)
         self._followed = not self.profile.window.whole
         log.info("memory: %s", self._choice.note)
@@ -329,12 +327,8 @@ class LoadingRows(Rows):
         """A field of a row over the final surface, written to ``out``, which holds zeros."""
         facts = records.plain[number]["facts"]
         window = self.profile.window_at(facts["corner"], facts["shape"])
-        touched = out[window.surface_cells] if name == "pressure" else out  # zeros that stay cost nothing
-        if self.profile.mirrored:
-            self._fill(records, name, number, window, touched[quarter(touched.shape)])
-            unfold(touched)
-        else:
-            self._fill(records, name, number, window, touched)
+        touched = out[window.cells] if name == "pressure" else out  # zeros that stay cost nothing
+        self._fill(records, name, number, window, touched)
         return out
 
     def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
@@ -344,11 +338,11 @@ class LoadingRows(Rows):
         repeats = settings.boundary == "periodic"
         warnings = {
             "slope": slope_note(
-                profile.height[profile.window.surface_cells],
+                profile.height[profile.window.cells],
                 settings.boundary,
                 approach - profile.least_gap,  # below the highest cell
             ),
-            "border": border_note(profile.height, dataset) if repeats and not profile.mirrored else "",
+            "border": border_note(profile.height, dataset) if repeats else "",
             "edge": "" if self._border is None else edge_note(self._border),
             "wake": self._wake_note(dataset),
             "slide": slide_note(scene.program, profile.spacing),

@@ -176,7 +176,7 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
         sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
-    return note + " Use mirror = true under [surface]."
+    return note + " Use boundary = 'mirror'."
 
 
 def edge_note(time: float) -> str:
@@ -205,13 +205,12 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
     ----------
     height : DataArray, dims (x, y)
         The rigid profile. [m]
-    boundary : {"free", "periodic"}
+    boundary : {"free", "periodic", "mirror"}
         In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
     approach : float
         The largest at kept times, from the highest cell. [m]
     """
-    periodic = boundary == "periodic"
-    slope = rms_slope(height, periodic, np.inf if periodic else approach)
+    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else np.inf)
     if not slope > LARGEST_SLOPE:
         return ""
     return (

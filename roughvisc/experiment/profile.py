@@ -1,4 +1,4 @@
-"""The profile that is pressed: the labelled surface, its mirror images, and the part of it that is solved on."""
+"""The profile that is pressed: the labelled surface, and the part of it that is solved on."""
 
 from __future__ import annotations
 
@@ -13,27 +13,14 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.bodies.window import Window, whole_domain, window_around
+from roughvisc.mechanics.grid import Boundary, Grid
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Missing, Settings
-from roughvisc.topography.borders import is_mirrored
 from roughvisc.topography.grid import checked, nominal_area, spacing
 from roughvisc.topography.indenters import grown, highest
 
 Array = NDArray[np.float64]
-
-
-def quarter(shape: tuple[int, ...]) -> tuple[slice, slice]:
-    """The quarter of a surface at the end of both axes, which begins in its middle."""
-    return slice(shape[0] // 2, None), slice(shape[1] // 2, None)
-
-
-def unfold(field: Array) -> None:
-    """Fill a field from that quarter of it, in place."""
-    nx, ny = field.shape[0] // 2, field.shape[1] // 2
-    field[nx:, :ny] = field[nx:, : ny - 1 : -1]
-    field[:nx] = field[: nx - 1 : -1]
 
 
 #: A window, and the grid of an analytic profile, grow by this factor a time; the latter no farther than so many cells.
@@ -56,8 +43,6 @@ class Profile:
         What missing heights mean.
     follow : bool
         Whether to begin with a small window, where all of the surface is present.
-    mirror : bool
-        Whether to solve on a quarter of a surface that is its own mirror image in x and in y.
     kernel : Kernel
         Of the body that it is pressed on; under one that raises the surface there is no window.
     """
@@ -68,29 +53,24 @@ class Profile:
         missing: Missing = Settings.missing,
         *,
         follow: bool = False,
-        mirror: bool = False,
         kernel: Kernel = HALF_SPACE,
     ) -> None:
         self._missing = missing
         self.kernel = kernel
         self.growths = 0
         height = _checked(height, missing)
-        self.mirrored = mirror and is_mirrored(height.values)
         self._lay_out(height)
         #: Area that nominal pressures refer to: that of the surface as it was given. [m2]
         self.nominal_area = nominal_area(height)
         self._extent = float(_FIRST_EXTENT)
         if follow and not kernel.raises_surface and self.all_present and min(height.shape) >= _WORTH_FOLLOWING:
-            self.window = window_around(self.gap, _FIRST_EXTENT, self.mirrored)
+            self.window = window_around(self.gap, _FIRST_EXTENT)
 
     def _lay_out(self, height: xr.DataArray) -> None:
         self.height = height
         self._can_grow: bool | None = None  # not known yet
-        cells = quarter(height.shape) if self.mirrored else ...
-        #: What is solved for: the surface, or the quarter of it at the end of both axes.
-        self.domain = height[cells]
-        values = self.domain.values
-        self._centres = self.domain["x"].values, self.domain["y"].values
+        values = height.values
+        self._centres = height["x"].values, height["y"].values
         self.present: NDArray[np.bool_] = np.isfinite(values)
         self.all_present = bool(self.present.all())
         #: Height of the highest point, which on an indenter may lie between the cells. [m]
@@ -103,7 +83,7 @@ class Profile:
         #: Its mean over the present cells. [m]
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
         self.spacing = spacing(self.height, "height")
-        self.window = whole_domain((values.shape[0], values.shape[1]), self.mirrored)
+        self.window = whole_domain((values.shape[0], values.shape[1]))
 
     @property
     def corner(self) -> tuple[float, float]:
@@ -111,9 +91,9 @@ class Profile:
         (i, j), (x, y) = self.window.first, self._centres
         return float(x[i]), float(y[j])
 
-    def operator(self, boundary: Boundary, workers: int | None = None) -> Operator:
+    def operator(self, boundary: Boundary, workers: int | None = None) -> Grid:
         """The body under the window's grid."""
-        return Operator(self.window.shape, self.spacing, boundary, workers, mirrored=self.mirrored, kernel=self.kernel)
+        return Grid(self.window.shape, self.spacing, boundary, workers, kernel=self.kernel)
 
     def contact_fraction(self, area: float) -> float:
         """Contact area over the area of the surface. [-]"""
@@ -146,7 +126,7 @@ class Profile:
         before = self.window
         while self.window == before:
             self._extent *= GROWTH
-            self.window = window_around(self.gap, int(self._extent), self.mirrored, former=before)
+            self.window = window_around(self.gap, int(self._extent), former=before)
 
     def of_scene(self) -> dict[str, Any]:
         """What a scene takes from the surface."""
@@ -163,7 +143,7 @@ class Profile:
     def window_at(self, corner: Sequence[float], shape: Sequence[int]) -> Window:
         """A window of the present domain that was solved on before: its first cell's centre and its shape."""
         first = (self._cell(0, corner[0]), self._cell(1, corner[1]))
-        return Window(self.window.domain, first, (shape[0], shape[1]), mirrored=self.mirrored)
+        return Window(self.window.domain, first, (shape[0], shape[1]))
 
 
 def _checked(height: xr.DataArray, missing: Missing) -> xr.DataArray:

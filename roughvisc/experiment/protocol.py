@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import ENTRIES, Settings
@@ -156,6 +156,10 @@ class Experiment(Protocol):
         InputError
             If problem and experiment do not go together; nothing has been computed then.
         """
+
+    def prepared(self, problem: Problem) -> Problem:
+        """Return the problem as it is computed. Default: unchanged."""
+        return problem
 
     @abstractmethod
     def content(self) -> Any:

@@ -26,7 +26,6 @@ from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_mem
 from roughvisc.problem import Problem
 from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
-from roughvisc.topography.borders import is_mirrored
 from roughvisc.topography.grid import counts, nominal_area
 
 _PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
@@ -161,7 +160,7 @@ _SURFACE = 2.1
 #: of whole fields, and the separation.
 _ELASTIC, _IN_CONTACT, _NARROW = 7.0, 11.0, 1.5
 #: Spectrum, symbols and what a transform gives.
-_TRANSFORMS = {"periodic": 2.0, "free": 6.0}
+_TRANSFORMS = {"periodic": 2.0, "mirror": 2.0, "free": 6.0}
 #: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
 #: and after a step, and in the checkpoint that may be asked for.
 _COMPANION, _EXPONENTIAL = 1.5, 5.2
@@ -276,7 +275,7 @@ def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> No
     Parameters
     ----------
     problem, program : Problem, Program
-        Of the case. A surface that is its own mirror image is solved on a quarter.
+        Of the case.
     in_memory : bool
         Whether the kept fields stay in memory.
 
@@ -299,10 +298,6 @@ def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> No
     there = memory_available()
     if there.fits(needed(cells)):
         return
-    if part and is_mirrored(height.values):
-        part = 0.25
-        if there.fits(needed(cells)):
-            return
     one, periodic = replace(settings, fields=settings.fields[:1]), replace(settings, boundary="periodic")
     savings = []
     if in_memory and there.fits(needed(cells, in_memory=False)):

@@ -16,8 +16,8 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.kernel import has_finite_mean
-from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Boundary, Grid
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice
 from roughvisc.mechanics.hereditary.memory import ActsOn
 from roughvisc.mechanics.materials.creep import Material, complete
@@ -201,6 +201,13 @@ def check_slides(program: Program, settings: Settings, spacing: Spacing) -> None
     """
     if not program.slides:
         return
+    if settings.boundary == "mirror":
+        raise InputError(
+            key="boundary",
+            found="mirror",
+            expected="'periodic' for a program that slides, on the unfolded surface rv.mirror(height): mirror images "
+            "would slide towards each other",
+        )
     if settings.boundary != "periodic":
         raise InputError(
             "boundary is 'free' and the program slides: in free space the wake of the profile leaves the grid at its "
@@ -283,8 +290,8 @@ def build_scene(profile: Profile, body: Body, program: Program, settings: Settin
     material = complete(body.material)
     (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), profile.gap[profile.present])
-    if settings.boundary == "periodic" and profile.all_present and not has_finite_mean(profile.kernel):
-        _check_approach(program, profile.mean_gap)
+    if settings.boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):
+        _check_approach(program, profile.mean_gap, settings.boundary)
     foreseen = 0.0 if profile.window.whole else _foreseen(profile, program, material)
     while profile.window.outside <= foreseen:
         profile.widen_window()
@@ -322,12 +329,12 @@ def _foreseen(profile: Profile, program: Program, material: Material) -> float:
     stride = math.ceil(max(profile.height.shape) / _FORESEEN_ON)
     gap = profile.gap[::stride, ::stride]
     dx, dy = (stride * side for side in profile.spacing)
-    operator = Operator((gap.shape[0], gap.shape[1]), (dx, dy), mirrored=profile.mirrored, kernel=profile.kernel)
+    operator = Grid((gap.shape[0], gap.shape[1]), (dx, dy), kernel=profile.kernel)
     load = value * glassy / operator.cell_area
     return solve_contact(operator, gap, load=load, tolerance=1e-2).approach
 
 
-def _check_approach(program: Program, full: float) -> None:
+def _check_approach(program: Program, full: float, boundary: Boundary) -> None:
     """Refuse an approach beyond the one of full contact, which has none: pressure may rise without limit there.
 
     Where cells are absent the half-space bulges into them, and every approach has its force.
@@ -336,7 +343,7 @@ def _check_approach(program: Program, full: float) -> None:
         largest = (segment.end or 0.0) + abs(segment.amplitude)
         if segment.control == "approach" and segment.end is not None and largest >= full:
             raise InputError(
-                f"program.{i}: approach goes to {largest:.6g} m, and with periodic boundaries contact is full at "
+                f"program.{i}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is full at "
                 f"{full:.6g} m: expected less"
             )
 

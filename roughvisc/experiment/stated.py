@@ -33,14 +33,13 @@ def staircase_area(contact: NDArray[np.bool_], scene: Scene) -> float:
     """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
 
     The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
-    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact.
+    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact. Under the
+    mirror boundary a cell's neighbour beyond the border is its own image, so there is no edge either.
     """
     free = ~contact if scene.present is None else scene.present & ~contact
-    periodic, mirrored = scene.operator.boundary == "periodic", scene.operator.mirrored
     goes_on = scene.outside < math.inf  # beyond the window, where nothing touches
-    # beyond a mirror a cell's neighbour is its image
-    outside = {"before": goes_on and not mirrored, "beyond": goes_on}
-    return staircase(contact, free, scene.operator.cell_area, periodic and not mirrored, **outside)
+    periodic = scene.operator.boundary == "periodic"
+    return staircase(contact, free, scene.operator.cell_area, periodic, before=goes_on, beyond=goes_on)
 
 
 def uncertain_cells(step: Step, contact: NDArray[np.bool_]) -> tuple[float, float]:

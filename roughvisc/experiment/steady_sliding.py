@@ -29,12 +29,13 @@ from roughvisc.experiment.resources import curve_bytes, require_memory_of_curve
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.sliding.steady import SteadyState
 from roughvisc.mechanics.stepping.program import Direction
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
+from roughvisc.topography.framing import mirror
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
@@ -116,13 +117,26 @@ class SteadySliding(Experiment):
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """What has no meaning where a whole surface slides, repeats without end, and never started."""
-        if settings.boundary != self.boundary:
-            yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic'"
+        if settings.boundary not in ("periodic", "mirror"):
+            yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic' or 'mirror'"
+        if settings.boundary == "mirror" and self.load is not None:
+            yield (
+                "boundary",
+                "mirror",
+                "the surface is unfolded to four times its area: expected a pressure",
+            )
         if "displacement" in settings.fields:
             yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
         if settings.missing != "refuse":
             yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
         yield from super().unsupported(settings)
+
+    def prepared(self, problem: Problem) -> Problem:
+        """Return the problem on the unfolded surface under the mirror boundary: sliding breaks the symmetry."""
+        if problem.settings.boundary != "mirror":
+            return problem
+        log.info("the surface is unfolded: it slides with its mirror images, on four times as many cells")
+        return problem.on(mirror(problem.height), boundary="periodic")
 
     def content(self) -> Any:
         """What differs from the defaults."""
@@ -135,7 +149,7 @@ class SteadySliding(Experiment):
 
     def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
         """Memory of one speed. [byte]"""
-        return curve_bytes(settings, cells)
+        return curve_bytes(settings, cells * (4 if settings.boundary == "mirror" else 1))
 
     def creep_time(self, size: float) -> float:
         """Of the longest wave, at the lowest speed. [s]"""

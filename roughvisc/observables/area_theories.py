@@ -73,8 +73,8 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     need_history(dataset, "force", "height")
     if dataset["force"].dims != ("time",):
         raise InputError(f"the force has dimensions {dataset['force'].dims}: choose one case first")
-    if dataset.attrs.get("boundary") != "periodic":
-        raise InputError("the theories are of surfaces without borders: expected a result with periodic boundaries")
+    if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
+        raise InputError("the theories are of surfaces without borders: expected boundary = 'periodic' or 'mirror'")
     attributes = dataset.attrs
     for body in ("thickness", "kernel"):
         if body in attributes:
@@ -85,7 +85,8 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     strain = _effective(known, steps["time"].values, steps["force"].values / area, kept)
     falling = np.diff(steps["force"].values) < -1e-9 * float(steps["force"].max())
     last = steps["time"].values[int(np.argmax(falling))] if falling.any() else math.inf
-    strain = np.where(kept <= last, strain / rms_slope(dataset["height"], periodic=True), np.nan)
+    slope = rms_slope(dataset["height"], periodic=attributes["boundary"] == "periodic")
+    strain = np.where(kept <= last, strain / slope, np.nan)
     found = {
         "persson_contact_area": ("time", area * persson_fraction(strain)),
         "asperity_contact_area": ("time", area * asperity_fraction(strain)),

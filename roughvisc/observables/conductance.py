@@ -31,7 +31,7 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     -------
     xarray.Dataset
         Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], and its error. Zero without contact;
-        infinite in full contact with periodic boundaries. The attribute ``resistivity`` states those of the two bodies.
+        infinite in full contact unless space is free. The attribute ``resistivity`` states those of the two bodies.
 
     Raises
     ------
@@ -44,8 +44,8 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     All spots are at one potential, and far away each body is at its own potential: :math:`G = 2k / (\rho_1 + \rho_2)`
     with the stiffness :math:`k` of a flat punch of the same spots over the contact modulus [1]_; a single disc has
     :math:`4a / (\rho_1 + \rho_2)`. Each body conducts like a half-space, even if it is a sheet. With periodic
-    boundaries the conductance is that of the constriction alone, for one period; the resistance of the bulk is not
-    included. Nothing flows through the gap, and films on the spots have no resistance.
+    or mirror boundaries the conductance is that of the constriction alone, for these cells; the resistance of the bulk
+    is not included. Nothing flows through the gap, and films on the spots have no resistance.
 
     References
     ----------

@@ -70,7 +70,7 @@ def over_frames(dataset: xr.Dataset, measure: Callable[..., tuple[float, ...]], 
     """What a function of contact, present cells, spacing and boundary gives of every frame; lazily on Dask."""
     touching = contact(dataset)
     present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
-    boundary = "periodic" if dataset.attrs.get("boundary") == "periodic" else "free"
+    boundary = dataset.attrs.get("boundary", "free")
     of_frame = partial(measure, spacing=spacing(dataset, "spots"), boundary=boundary)
     return frame_by_frame(of_frame, touching, present, outputs=outputs)
 

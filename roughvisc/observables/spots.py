@@ -60,7 +60,7 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
     ----------
     dataset : xarray.Dataset
         A result with ``pressure`` or ``gap``. If its attribute ``boundary`` is ``"periodic"``, clusters continue across
-        opposite borders.
+        opposite borders. If it is ``"mirror"``, a cluster counts with its part inside the border.
 
     Returns
     -------

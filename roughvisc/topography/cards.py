@@ -151,8 +151,8 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
         Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
         plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
         cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate, or a table of ``number`` and ``seed``), ``resample`` (cells) and ``mirror``. They act in this
-        order; false leaves a step out.
+        a surrogate, or a table of ``number`` and ``seed``) and ``resample`` (cells). They act in this order; false
+        leaves a step out.
 
     Returns
     -------
@@ -182,20 +182,20 @@ def boundary_after(
     Parameters
     ----------
     steps : mapping
-        As :func:`condition` takes them. ``mirror`` and ``realisation`` make any surface periodic; turns, cuts of short
-        waves and other numbers of cells leave a periodic one so; all else leaves open what lies beyond the border.
+        As :func:`condition` takes them. ``realisation`` makes any surface periodic; turns, cuts of short waves and
+        other numbers of cells leave a periodic one so; all else leaves open what lies beyond the border.
     made : {"free", "periodic"} or None
         Boundary that the surface was made for.
 
     Examples
     --------
-    >>> boundary_after({"level": 1, "mirror": True}, None), boundary_after({"level": 1}, "free")
+    >>> boundary_after({"level": 1, "realisation": 1}, None), boundary_after({"level": 1}, "free")
     ('periodic', None)
     """
     for step in _STEPS:
         if steps.get(step, False) is not False:
             kept = made == "periodic" and step in _KEEP_PERIOD
-            made = "periodic" if kept or step in ("mirror", "realisation") else None
+            made = "periodic" if kept or step == "realisation" else None
     return made
 
 
@@ -306,7 +306,6 @@ _STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
     "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
     "realisation": _realisation,
     "resample": conditioning.resample,
-    "mirror": _switch("mirror", conditioning.mirror),
 }
 #: Steps that leave a surface that repeats one that does.
 _KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")

@@ -272,8 +272,9 @@ def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
 def mirror(h: xr.DataArray) -> xr.DataArray:
     """Add the mirror images of a surface, so that it repeats without a step.
 
-    The result is twice as long along each axis, and slopes reverse at the seams. Contact with periodic boundaries is
-    solved on a quarter of it, and costs no more than that of the surface itself.
+    The result is twice as long along each axis, and slopes reverse at the seams. Contact of a surface and its mirror
+    images is solved on the surface's own cells by ``boundary="mirror"``; this function is for surfaces that slide and
+    for other programs.
 
     Parameters
     ----------
@@ -290,17 +291,17 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     for axis, d in zip(("x", "y"), spacing(h), strict=True):
         axes[axis] = (axis, float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d, h[axis].attrs)
     maps = {
-        name: (("x", "y"), _with_images(one.transpose("x", "y").values), one.attrs)
+        name: (("x", "y"), with_images(one.transpose("x", "y").values), one.attrs)
         for name, one in h.coords.items()
         if set(one.dims) == {"x", "y"}
     }
     alone = {name: one.variable for name, one in h.coords.items() if not one.dims}
-    doubled = xr.DataArray(_with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
+    doubled = xr.DataArray(with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
     return noted(doubled, MIRRORED, period=period_of(doubled))
 
 
-def _with_images(values: np.ndarray) -> np.ndarray:
-    """A map and its mirror images, written where they belong: no part of it is held twice."""
+def with_images(values: np.ndarray) -> np.ndarray:
+    """Return a map and its mirror images: one period."""
     nx, ny = values.shape
     whole = np.empty((2 * nx, 2 * ny), values.dtype)
     whole[:nx, :ny] = values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy.ndimage
@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.topography.borders import BorderMismatch, border_mismatch
 from roughvisc.topography.cards import condition
 from roughvisc.topography.conditioning import crop, fill, gaussian_filter, level, mask_outliers
-from roughvisc.topography.grid import cell_edges, checked, filled_points, require_heights, spacing
+from roughvisc.topography.grid import cell_edges, checked, filled_points, nominal_area, require_heights, spacing
 from roughvisc.topography.missing_points import in_large_holes
 from roughvisc.topography.parameters import parameters
 from roughvisc.topography.spectrum import psd
@@ -86,11 +86,13 @@ class Inspection:
     rms_slope, kurtosis : float
         Of the surface after the steps; Gaussian heights have a kurtosis of 3. [-]
     area : float
-        Of the surface after the steps, mirror images included. [m2]
+        Of the surface after the steps. [m2]
     shape : pair of int
         Points of the surface after the steps.
     steps : dict
         Conditioning steps as surface cards and studies write them.
+    boundary : {"periodic", "mirror"}
+        Boundary with which the surface repeats without a step.
     """
 
     points: int
@@ -109,6 +111,7 @@ class Inspection:
     area: float
     shape: tuple[int, int]
     steps: dict[str, Any]
+    boundary: Literal["periodic", "mirror"]
 
     @property
     def form_share(self) -> float:
@@ -155,8 +158,6 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
         steps["filter"] = float(f"{noise.wavelength:.2g}")
         steps["filter"] = max(steps["filter"], 3.001 * max(spacing(treated)))
         treated = gaussian_filter(treated, steps["filter"])
-    steps |= {"mirror": True} if borders.jumps else {}
-    images = 2 if borders.jumps else 1
     measures = parameters(treated)
     return Inspection(
         points=points,
@@ -172,9 +173,10 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
         noise=noise,
         rms_slope=float(measures["Sdq"]),
         kurtosis=float(measures["Sku"]),
-        area=float(np.prod([images * n * d for n, d in zip(treated.shape, spacing(treated), strict=True)])),
-        shape=(images * treated.shape[0], images * treated.shape[1]),
+        area=nominal_area(treated),
+        shape=(treated.shape[0], treated.shape[1]),
         steps=steps,
+        boundary="mirror" if borders.jumps else "periodic",
     )
 
 

@@ -82,7 +82,7 @@ VARIABLES: dict[str, Variable] = {
         _FRAME,
         "m",
         "normal displacement",
-        "of the half-space's surface; positive into the half-space; with periodic boundaries its mean is zero",
+        "of the half-space's surface; positive into the half-space; its mean is zero unless space is free",
         short="displacement",
         cell_methods="x: y: point",
     ),
@@ -102,11 +102,11 @@ VARIABLES: dict[str, Variable] = {
         "m",
         "rigid-body approach",
         "from first touch; "
-        "free space: against the undeformed plane; periodic: against the mean plane of the half-space's surface, which "
-        "is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells if any are "
-        "absent; while the contact is open: the value at which it would just close; first touch is at the highest "
-        "cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while mean_gap "
-        "(periodic) does",
+        "free space: against the undeformed plane; periodic and mirror: against the mean plane of the half-space's "
+        "surface, which is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells "
+        "if any are absent; while the contact is open: the value at which it would just close; first touch is at the "
+        "highest cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while "
+        "mean_gap (periodic and mirror) does",
         ancillary=("approach_error", "grid_error_approach"),
         short="approach",
         every_step=True,

@@ -103,8 +103,7 @@ def test_periodic__approach_is_the_mean_undeformed_gap_less_the_mean_gap():
         pressed(even, rv.Program().approach(1.001 * full, over=0), boundary="periodic")
 
 
-def test_quarter__and_whole_surface_count_from_one_apex():
-    """A grid even along one axis only is solved as a whole, one even along both by a quarter."""
+def test_even_and_odd_grids__count_from_one_apex():
     load, approach = hertz_or_sneddon("cone")
     found = [
         float(pressed(rv.cone(1.0, (n / 6, m / 6), (n, m)), rv.Program().load(load, over=0)).approach[0])

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment import profile
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 from roughvisc.study.statement.case import Case
 
 FIELDS = ("pressure", "gap", "displacement")
@@ -64,13 +63,13 @@ RAMP = rv.Program().load(1e-4, over=0.1).hold(0.3)
 SMALL = rv.Program().load(1e-5, over=0.1)
 JUMP = rv.Program().load(1e-4, over=0).hold(0.3)
 PATHS = {
-    "free, mirrored, window": (rv.sphere(1e-3, 4e-4, (160, 128)), RAMP, {}),
+    "free, window": (rv.sphere(1e-3, 4e-4, (160, 128)), RAMP, {}),
     "free, odd, window foreseen": (rv.sphere(1e-3, 4e-4, (129, 111)), JUMP, {}),
     "free, grows": (rv.sphere(1e-3, 3e-5, 24), SMALL, {}),
     "free, absent cells": (rv.flat_punch(5e-5, 2e-4, (40, 30)), JUMP, {"edge": "accept"}),
     "free, grid error": (rv.sphere(1e-3, 1.2e-4, (45, 40)), SMALL, {"grid_error": True}),
     "periodic, grid error": (rv.wavy(1e-6, 1e-4, 2e-4, (48, 45)), JUMP, {"boundary": "periodic", "grid_error": True}),
-    "periodic, mirrored, approach": (
+    "periodic, approach": (
         rv.wavy(1e-6, 1e-4, 1e-4, 32),
         rv.Program().approach(5e-7, over=0.1),
         {"boundary": "periodic"},
@@ -109,7 +108,7 @@ def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
     kernel, n = Screened(0.05), 256
     x = np.arange(n) - n / 2
     gap = (x[:, None] ** 2 + x**2) / 2000
-    body = Operator((n, n), (1.0, 1.0), kernel=kernel)
+    body = Grid((n, n), (1.0, 1.0), kernel=kernel)
     found = solve_contact(body, gap, load=200.0, tolerance=1e-7)
     guessed = solve_contact(body, gap, load=200.0, tolerance=1e-7, start=np.ones((n, n)))
     assert found.pressure == pytest.approx(guessed.pressure, abs=1e-5 * guessed.pressure.max())
@@ -136,11 +135,10 @@ def test_cases__keep_their_kernel(no_half_space, monkeypatch, tmp_path):
     assert found.attrs["kernel"] == repr(Screened(5e4))
 
 
-@pytest.mark.parametrize("path", ["free, mirrored, window", "periodic, mirrored, approach"])
-def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeypatch):
+@pytest.mark.parametrize("path", ["free, window", "periodic, approach"])
+def test_another_kernel__gives_the_same_without_window(path):
     kernel = Screened(5e4)
     quick = pressed(path, kernel)
-    monkeypatch.setattr(profile, "is_mirrored", lambda height: False)
     slow = pressed(path, replace(kernel, raises_surface=True))
     for name in ("force", "approach", "mean_gap"):
         assert quick[name].values == pytest.approx(slow[name].values, rel=2e-3), name
@@ -150,7 +148,7 @@ def test_another_kernel__gives_the_same_without_window_and_mirrors(path, monkeyp
 
 
 def test_preconditioner__knows_the_mean():
-    body = Operator((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
+    body = Grid((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
     pressure = 1 + np.random.default_rng(1).random((12, 15))
     back = body.inverse(body.displacement(pressure).astype(np.float32))
     assert back == pytest.approx(pressure, rel=1e-5)

@@ -107,8 +107,7 @@ def test_distance__is_told_where_it_is_not_of_whole_cells():
     assert "slide:" not in slid(PRESS.slide(0.5 * SIDE, speed=0.1), times=1).attrs.get("warnings", "")
 
 
-def test_mirror_images__do_not_slide_apart():
-    """A surface that is its own mirror image is solved whole, and leans into the motion."""
+def test_symmetric_surface__leans_into_the_motion():
     ds = slid(PRESS.slide(SIDE, speed=0.1), times=1, fields=("pressure",))
     across = ds.pressure.values[0].sum(axis=1)
     assert across[:12].sum() > 1.05 * across[12:].sum(), "the crest is at x = 0"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from roughvisc.mechanics import arrays
-from roughvisc.mechanics.bodies import operator
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics import grid as grids
 from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.grid import Grid
 
 THREADS = pytest.mark.parametrize("threads", [1, 2, 3])
 
@@ -31,17 +31,16 @@ def test_error_in_a_part__ends_all(threads, error):
     assert len(done) < 1000 - 1
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
 def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
     monkeypatch.setattr(arrays, "_THREADED", 1)
-    for name, value in {"_BLOCKED": 1, "_COLUMN_BYTES": 1, "_COLUMNS": 5, "_ROW_POINTS": 500}.items():
-        monkeypatch.setattr(operator, name, value)
+    for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
+        monkeypatch.setattr(grids, name, value)
     monkeypatch.setattr(solver, "BLOCKS_FROM", 1)
     monkeypatch.setattr(solver, "SPOTS", 0.0)
     gap = np.random.default_rng(5).random((48, 37))
     one, *others = (
-        solve_contact(Operator((48, 37), (1.0, 1.3), boundary, workers=threads), gap, load=60.0)
-        for threads in (1, 2, 3)
+        solve_contact(Grid((48, 37), (1.0, 1.3), boundary, workers=threads), gap, load=60.0) for threads in (1, 2, 3)
     )
     assert one.iterations > 3
     for other in others:

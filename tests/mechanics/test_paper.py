@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.paper import conjugate_gradients, press
 
 ZENER = rv.zener(1.0, 1.0, 1.0)
@@ -15,7 +15,7 @@ ZENER = rv.zener(1.0, 1.0, 1.0)
 
 def paraboloid(n, size):
     x = (np.arange(n) - n // 2) * size / n
-    return Operator((n, n), (size / n, size / n)), (x[:, None] ** 2 + x[None, :] ** 2) / 2
+    return Grid((n, n), (size / n, size / n)), (x[:, None] ** 2 + x[None, :] ** 2) / 2
 
 
 def hertz_run(sign):
@@ -75,7 +75,7 @@ def test_rectangle_rule__is_unstable_beyond_its_bound(over_the_bound):
     step = over_the_bound * 2 * tau * math.atanh(1 / ratio)
     soft = rv.Prony(1.0, 0.0, (ratio,), (tau,))
     wave = 1e-3 * np.cos(2 * np.pi * np.arange(n) / n)[:, None] * np.ones((1, n))
-    grid = Operator((n, n), (1.0, 1.0), "periodic")
+    grid = Grid((n, n), (1.0, 1.0), "periodic")
     instants = step * np.arange(200)
     steps = press(grid, 1e-3 - wave, soft.contact_compliance, lambda _: 1.0 * n * n, instants, epsilon=1e-12)
     amplitudes = []

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 
 
 def rough_gap(cells, seed=0):
@@ -16,17 +16,11 @@ def rough_gap(cells, seed=0):
     return float(surface.max()) - surface.values
 
 
-def quarter_of_sphere(cells):
-    """Gap under a quarter of a sphere of four times as many cells."""
-    x = np.arange(cells) + 0.5
-    return (x[:, None] ** 2 + x**2) / (4 * cells)
-
-
 def problems(cells, boundary):
     """Name, half-space, gap, load and present cells; lengths in cells."""
     shape = (cells, cells - 3)
-    whole = Operator(shape, (1.0, 1.0), boundary)
-    quarter = Operator(shape, (1.0, 1.0), boundary, mirrored=True)
+    whole = Grid(shape, (1.0, 1.0), boundary)
+    mirror = Grid(shape, (1.0, 1.0), "mirror")
     x, y = np.arange(cells)[:, None] - cells / 2 + 0.37, np.arange(cells - 3) - cells / 2 + 1.1
     distance, inside = np.hypot(x, y), np.hypot(x, y) < cells / 3
     for a in (0.08, 0.2, 0.35):
@@ -39,8 +33,10 @@ def problems(cells, boundary):
         yield "wave", whole, 0.025 * cells * (2 - waves), mean * cells**2, None
     for mean, seed in itertools.product((0.01, 0.05, 0.2, 0.5, 0.9, 1.3), (0, 1)):
         yield "rough", whole, rough_gap(cells, seed)[:, 3:], mean * cells**2, None
-    yield "a quarter of a sphere", quarter, quarter_of_sphere(cells)[:, :-3], 0.018 * cells**2, None
-    yield "a quarter of a rough surface", quarter, rough_gap(cells, 2)[:, 3:], 0.1 * cells**2, None
+    if boundary == "periodic":
+        corner = np.hypot(np.arange(cells)[:, None] + 0.5, np.arange(cells - 3) + 0.5)  # a sphere and its mirror images
+        yield "sphere at a mirror", mirror, corner**2 / (4 * cells), 0.018 * cells**2, None
+        yield "rough with mirror images", mirror, rough_gap(cells, 2)[:, 3:], 0.1 * cells**2, None
 
 
 def rows(cells, tolerances):

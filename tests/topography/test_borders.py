@@ -74,27 +74,26 @@ def test_boundary__of_what_was_changed_has_to_be_said(height):
     [
         ({}, "free", "free"),
         ({}, None, None),
-        ({"level": False, "mirror": False}, "periodic", "periodic"),
+        ({"level": False, "realisation": False}, "periodic", "periodic"),
         ({"level": 0}, "free", None),
         ({"level": 1}, "periodic", None),
-        ({"mirror": True}, None, "periodic"),
         ({"realisation": 2}, None, "periodic"),
         ({"realisation": 2, "level": 1}, "free", "periodic"),
         ({"crop": {}, "realisation": 2, "resample": 8}, None, "periodic"),
         ({"resample": 8}, "free", None),
         ({"resample": 8}, "periodic", "periodic"),
         ({"resample": 8}, None, None),
-        ({"level": 1, "mirror": True}, "free", "periodic"),
+        ({"level": 1, "realisation": 1}, "free", "periodic"),
     ],
 )
-def test_boundary_after__trusts_nothing_but_an_untouched_recipe_and_mirror_images(steps, made, expected):
+def test_boundary_after__trusts_nothing_but_an_untouched_recipe_and_surrogates(steps, made, expected):
     assert boundary_after(steps, made) == expected
 
 
 @pytest.mark.parametrize("height", [ROUGH, WAVES])
 def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
     values = {"rotate90": 1, "invert": True, "shortest_wave": 4e-4, "resample": [12, 10]}
-    values |= {"realisation": 2, "mirror": True, "level": 1, "filter": 3e-4, "crop": {"x": [0, 5e-4]}}
+    values |= {"realisation": 2, "level": 1, "filter": 3e-4, "crop": {"x": [0, 5e-4]}}
     for step, value in values.items():
         found = is_periodic(condition(height, {step: value}))
         assert (boundary_after({step: value}, "periodic") == "periodic") == found, step
@@ -102,7 +101,7 @@ def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
 
 @pytest.mark.parametrize(
     ("steps", "expected"),
-    [("", "free"), ("[conditioning]\nmirror = true", "periodic"), ("[conditioning]\nlevel=1", None)],
+    [("", "free"), ("[conditioning]\nlevel=1", None)],
 )
 def test_card__says_by_its_text_what_its_heights_say(tmp_path, steps, expected):
     path = tmp_path / "ball.toml"

@@ -338,7 +338,6 @@ def test_card__refuses_and_names_card_and_key(text, named, tmp_path):
 def test_card__every_step_acts(tmp_path):
     steps = """
 [conditioning]
-mirror = true
 resample = [12, 10]
 filter = { cutoff = "12 um", keep = "short" }
 fill = "nearest"
@@ -350,11 +349,11 @@ crop = { x = ["0 um", "22 um"] }
 """
     h = open_scan(file_card(tmp_path, steps))
     lines = [line.split()[0].rstrip(":") for line in h.attrs["history"].splitlines()]
-    order = "read cropped rotated inverted levelled outliers filled Gaussian resampled mirrored"
+    order = "read cropped rotated inverted levelled outliers filled Gaussian resampled"
     assert lines == order.split()
-    assert h.shape == (24, 20)
-    off = steps.replace("mirror = true", "mirror = false").replace("invert = true", "invert = false")
-    assert open_scan(file_card(tmp_path, off)).shape == (12, 10)
+    assert h.shape == (12, 10)
+    off = steps.replace("resample = [12, 10]", "resample = false").replace("invert = true", "invert = false")
+    assert open_scan(file_card(tmp_path, off)).shape == (9, 11)
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "surfaces").glob("*.toml")), ids=lambda p: p.stem)

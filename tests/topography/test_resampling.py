@@ -9,8 +9,7 @@ from strategies import examples, shapes
 
 import roughvisc as rv
 from roughvisc.experiment.coarser import coarser
-from roughvisc.experiment.profile import is_mirrored
-from roughvisc.topography.borders import border_mismatch, is_periodic
+from roughvisc.topography.borders import border_mismatch, is_mirrored, is_periodic
 
 SIZE = (1e-3, 0.8e-3)
 #: Waves of a surface: numbers over the sides, amplitude [m] and phase; none shorter than a seventh of a side.

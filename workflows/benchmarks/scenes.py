@@ -1,29 +1,15 @@
 """What the benchmarks press: scenes with a closed form or a tight solution, and how errors are measured."""
 
 import time
-from unittest import mock
 
 import numpy as np
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment import profile
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 
 RADIUS = 1.0
-
-
-def without_symmetry():
-    """Context in which all of a surface is solved, also where it is its own mirror image."""
-    return mock.patch.object(profile, "is_mirrored", return_value=False)
-
-
-def with_symmetry_and_without():
-    """Goes round twice, and gives what to add to a case's name."""
-    yield ""
-    with without_symmetry():
-        yield ", all of the ball solved"
 
 
 def seconds(run, repeats):
@@ -112,4 +98,4 @@ def sphere_gap(cells):
 
 
 def grid(cells, boundary):
-    return Operator((cells, cells), (1.0, 1.0), boundary)
+    return Grid((cells, cells), (1.0, 1.0), boundary)

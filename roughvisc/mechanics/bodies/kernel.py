@@ -1,7 +1,7 @@
 r"""Kernel of a body: the displacement of its surface under unit pressure, at unit contact compliance.
 
 The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*``. A :class:`Kernel` is one value that
-everything built from it keeps: coarser, larger and mirrored grids, and windows.
+everything built from it keeps: coarser and larger grids, and windows.
 
 Fourier convention: ``p_q = sum_x p exp(-i q x)`` with ``q = 2 pi n / size``, as in ``scipy.fft``. Kernels are real and
 even in x and in y, hence so are their transforms: a *symbol* here holds the non-negative wave numbers of both axes,

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol
-from roughvisc.mechanics.bodies.transforms import transforms
+from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.grid import transforms
 
 Array = NDArray[np.float64]
 
@@ -40,15 +40,12 @@ class Window:
         Cell of the domain at which the window begins, and its number of cells.
     outside : float
         Least undeformed gap beyond the window; infinite where the window is the whole domain. [m]
-    mirrored : bool
-        Whether the domain is a quarter of a surface that is its own mirror image beyond the first row and column.
     """
 
     domain: tuple[int, int]
     first: tuple[int, int]
     shape: tuple[int, int]
     outside: float = math.inf
-    mirrored: bool = False
 
     @property
     def whole(self) -> bool:
@@ -61,21 +58,13 @@ class Window:
         (i, j), (nx, ny) = self.first, self.shape
         return slice(i, i + nx), slice(j, j + ny)
 
-    @property
-    def surface_cells(self) -> tuple[slice, slice]:
-        """Index of its cells in the surface, with their mirror images where there are any."""
-        if not self.mirrored:
-            return self.cells
-        (nx, ny), (mx, my) = self.domain, self.shape
-        return slice(nx - mx, nx + mx), slice(ny - my, ny + my)
 
-
-def whole_domain(shape: tuple[int, int], mirrored: bool = False) -> Window:
+def whole_domain(shape: tuple[int, int]) -> Window:
     """The window that leaves nothing out."""
-    return Window(shape, (0, 0), shape, mirrored=mirrored)
+    return Window(shape, (0, 0), shape)
 
 
-def window_around(gap: Array, extent: int, mirrored: bool = False, former: Window | None = None) -> Window:
+def window_around(gap: Array, extent: int, former: Window | None = None) -> Window:
     """The window around the lowest parts of a gap, about so many cells wide.
 
     Parameters
@@ -84,8 +73,6 @@ def window_around(gap: Array, extent: int, mirrored: bool = False, former: Windo
         Undeformed gap of the domain. [m]
     extent : int
         Longest side, in cells: as much of what lies low is taken as fits, at least what lies lowest.
-    mirrored : bool
-        Whether the gap goes on as its mirror image beyond the first row and column: then so does the window.
     former : Window, optional
         Window that the new one contains, even where it gets longer than ``extent``.
 
@@ -97,7 +84,6 @@ def window_around(gap: Array, extent: int, mirrored: bool = False, former: Windo
     """
     lowest = [np.min(gap, axis=1), np.min(gap, axis=0)]  # of each row and column
     levels = np.unique(np.concatenate(lowest))
-    images = 2 if mirrored else 1
     held = (slice(None, 0), slice(None, 0)) if former is None else former.cells
 
     def box(level: float) -> list[tuple[int, int]]:
@@ -105,27 +91,26 @@ def window_around(gap: Array, extent: int, mirrored: bool = False, former: Windo
         for cells, own in zip(inside, held, strict=True):
             cells[own] = True
         ends = [np.flatnonzero(cells) for cells in inside]
-        return [(0 if mirrored else int(cells[0]), int(cells[-1]) + 1) for cells in ends]
+        return [(int(cells[0]), int(cells[-1]) + 1) for cells in ends]
 
     fits, too_large = 0, len(levels)
     while too_large - fits > 1:
         middle = (fits + too_large) // 2
-        inside = images * max(last - first for first, last in box(float(levels[middle]))) <= extent
+        inside = max(last - first for first, last in box(float(levels[middle]))) <= extent
         fits, too_large = (middle, too_large) if inside else (fits, middle)
     sides = []
     for (first, last), cells in zip(box(float(levels[fits])), gap.shape, strict=True):
-        smallest, border = (_SMALLEST // 2, _BORDER) if mirrored else (_SMALLEST, 2 * _BORDER)
-        length = fft.next_fast_len(max(last - first + border, smallest), real=True)
-        start = 0 if mirrored else (first + last - length) // 2
-        if (start <= 0 and not mirrored) or start + length >= cells:
-            return whole_domain((gap.shape[0], gap.shape[1]), mirrored)
+        length = fft.next_fast_len(max(last - first + 2 * _BORDER, _SMALLEST), real=True)
+        start = (first + last - length) // 2
+        if start <= 0 or start + length >= cells:
+            return whole_domain((gap.shape[0], gap.shape[1]))
         sides.append(slice(start, start + length))
     shape = (sides[0].stop - sides[0].start, sides[1].stop - sides[1].start)
     if shape[0] * shape[1] > _LARGEST * gap.size:
-        return whole_domain((gap.shape[0], gap.shape[1]), mirrored)
+        return whole_domain((gap.shape[0], gap.shape[1]))
     beyond = [np.delete(side, cells) for side, cells in zip(lowest, sides, strict=True)]
     outside = float(min(np.min(beyond[0]), np.min(beyond[1])))
-    return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside, mirrored)
+    return Window((gap.shape[0], gap.shape[1]), (sides[0].start, sides[1].start), shape, outside)
 
 
 def mean_influence(window: Window, spacing: tuple[float, float], kernel: Kernel) -> Array:
@@ -133,10 +118,9 @@ def mean_influence(window: Window, spacing: tuple[float, float], kernel: Kernel)
 
     The kernel is symmetric: it is the displacement of that cell under uniform pressure on the domain, a rectangle.
     """
-    axes = zip(window.first, window.shape, window.domain, strict=True)
-    # beyond a mirror lie as many cells again
-    before = [np.arange(i, i + m) + (n if window.mirrored else 0) for i, m, n in axes]
-    after = [(2 if window.mirrored else 1) * n - 1 - cells for cells, n in zip(before, window.domain, strict=True)]
+    axes = zip(window.first, window.shape, strict=True)
+    before = [np.arange(i, i + m) for i, m in axes]
+    after = [n - 1 - cells for cells, n in zip(before, window.domain, strict=True)]
     count = window.domain[0] * window.domain[1]
     return kernel.under_rectangle((before[0], before[1]), (after[0], after[1]), spacing) / count
 
@@ -160,11 +144,10 @@ class FarFieldDisplacement:
         self._window = window
         self._type = np.float32 if single else np.float64
         self._scale = max(spacing)  # the range of single precision is small
-        self._transforms = transforms(window.mirrored)
-        symbol_of = self._mirrored_symbol if window.mirrored else self._general_symbol
-        self._points, self._symbol = symbol_of(spacing, kernel)
+        self._transforms = transforms()
+        self._points, self._symbol = self._symbol_of(spacing, kernel)
 
-    def _general_symbol(self, spacing: tuple[float, float], kernel: Kernel) -> tuple[tuple[int, int], NDArray[Any]]:
+    def _symbol_of(self, spacing: tuple[float, float], kernel: Kernel) -> tuple[tuple[int, int], NDArray[Any]]:
         """Points of the transforms, and the kernel's."""
         window = self._window
         mx, my = (fft.next_fast_len(n + m - 1, real=True) for n, m in zip(window.domain, window.shape, strict=True))
@@ -177,13 +160,6 @@ class FarFieldDisplacement:
         quadrant = kernel.influence((int(distances[0].max()) + 1, int(distances[1].max()) + 1), spacing)
         return (mx, my), fft.rfft2((quadrant[np.ix_(*distances)] / self._scale).astype(self._type))
 
-    def _mirrored_symbol(self, spacing: tuple[float, float], kernel: Kernel) -> tuple[tuple[int, int], NDArray[Any]]:
-        """The same for a window in the middle of a surface."""
-        window = self._window
-        mx, my = (fft.next_fast_len(n + m, real=True) for n, m in zip(window.domain, window.shape, strict=True))
-        symbol = free_space_symbol(kernel, (2 * mx, 2 * my), spacing) / self._scale
-        return (mx, my), self._transforms.cropped(symbol, (mx, my)).astype(self._type)
-
     def rows(self, pressure: Array) -> Iterator[tuple[slice, Array]]:
         """Displacement of the domain under a pressure in the window over the contact modulus, some rows at a time. [m]
 
@@ -193,17 +169,19 @@ class FarFieldDisplacement:
         spread = self.spread((pressure / largest).astype(self._type))
         for start in range(0, len(spread), _BLOCK):
             rows = slice(start, start + _BLOCK)
-            along_y = self._transforms.rows_back(spread[rows], n=self._points[1], axis=1, overwrite_x=True)
+            along_y = self._transforms.rows_back(spread[rows], self._points[1])
             yield rows, np.multiply(along_y[:, : self._window.domain[1]], largest * self._scale, dtype=float)
 
     def spread(self, pressure: NDArray) -> NDArray:
         """The displacement as its transform along y."""
         nx, (mx, my) = self._window.domain[0], self._points
-        along_y = self._transforms.of_rows(pressure, n=my, axis=1)
+        along_y = self._transforms.rows(pressure, my)
         spread = np.empty((nx, along_y.shape[1]), along_y.dtype)
         for start in range(0, along_y.shape[1], _BLOCK):
             block = slice(start, start + _BLOCK)
-            columns = self._transforms.of_columns(along_y[:, block], n=mx, axis=0)
+            columns = np.zeros((mx, along_y[:, block].shape[1]), along_y.dtype)
+            columns[: len(along_y)] = along_y[:, block]
+            columns = self._transforms.columns(columns)
             columns *= self._symbol[:, block]
-            spread[:, block] = self._transforms.columns_back(columns, axis=0, overwrite_x=True)[:nx]
+            spread[:, block] = self._transforms.columns_back(columns)[:nx]
         return spread

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roughvisc.mechanics.grid import Boundary
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -15,33 +17,39 @@ Mask = NDArray[np.bool_]
 PERIMETER_CORRECTION = 0.088
 
 
-def neighbours(mask: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> Iterator[Mask]:
+def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: bool = False) -> Iterator[Mask]:
     """The mask as seen from each cell across its lower and upper face along x, then along y.
 
     Parameters
     ----------
     mask : ndarray of bool, shape (nx, ny)
         Of the cells.
-    periodic : bool
-        Whether the first cell of a row is the neighbour of the last.
+    boundary : {"free", "periodic", "mirror"}
+        Periodic: the first cell of a row is the neighbour of the last. Mirror: beyond the border, a cell's neighbour is
+        its own image.
     before, beyond : bool
-        What lies outside the first and outside the last cell of every row, unless periodic.
+        What lies outside the first and outside the last cell of every row in free space.
 
     Examples
     --------
-    >>> [seen.ravel().tolist() for seen in neighbours(np.array([[True], [False]]), False)][:2]
+    >>> [seen.ravel().tolist() for seen in neighbours(np.array([[True], [False]]), "free")][:2]
     [[False, True], [False, False]]
+    >>> [seen.ravel().tolist() for seen in neighbours(np.array([[True], [False]]), "mirror")][:2]
+    [[True, True], [False, False]]
     """
     for turned in (False, True):
         own = mask.T if turned else mask
         lower, upper = np.empty_like(own), np.empty_like(own)
-        lower[1:], lower[0] = own[:-1], own[-1] if periodic else before
-        upper[:-1], upper[-1] = own[1:], own[0] if periodic else beyond
+        lower[1:], lower[0] = own[:-1], {"free": before, "periodic": own[-1], "mirror": own[0]}[boundary]
+        upper[:-1], upper[-1] = own[1:], {"free": beyond, "periodic": own[0], "mirror": own[-1]}[boundary]
         yield from (lower.T, upper.T) if turned else (lower, upper)
 
 
 def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> int:
-    """Number of faces between cells in contact and free ones, as :func:`neighbours` sees these."""
+    """Number of faces between cells in contact and free ones, as :func:`neighbours` sees these.
+
+    With mirror images there are none at the border, as in free space with nothing beyond it.
+    """
     count = 0
     for own, other in ((contact, free), (contact.T, free.T)):
         below = other[-1] if periodic else before

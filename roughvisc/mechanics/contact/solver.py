@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 
 Array = NDArray[Any]
 
@@ -99,7 +99,7 @@ class ContactState(NamedTuple):
 
 
 def solve_contact(
-    grid: Operator,
+    grid: Grid,
     gap: Array,
     *,
     load: float | None = None,
@@ -114,7 +114,7 @@ def solve_contact(
 
     Parameters
     ----------
-    grid : Operator
+    grid : Grid
         Cells, boundary and body.
     gap : ndarray, shape (nx, ny)
         Gap without pressure at zero approach; ignored at absent cells. [m]
@@ -310,7 +310,7 @@ def solve_contact(
     )
 
 
-def coarse_guess(grid: Operator, gap: Array, load: float) -> Array:
+def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     """Return the pressure of the same problem on half as many cells a side, on the cells of the grid. [-]"""
     shape = (gap.shape[0] // 2, gap.shape[1] // 2)
     coarse, sides = grid.on(shape), list(zip(gap.shape, shape, strict=True))
@@ -378,7 +378,7 @@ def unsolved(iterations: int, error: float, tolerance: float) -> str:
 
 
 def opening_pressure(
-    grid: Operator, separation: Array, contact: Array, level: float, present: Array | None
+    grid: Grid, separation: Array, contact: Array, level: float, present: Array | None
 ) -> tuple[Array, Array]:
     """Return the gap outside the contact over its mean, and about the pressure that opens it.
 
@@ -399,7 +399,7 @@ def opening_pressure(
 
 
 def load_error(
-    grid: Operator, separation: Array, contact: Array, level: float, present: Array | None, total: float
+    grid: Grid, separation: Array, contact: Array, level: float, present: Array | None, total: float
 ) -> float:
     """Return the relative error of the load under a given approach with periodic boundaries.
 
@@ -418,7 +418,7 @@ def load_error(
 
 
 def level_under_load(
-    grid: Operator, pressure: Array, separation: Array, full: float, contact: Array, level: float
+    grid: Grid, pressure: Array, separation: Array, full: float, contact: Array, level: float
 ) -> float:
     """Return the approach under a load: the separation in the contact, weighted by the pressure.
 
@@ -464,7 +464,7 @@ class LongWaves(NamedTuple):
 
     Attributes
     ----------
-    blocks : Operator
+    blocks : Grid
         The blocks.
     block : ndarray of int
         Block of each free cell.
@@ -480,14 +480,14 @@ class LongWaves(NamedTuple):
     .. [1] R. A. Nicolaides, SIAM J. Numer. Anal. 24 (1987) 355.
     """
 
-    blocks: Operator
+    blocks: Grid
     block: Array
     free: Array
     part: float
     local: float
 
     @classmethod
-    def of(cls, grid: Operator, cells: Array, held: Array, energy: float) -> LongWaves | None:
+    def of(cls, grid: Grid, cells: Array, held: Array, energy: float) -> LongWaves | None:
         """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
         if min(grid.shape) < BLOCKS_FROM or cells.size > SPARSE * grid.size:
             return None

@@ -38,7 +38,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import threads_of
 from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.transforms import transforms
+from roughvisc.mechanics.grid import transforms
 from roughvisc.mechanics.sliding.gmres import gmres
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ class Sliding:
         self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
         #: Cells of one period.
         self.shape = shape
-        self._transforms, self._threads = transforms(mirrored=False), threads_of(nx * ny)
+        self._transforms = transforms(threads_of(nx * ny))
         #: Number of convolutions so far, with the preconditioner's.
         self.convolutions = 0
         self.cell_area = dx * dy
@@ -213,9 +213,9 @@ class Sliding:
     def _convolved(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
         """Convolution in the precision of field and symbol."""
         self.convolutions += 1
-        waves = self._transforms.of_field(field, workers=self._threads)
+        waves = self._transforms.waves(field)
         waves *= symbol
-        return self._transforms.field_back(waves, s=self.shape, overwrite_x=True, workers=self._threads)
+        return self._transforms.waves_back(waves, self.shape)
 
 
 def steady_state(

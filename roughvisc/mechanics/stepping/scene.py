@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.arrays import lowest
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.memory import Memory, mean_compliance, old_weight
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping.program import Program, Slide
@@ -30,7 +30,7 @@ class Scene:
 
     Attributes
     ----------
-    operator : Operator
+    operator : Grid
         Grid and boundary.
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at the highest peak, which may lie between the cells; any finite number
@@ -56,7 +56,7 @@ class Scene:
         Least undeformed gap of the domain beyond the grid; infinite where the grid is all of it. [m]
     """
 
-    operator: Operator
+    operator: Grid
     gap: Array
     material: Prony
     memory: Memory

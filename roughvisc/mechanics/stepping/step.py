@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.mechanics.arrays import blockwise, empty
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes, padded
 from roughvisc.mechanics.hereditary.memory import Rule
 from roughvisc.mechanics.sparse import Sparse, Sum
@@ -143,9 +143,7 @@ def trial_step(
     )
 
 
-def carried_into_step(
-    scene: Scene, memory: Any, length: float, rule: Rule
-) -> tuple[Operator, float, Array | None, Array]:
+def carried_into_step(scene: Scene, memory: Any, length: float, rule: Rule) -> tuple[Grid, float, Array | None, Array]:
     """What answers the pressure of a step, an operator times ``alpha``, and what is carried into it.
 
     That is the effective pressure, if known, and the displacement.
@@ -349,16 +347,15 @@ def at_border(scene: Scene, contact: Sparse) -> bool:
     if scene.operator.boundary != "free":
         return False
     pressure = contact.field()
-    borders = (-1,) if scene.operator.mirrored else (0, -1)
-    return any(np.maximum.reduce(line) > 0 for i in borders for line in (pressure[i], pressure[:, i]))
+    return any(np.maximum.reduce(line) > 0 for i in (0, -1) for line in (pressure[i], pressure[:, i]))
 
 
 def edge_error(scene: Scene, time: float) -> EdgeContactError:
     """The error to raise where the grid cannot grow."""
-    nx, ny = scene.operator.surface_shape
+    nx, ny = scene.operator.shape
     return EdgeContactError(
         f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected contact "
-        "inside it; use boundary='periodic' for a nominally flat scan, a larger scan, a smaller load, or "
+        "inside it; use boundary='mirror' for a nominally flat scan, a larger scan, a smaller load, or "
         "edge='accept' to treat the scan outline as a punch"
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.stepping.program import Slide
 
 Array = NDArray[np.float64]
@@ -46,12 +46,12 @@ def slope(field: Array, side: float, axis: int) -> Array:
     return np.asarray(fft.irfft(fft.rfft(field, axis=axis) * (1j * waves), n=count, axis=axis, overwrite_x=True))
 
 
-def tangential_force(operator: Operator, pressure: Array, displacement: Array, slide: Slide) -> float:
+def tangential_force(operator: Grid, pressure: Array, displacement: Array, slide: Slide) -> float:
     """Friction force, against the motion of a profile, by the slope of the body under it. [N]
 
     Parameters
     ----------
-    operator : Operator
+    operator : Grid
         The body, periodic.
     pressure, displacement : ndarray, shape (nx, ny)
         [Pa], [m]
@@ -61,7 +61,7 @@ def tangential_force(operator: Operator, pressure: Array, displacement: Array, s
     return slide.sense * _force_along(operator, pressure, displacement, slide.axis)
 
 
-def force_across(operator: Operator, pressure: Array, displacement: Array, slide: Slide) -> float:
+def force_across(operator: Grid, pressure: Array, displacement: Array, slide: Slide) -> float:
     """Force to the left of the motion that keeps a profile on its path, of the same fields. [N]
 
     Left is 90 degrees counter-clockwise from the motion, with x to the right and y upwards: of a motion along x it is
@@ -71,7 +71,7 @@ def force_across(operator: Operator, pressure: Array, displacement: Array, slide
     return left * _force_along(operator, pressure, displacement, 1 - slide.axis)
 
 
-def _force_along(operator: Operator, pressure: Array, displacement: Array, axis: int) -> float:
+def _force_along(operator: Grid, pressure: Array, displacement: Array, axis: int) -> float:
     """Component along an axis of the force that holds the profile. [N]"""
     inclined = slope(displacement, operator.spacing[axis], axis)
     return -float(np.sum(pressure * inclined)) * operator.cell_area

@@ -18,8 +18,8 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import empty, weighted
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.layer import LayeredBody
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.wave_series import Strata, WaveSeries, wave_series
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.choice import (
     SERIES_SHARE,
     SHORTEST_AGE,
@@ -53,13 +53,13 @@ class WaveMemory:
         Of the body.
     duration : float
         Of the program. [s]
-    operator : Operator or None
+    operator : Grid or None
         The grid; None where only the number of exponentials is of interest.
     """
 
     series: WaveSeries
     duration: float
-    operator: Operator | None = None
+    operator: Grid | None = None
     acts_on: ActsOn = "waves"
 
     @cached_property
@@ -80,7 +80,7 @@ class WaveMemory:
         return Modes(self.material, rules=rules)
 
     @cached_property
-    def grid(self) -> Operator:
+    def grid(self) -> Grid:
         """What answers a pressure that has come a long time ago, at unit compliance of the material."""
         assert self.operator is not None
         unit = 1 / float(self.material.contact_compliance(self.duration))
@@ -116,7 +116,7 @@ class WaveMemory:
         answers = bool(after.any() or self._symbols[0].any())
         return float(answers), self.operator.field_of(self._weighted(terms, carried))
 
-    def operator_of(self, state: ModesState, step: float, rule: Rule) -> Operator:
+    def operator_of(self, state: ModesState, step: float, rule: Rule) -> Grid:
         """What answers the pressure of a step: ``alpha_q``. [m/Pa]"""
         assert self.operator is not None
         after = self._modes.coefficients(state, step, rule)[3]
@@ -222,7 +222,7 @@ def choose_body_memory(
     tolerance: float,
     acts_on: ActsOn = "displacement",
     shortest: float | None = None,
-    operator: Operator | None = None,
+    operator: Grid | None = None,
 ) -> Choice:
     """Memory for a body over a program: that of its material where space and time separate, else one of waves.
 
@@ -231,7 +231,7 @@ def choose_body_memory(
     body : Body
     duration, tolerance, acts_on, shortest
         As :func:`~roughvisc.mechanics.hereditary.choice.choose_memory` has them.
-    operator : Operator, optional
+    operator : Grid, optional
         The grid; without one the memory tells its number of exponentials alone.
 
     Raises

@@ -22,15 +22,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
+from roughvisc.mechanics.grid import Boundary, Grid
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -84,9 +85,9 @@ def frozen_contact(
         Cells in contact.
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
-    boundary : {"free", "periodic"}
-        With periodic boundaries the approach is that to the mean plane of a half-space, and the stiffness that of one
-        period.
+    boundary : {"free", "periodic", "mirror"}
+        With periodic or mirror boundaries the approach is that to the mean plane of a half-space, and the stiffness
+        that of these cells.
     present : ndarray of bool, shape (nx, ny), optional
         Cells where there is material; None: all. Spots end for certain beside the others, and at the border of free
         space.
@@ -99,16 +100,16 @@ def frozen_contact(
     -------
     FrozenContact
     """
-    periodic = boundary == "periodic"
     if not contact.any():
         return FrozenContact(0.0, 0.0)
     present = np.ones(contact.shape, dtype=bool) if present is None else present
-    rimmed, rim = (np.pad(one, 1, mode="wrap") if periodic else np.pad(one, 1) for one in (contact, present))
-    if not periodic:  # nothing outside the spots matters
+    beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
+    rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
+    if boundary == "free":  # nothing outside the spots matters
         x, y = _bounds(contact)
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
-    body = Operator((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
+    body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
     if contact.all() and not body.definite:
         return FrozenContact(math.inf, 0.0)
     punch = _punch(body, contact, tolerance)
@@ -124,7 +125,7 @@ def frozen_contact(
 
 
 def _extrapolated(
-    coarse: FrozenContact, contact: Mask, body: Operator, tolerance: float, *, share: float, oblique: float
+    coarse: FrozenContact, contact: Mask, body: Grid, tolerance: float, *, share: float, oblique: float
 ) -> FrozenContact:
     """With the part of the edge that is known for certain extrapolated from cells of half the side."""
     split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
@@ -140,7 +141,7 @@ def _extrapolated(
     )
 
 
-def _punch(body: Operator, contact: Mask, tolerance: float) -> ContactState:
+def _punch(body: Grid, contact: Mask, tolerance: float) -> ContactState:
     return solve_contact(
         body, np.zeros(contact.shape), approach=1.0, present=contact, tolerance=_OF_PRESSURE * math.sqrt(tolerance)
     )
@@ -181,7 +182,7 @@ def _edge_energies(
     """
     ends = opens = squares = 0.0
     strips = [side * spacing[0] * spacing[1] for side in (spacing[0], spacing[0], spacing[1], spacing[1])]
-    pairs = zip(neighbours(contact, False), neighbours(rim, False), strict=True)
+    pairs = zip(neighbours(contact, "free"), neighbours(rim, "free"), strict=True)
     for strip, (touching, material) in zip(strips, pairs, strict=True):
         at_edge = (contact & ~touching)[1:-1, 1:-1]
         energy = strip * pressure**2
@@ -194,6 +195,6 @@ def _edge_energies(
 
 def _staircase(contact: Mask) -> float:
     """Share of an outline's faces that belong to steps, two for each inner corner; one more cell on every side."""
-    faces = sum(int(np.count_nonzero((contact & ~seen)[1:-1, 1:-1])) for seen in neighbours(contact, False))
+    faces = sum(int(np.count_nonzero((contact & ~seen)[1:-1, 1:-1])) for seen in neighbours(contact, "free"))
     around = contact[1:, 1:].astype(int) + contact[:-1, 1:] + contact[1:, :-1] + contact[:-1, :-1]
     return 2 * int(np.count_nonzero(around == 3)) / max(faces, 1)

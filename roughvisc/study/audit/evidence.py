@@ -20,6 +20,7 @@ from roughvisc.mechanics.materials.creep import complete
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.case import Case
+from roughvisc.topography.framing import with_images
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import OTHER_DIMS
 from roughvisc.variables.axes import axis_of
@@ -92,7 +93,7 @@ def contact_of(dataset: xr.Dataset, row: xr.Dataset) -> Contact | None:
         spots=int(ndimage.label(touching, np.ones((3, 3)))[1]),
         curvature=_curvature(height.values, cells, touching),
         half_width=max(n * d for n, d in zip(extents, cells, strict=True)) / 2,
-        pressure=pressure,
+        pressure=with_images(pressure) if dataset.attrs["boundary"] == "mirror" else pressure,
         cells=cells,
     )
 
@@ -125,7 +126,7 @@ class Evidence:
 
     Attributes
     ----------
-    boundary : {"free", "periodic"}
+    boundary : {"free", "periodic", "mirror"}
     size : tuple of float
         Of the surface. [m]
     texture : Texture or None
@@ -183,7 +184,7 @@ class Evidence:
     @property
     def half_width(self) -> float:
         """Half of what is loaded: of the contact in free space, of the longer side under a surface that repeats. [m]"""
-        if self.boundary == "periodic":
+        if self.boundary != "free":
             return max(self.size) / 2
         return self.contact.half_width if self.contact else math.sqrt(self.area / math.pi)
 

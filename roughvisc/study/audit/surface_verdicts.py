@@ -31,7 +31,7 @@ def adhesion(evidence: Evidence, given: AuditInputs) -> Finding:
     if contact is None:
         return unknown("adhesion", 'Keep the pressure, fields = ["pressure"], for the spots in contact.')
     flat = not contact.curvature * _FLAT * contact.half_width > 1
-    if evidence.boundary == "periodic" and (flat or evidence.fraction > _MERGED):
+    if evidence.boundary != "free" and (flat or evidence.fraction > _MERGED):
         merged = f"{percent(evidence.fraction)} of the area is in contact"
         return unknown("adhesion", f"{merged}, without separate spots: see stickiness.")
     if flat:
@@ -110,7 +110,7 @@ def slope(evidence: Evidence, given: AuditInputs) -> Finding:
     if math.isnan(evidence.slope):
         return unknown("slope", "The result contains no loaded heights.")
     number = evidence.slope
-    where = "surface" if evidence.boundary == "periodic" else "part of the surface that may touch"
+    where = "surface" if evidence.boundary != "free" else "part of the surface that may touch"
     return Finding("slope", number, f"The {where} has {percent(number**2 / 2)} more area than its projection.")
 
 
@@ -161,13 +161,15 @@ def resolution(evidence: Evidence, given: AuditInputs) -> Finding:
 
 def border(evidence: Evidence, given: AuditInputs) -> Finding | None:
     """Whether a surface repeats with a step; None in free space."""
-    if evidence.boundary != "periodic":
+    if evidence.boundary == "free":
         return None
     if evidence.texture is None:
         return unknown("border", "The result contains no heights.")
     number = evidence.texture.mismatch
+    if evidence.boundary == "mirror":
+        return Finding("border", number, "The surface repeats with its mirror images, without a step.")
     seam = "Opposite borders match" if number < LIMITS["border"].doubtful else "The surface repeats with a step"
-    advice = "" if number < LIMITS["border"].doubtful else " Use mirror = true under [surface]."
+    advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
     return Finding("border", number, f"{seam}: they differ {number:.2g} times as much as neighbouring rows.{advice}")
 
 

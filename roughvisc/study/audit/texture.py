@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.topography.borders import border_mismatch, is_analytic
+from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import parameters, rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
@@ -83,12 +84,14 @@ def texture_of(height: xr.DataArray, boundary: str, recipe: str = "") -> Texture
     ----------
     height : xarray.DataArray, dims (x, y)
         [m]
-    boundary : {"free", "periodic"}
-        In free space waves are those under a cosine window.
+    boundary : {"free", "periodic", "mirror"}
+        In free space waves are those under a cosine window. With mirror images the surface is unfolded.
     recipe : str
         What the surface was made by; empty if it was measured.
     """
     height = height.transpose("x", "y")
+    if boundary == "mirror":
+        height, boundary = mirror(height), "periodic"
     cells = spacing(height, "audit")
     periodic = boundary == "periodic"
     size = (height.sizes["x"] * cells[0], height.sizes["y"] * cells[1])
@@ -116,13 +119,13 @@ def loaded_slope(height: xr.DataArray, boundary: str, approach: float) -> float:
     ----------
     height : xarray.DataArray, dims (x, y)
         [m]
-    boundary : {"free", "periodic"}
+    boundary : {"free", "periodic", "mirror"}
     approach : float
         The largest; NaN: the whole surface counts. [m]
     """
     periodic = boundary == "periodic"
     above = float(height.attrs.get("highest", height.max())) - float(height.max())
-    return rms_slope(height, periodic, math.inf if periodic or math.isnan(approach) else approach - above)
+    return rms_slope(height, periodic, math.inf if boundary != "free" or math.isnan(approach) else approach - above)
 
 
 def _stated_waves(recipe: str, height: xr.DataArray, cells: tuple[float, float], analytic: bool) -> Stated | None:

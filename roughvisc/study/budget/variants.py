@@ -46,7 +46,7 @@ class Variants:
     @property
     def is_rough(self) -> bool:
         """Whether the whole surface stands for a larger one: then another patch and shorter waves have a meaning."""
-        stands_for_more = self.case.solving().boundary == "periodic" and is_data(self.case)
+        stands_for_more = self.case.solving().boundary != "free" and is_data(self.case)
         return stands_for_more and bool(np.isfinite(self.height.values).all())
 
     @cached_property
@@ -75,12 +75,8 @@ class Variants:
         return vary(case, {"surface.shortest_wave": 2 * self.shortest_wave})
 
     def other_patch(self, number: int) -> Case:
-        """Another patch of the same roughness, as large as what was measured, on cells twice as long.
-
-        Where the surface has its mirror images, so has the patch: a load [N] then makes the same pressure.
-        """
-        mirrored = 2 if self.case.settings.surface.mirror else 1
-        cells = [max(2, round(n / mirrored / 2)) for n in self.shape]
+        """Another patch of the same roughness, as large as what was measured, on cells twice as long."""
+        cells = [max(2, round(n / 2)) for n in self.shape]
         return vary(self.case, {"surface.resample": cells, "surface.realisation": number})
 
 

@@ -81,8 +81,8 @@ def _copies(case: Case, height: xr.DataArray) -> list[xr.DataArray]:
         shape = tuple(min(count, side) for count in height.shape)
         if shape == height.shape:
             found.append(height)
-        elif case.settings.solve.boundary == "periodic" and np.isfinite(height.values).all():
-            found.append(on_fewer_cells(height, (shape[0], shape[1]), "periodic"))
+        elif case.settings.solve.boundary != "free" and np.isfinite(height.values).all():
+            found.append(on_fewer_cells(height, (shape[0], shape[1]), case.settings.solve.boundary))
         else:
             found.append(coarse(height, side))
     return found

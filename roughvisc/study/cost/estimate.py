@@ -20,8 +20,8 @@ from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import build_scene, check_slides, kept_times
 from roughvisc.experiment.stated import in_slide, staircase_area
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary, Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.hereditary.memory import STIFF
@@ -492,14 +492,14 @@ class ConvolutionTimer:
         self._found: dict[tuple[tuple[int, ...], str, Kernel], float] = {}
         self._left = _CALIBRATION
 
-    def seconds(self, height: xr.DataArray, boundary: str, kernel: Kernel) -> float:
+    def seconds(self, height: xr.DataArray, boundary: Boundary, kernel: Kernel) -> float:
         """Seconds of one convolution and what goes with it, one thread. [s]"""
         grid = (height.shape, boundary, kernel)
         if grid not in self._found:
             self._found[grid] = self._measured(height, boundary, kernel)
         return self._found[grid]
 
-    def _measured(self, height: xr.DataArray, boundary: str, kernel: Kernel) -> float:
+    def _measured(self, height: xr.DataArray, boundary: Boundary, kernel: Kernel) -> float:
         alike = [grid for grid in self._found if grid[1:] == (boundary, kernel)]
         if self._left <= 0 and alike:  # as N log N from the grid nearest in size
             nearest = min(alike, key=lambda grid: abs(math.log(math.prod(grid[0]) / height.size)))
@@ -509,7 +509,7 @@ class ConvolutionTimer:
             height = coarse(height, math.isqrt(_TIMED))
         began = time.perf_counter()
         profile = Profile(height, "absent", kernel=kernel)
-        operator: Operator = profile.operator("free" if boundary == "free" else "periodic")
+        operator = profile.operator(boundary)
         gap = profile.gap
         # a tenth of the cells penetrates, and the load is that of which the displacement is as large
         guess = np.maximum(np.quantile(gap, _TOUCHING) - gap, 0)
@@ -536,7 +536,7 @@ class ConvolutionTimer:
         self._left -= time.perf_counter() - began
         return seconds * work(cells) / work(height.size)
 
-    def beside(self, run: CoarseRun | None, boundary: str, kernel: Kernel) -> float:
+    def beside(self, run: CoarseRun | None, boundary: Boundary, kernel: Kernel) -> float:
         """Seconds that a step takes beside its convolutions where fields are small: the interpreter's. [s]"""
         if run is None or run.steps == 0:
             return 0.0
@@ -617,14 +617,14 @@ def bytes_needed(
     return PROCESS + march_bytes(settings, cells, choice.memory, **counts, grows=grows)
 
 
-def disk(case: Case, cells: int, found: CostEstimate, mirrored: bool = False) -> float:
+def disk(case: Case, cells: int, found: CostEstimate, symmetric: bool = False) -> float:
     """Size of a case's file; what it keeps meanwhile comes to as much. [bytes]"""
     dense = 1.0 if case.settings.keep.precision is None else _ROUNDED
     rows = found.rows
     if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
         rows = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
     kept = np.array(found.kept or (found.contact,))
-    few = kept[len(kept) // 2] < _COMPRESSED[mirrored]  # the frame that the writer asks
+    few = kept[len(kept) // 2] < _COMPRESSED[symmetric]  # the frame that the writer asks
     names = case.settings.keep.fields
     pressure = found.rows * (float(np.mean(kept)) + 0.01) if few else rows * dense
     fields = sum(pressure if name == "pressure" else rows * dense for name in names)

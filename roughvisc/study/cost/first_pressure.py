@@ -45,18 +45,15 @@ def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTA
     contact : float
         Contact fraction to aim at, above 0 and below 1. [-]
     """
-    steps = {name: value for name, value in found.steps.items() if name != "mirror"}
-    few = copy_to_press(condition(scan, steps), "free", MOST_PRESSED)
+    few = copy_to_press(condition(scan, found.steps), "free", MOST_PRESSED)
     slope = rms_slope(few)
-    if "mirror" in found.steps:
-        few = condition(few, {"mirror": True})
     rubber = zener(SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY)
     early, late = (float(rubber.contact_compliance(time)) for time in (0.0, math.inf))
     share = slope / found.rms_slope if found.rms_slope > 0 else 1.0
 
     def touching(pressure: float, compliance: float) -> float:
         load = share * pressure * nominal_area(few) * compliance
-        return press(few, Push(load=load), "periodic", HALF_SPACE).fraction
+        return press(few, Push(load=load), found.boundary, HALF_SPACE).fraction
 
     guess = pressure = pressure_for(contact, 1 / late, found.rms_slope) or _ON_FLAT
     for _ in range(_PRESSES if found.rms_slope > 0 else 0):

@@ -19,7 +19,7 @@ def border_warning(shape: tuple[int, ...]) -> str:
     """What to say of contact that reaches the border of a free surface of so many cells, where that ends a run."""
     return (
         f"Contact is expected to reach the border of the free-space domain of {shape[0]} x {shape[1]} cells, which "
-        "ends a run: use boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = "
+        "ends a run: use boundary = 'mirror' for a nominally flat scan, a larger surface, a smaller load, or edge = "
         "'accept' to treat the scan outline as a punch."
     )
 

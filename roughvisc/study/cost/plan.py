@@ -54,6 +54,7 @@ from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import existing_part
 from roughvisc.study.storage.parameters import labels_of, parameters_of
+from roughvisc.topography.borders import is_mirrored
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import unit_for
@@ -207,7 +208,7 @@ class _Surface:
     problem: str
     copies: Copies | None = None
     stages: tuple[Stage, ...] = ()
-    mirrored: bool = False
+    symmetric: bool = False
     slope: float = 0.0
 
 
@@ -254,7 +255,7 @@ def _surface(case: Case) -> _Surface:
     try:
         height = case.height()
         boundary = case.settings.solve.boundary
-        profile = Profile(height, case.settings.surface.missing, follow=True, mirror=True, kernel=case.body().kernel)
+        profile = Profile(height, case.settings.surface.missing, follow=True, kernel=case.body().kernel)
     except InputError as error:
         return _Surface(None, False, str(error))
     return _Surface(
@@ -263,7 +264,7 @@ def _surface(case: Case) -> _Surface:
         "",
         Copies(height, boundary),
         stages_of(profile, profile.can_grow()),
-        profile.mirrored,
+        is_mirrored(height.values),
         rms_slope(height),
     )
 
@@ -405,7 +406,7 @@ def _row(ahead: _Ahead, choices: _Choices, stopwatch: ConvolutionTimer, there: A
         "scheme": _scheme(settings, choice, found),
         "steps": found.steps,
         "wall_time": wall_time(settings, solved, found, choice, convolution, beside),
-        "disk": disk(case, cells, found, surface.mirrored or surface.grows),  # an indenter is symmetric
+        "disk": disk(case, cells, found, surface.symmetric or surface.grows),  # an indenter is symmetric
     }
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.bodies.kernel import Kernel
-from roughvisc.mechanics.bodies.operator import Boundary
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.grid import Boundary
 
 #: Cells of the longer side of the copy that is pressed, at most: a press takes 30 to 60 ms then.
 MOST_PRESSED = 256
@@ -84,7 +84,7 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
     kernel : Kernel
         Of the body.
     """
-    profile = Profile(height, "absent", mirror=True, kernel=kernel)
+    profile = Profile(height, "absent", kernel=kernel)
     operator, shape = profile.operator(boundary), (height.sizes["x"], height.sizes["y"])
     present = None if profile.present.all() else profile.present
     nothing = push.load == 0 if push.approach is None else push.approach <= profile.least_gap
@@ -103,11 +103,10 @@ def press(height: xr.DataArray, push: Push, boundary: Boundary, kernel: Kernel) 
         )
         touching, approach = found.pressure > 0, found.approach
     free = ~touching if present is None else present & ~touching
-    periodic = boundary == "periodic" and not operator.mirrored
     counted = np.count_nonzero(touching) * operator.cell_area
-    area = max(counted - staircase(touching, free, operator.cell_area, periodic), 0.0)
+    area = max(counted - staircase(touching, free, operator.cell_area, boundary == "periodic"), 0.0)
     fraction = profile.contact_fraction(area)
-    return Pressed(shape, fraction, approach, width_of(touching, profile), _at_border(touching, profile.mirrored))
+    return Pressed(shape, fraction, approach, width_of(touching, profile), _at_border(touching))
 
 
 def width_of(touching: NDArray[np.bool_], profile: Profile) -> tuple[float, float]:
@@ -115,12 +114,9 @@ def width_of(touching: NDArray[np.bool_], profile: Profile) -> tuple[float, floa
     widths = []
     for other, side in zip((1, 0), profile.spacing, strict=True):
         cells = np.flatnonzero(touching.any(axis=other))
-        first = 0 if profile.mirrored else (cells[0] if cells.size else 0)
-        count = cells[-1] + 1 - first if cells.size else 0
-        widths.append(float(count * side * (2 if profile.mirrored else 1)))
+        widths.append(float((cells[-1] + 1 - cells[0]) * side) if cells.size else 0.0)
     return widths[0], widths[1]
 
 
-def _at_border(touching: NDArray[np.bool_], mirrored: bool) -> bool:
-    borders = (-1,) if mirrored else (0, -1)
-    return any(bool(touching[i].any() or touching[:, i].any()) for i in borders)
+def _at_border(touching: NDArray[np.bool_]) -> bool:
+    return any(bool(touching[i].any() or touching[:, i].any()) for i in (0, -1))

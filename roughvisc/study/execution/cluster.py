@@ -303,7 +303,7 @@ def _cells_and_area(case: Case) -> tuple[int, float]:
     surface = case.settings.surface
     shape = surface.resample or case.made_shape
     if shape is not None:
-        return math.prod(shape) * (4 if surface.mirror else 1), 1.0
+        return math.prod(shape), 1.0
     file = getattr(surface, "file", None)
     try:
         if file is None or Path(file).stat().st_size < _SMALL_FILE:

@@ -27,7 +27,7 @@ from roughvisc.errors import (
     UnusableFileError,
 )
 from roughvisc.labels import annotate, warnings_of
-from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.problem import Problem
 from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case

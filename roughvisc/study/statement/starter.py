@@ -52,7 +52,13 @@ _REMARKS = {
     "outliers": "spikes become missing points ...",
     "fill": "... and missing points are filled in; the result keeps their mask",
     "filter": "shorter waves are noise",
-    "mirror": "opposite borders do not meet: with its mirror images the scan repeats without a step",
+}
+
+
+#: boundary -> line of the study: the scan stands for a larger, nominally flat surface.
+_BOUNDARIES = {
+    "periodic": 'boundary = "periodic"               # the scan stands for a larger, nominally flat surface',
+    "mirror": 'boundary = "mirror"                 # opposite borders differ: the scan repeats with its mirror images',
 }
 
 
@@ -88,7 +94,7 @@ def starter_study(
         remarks["fill"] = "missing points are filled in; the result keeps their mask"
     surface = surface_table(file, Path(study).parent, options, steps, remarks)
     if math.prod(found.shape) > _LARGE:
-        coarse = [max(16, n // (4 if "mirror" in steps else 2)) for n in found.shape]
+        coarse = [max(16, n // 2) for n in found.shape]
         surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
     title = Path(file).stem.replace("_", " ")
     return _TEXT.format(
@@ -105,6 +111,7 @@ def starter_study(
         pressed=f"{first.shape[0]} x {first.shape[1]}",
         copy="" if first.shape == found.shape else _COPY.format(few=f"{first.slope:.2g}", all=f"{found.rms_slope:.2g}"),
         program=_program(first.pressure, found),
+        boundary=_BOUNDARIES[found.boundary],
     )
 
 
@@ -146,8 +153,7 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
 def _program(pressure: float, found: Inspection) -> str:
     """The line that sets the load, with the pressure and the force that it stands for."""
     force = written_quantity(pressure * found.area, "N", 4)
-    whole = " with the mirror images" if "mirror" in found.steps else ""
-    return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {written_area(found.area)}{whole}'
+    return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {written_area(found.area)}'
 
 
 def written_area(area: float) -> str:
@@ -193,7 +199,7 @@ over = "50 ms"                      # within this time, linearly
 hold = "0.95 s"                     # ten times the time of the creep
 
 [solve]
-boundary = "periodic"               # the scan stands for a larger, nominally flat surface
+{boundary}
 tolerance = 1e-2                    # of pressure, force and approach; 1e-3 for the final answer
 
 [keep]

@@ -70,7 +70,7 @@ def is_data(case: Case) -> bool:
 def _treated(case: Case) -> bool:
     """Whether the heights are no longer those of the recipe."""
     surface = case.settings.surface
-    steps = ("crop", "rotate90", "invert", "filter", "mirror", "second")
+    steps = ("crop", "rotate90", "invert", "filter", "second")
     return any(getattr(surface, step) for step in steps) or any(
         getattr(surface, step) is not False for step in ("level", "outliers", "fill")
     )
@@ -120,8 +120,7 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[
     cells = shape_of(case, shape, coarsening)
     if not is_data(case):
         return "surface.shape", list(cells)
-    mirrored = 2 if case.settings.surface.mirror else 1
-    return "surface.resample", [max(2, n // mirrored) for n in cells]
+    return "surface.resample", [max(2, n) for n in cells]
 
 
 def has_steps(case: Case) -> bool:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import annotate
-from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.progress import reporting
 from roughvisc.study.quantities import QUANTITIES, Observable
 from roughvisc.study.statement.case import Case, read_study, vary

@@ -59,7 +59,7 @@ def _holes(found: Inspection) -> tuple[str, str]:
     seen = f"{100 * found.holes:.2g} % of the scan lies in holes wider than a few points"
     if "crop" not in found.steps:
         return seen, "too small to crop; fill them with the other missing points"
-    nx, ny = found.shape if "mirror" not in found.steps else (found.shape[0] // 2, found.shape[1] // 2)
+    nx, ny = found.shape
     return seen, (
         f"crop to the largest part without holes, {nx} x {ny} points (the findings below refer to it); or keep "
         'the whole scan with missing = "absent" if there is no material in the holes'
@@ -110,10 +110,8 @@ def _borders(found: Inspection) -> tuple[str, str]:
         "difference of neighbouring rows"
     )
     if not found.borders.jumps:
-        return seen, 'boundary = "periodic" needs no mirror'
-    return seen, (
-        'for boundary = "periodic" set mirror = true, at no extra cost; otherwise the step at the seam carries load'
-    )
+        return seen, 'boundary = "periodic"'
+    return seen, 'boundary = "mirror"; with "periodic" the step at the seam carries load'
 
 
 def _slope(found: Inspection) -> tuple[str, str]:

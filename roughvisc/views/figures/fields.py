@@ -463,7 +463,7 @@ def _power(value: float) -> str:
 
 def _stands_for_more(dataset: xr.Dataset) -> bool:
     """Whether a nominal pressure is known of a scan that stands for a larger surface."""
-    return "nominal_pressure" in dataset and dataset.attrs.get("boundary") == "periodic"
+    return "nominal_pressure" in dataset and dataset.attrs.get("boundary") in ("periodic", "mirror")
 
 
 def _nominal(dataset: xr.Dataset, frames: list[int]) -> str:

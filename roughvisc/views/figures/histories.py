@@ -276,7 +276,7 @@ def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     first, material = next(iter(cases.values())), stated[0].get("material")
     of_one_material = material is not None and all(one.get("material") == material for one in stated)
     rough = "height" in first and stated[0].get("surface", {}).get("generate") not in _SMOOTH
-    endless = first.attrs.get("boundary") == "periodic" and not {"thickness", "kernel"} & first.attrs.keys()
+    endless = first.attrs.get("boundary") in ("periodic", "mirror") and not {"thickness", "kernel"} & first.attrs.keys()
     if not (of_one_material and rough and endless):
         return {}
     known = material_of(first)

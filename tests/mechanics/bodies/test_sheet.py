@@ -10,10 +10,10 @@ from references import OnSheet
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.bodies.kernel import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet, complement, reduction
 from roughvisc.mechanics.closed_forms import Paraboloid
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 
 BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
 
@@ -126,10 +126,10 @@ def test_ball_on_an_incompressible_sheet__agrees_with_the_integral_equation_on_l
         force = of(contact.scaled_force, lambda a: math.pi * a**6 / 128)
         approach = of(contact.reduced, lambda a: a**2 / 4)
     x, y = (ratio * (np.arange(n) - (n - 1) / 2) for n in (23, 25))
-    body = Operator((23, 25), (ratio, ratio), kernel=sheet)
+    body = Grid((23, 25), (ratio, ratio), kernel=sheet)
     found = solve_contact(body, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
     assert found.approach == pytest.approx(approach, rel=3e-3)
-    periodic = Operator((23, 25), (ratio, ratio), "periodic", kernel=sheet)
+    periodic = Grid((23, 25), (ratio, ratio), "periodic", kernel=sheet)
     same = solve_contact(periodic, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
     if ratio > 4:  # waves as long as the grid hardly move it, and its images are not felt
         assert found.approach == pytest.approx(same.approach, rel=3e-3)

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.window import (
     FarFieldDisplacement,
     Window,
@@ -17,6 +16,7 @@ from roughvisc.mechanics.bodies.window import (
     whole_domain,
     window_around,
 )
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import padded
 
 
@@ -49,15 +49,15 @@ def test_window__grows_with_its_extent_up_to_the_domain():
         assert all(a >= b for a, b in zip(small.first, large.first, strict=True))
 
 
-@given(seed=st.integers(0, 10_000), mirrored=st.booleans())
-def test_window__contains_the_former_one(seed, mirrored):
+@given(seed=st.integers(0, 10_000))
+def test_window__contains_the_former_one(seed):
     rng = np.random.default_rng(seed)
     gap = rng.random((101, 133))  # whose low cells lie anywhere
     gap -= gap.min()
-    window, extent = window_around(gap, 30, mirrored), 30
+    window, extent = window_around(gap, 30), 30
     while not window.whole:
         extent = round(1.5 * extent)
-        former, window = window, window_around(gap, extent, mirrored, former=window)
+        former, window = window, window_around(gap, extent, former=window)
         former_cells, cells = np.zeros(gap.shape, bool), np.zeros(gap.shape, bool)
         former_cells[former.cells] = cells[window.cells] = True
         assert not (former_cells & ~cells).any()
@@ -81,7 +81,7 @@ def test_window__takes_in_every_summit_of_the_same_height():
 def test_reach__is_the_displacement_of_the_whole_domain(spacing, first, shape):
     domain = (41, 53)
     pressure = np.random.default_rng(0).random(shape)
-    expected = Operator(domain, spacing).displacement(padded(pressure, domain, first))
+    expected = Grid(domain, spacing).displacement(padded(pressure, domain, first))
     window = Window(domain, first, shape)
     found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(pressure)])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
@@ -97,41 +97,6 @@ def test_whole_domain__leaves_nothing_out():
     window = whole_domain((5, 7))
     assert window.whole
     assert np.zeros((5, 7))[window.cells].shape == (5, 7)
-
-
-@given(extent=st.integers(1, 200), curved=st.floats(0.1, 10))
-def test_mirrored_window__holds_all_that_lies_lower_than_what_is_outside(extent, curved):
-    x, y = np.arange(65) + 0.5, np.arange(75) + 0.5
-    gap = np.abs(1e-3 * (x[:, None] ** 2 + curved * y**2) - 0.2)
-    gap -= gap.min()
-    window = window_around(gap, extent, mirrored=True)
-    beyond = np.ones(gap.shape, bool)
-    beyond[window.cells] = False
-    assert window.mirrored
-    assert window.first == (0, 0)
-    if window.whole:
-        assert math.isinf(window.outside)
-        return
-    assert window.outside == gap[beyond].min() > 0
-    assert gap[window.cells].min() == 0
-    assert all(m < n for m, n in zip(window.shape, gap.shape, strict=True))
-
-
-@pytest.mark.parametrize("spacing", [(1e-6, 1e-6), (2.0, 0.7)])
-@pytest.mark.parametrize("shape", [(11, 8), (21, 27), (1, 1)])
-def test_mirrored_reach__is_that_of_the_window_with_its_images(spacing, shape):
-    corner, domain = np.random.default_rng(0).random(shape), (21, 27)
-    pressure = np.block([[corner[::-1, ::-1], corner[::-1]], [corner[:, ::-1], corner]])
-    first = (domain[0] - shape[0], domain[1] - shape[1])
-    expected = Operator((42, 54), spacing).displacement(padded(pressure, (42, 54), first))
-    window = Window(domain, (0, 0), shape, mirrored=True)
-    found = np.concatenate([rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE).rows(corner)])
-    np.testing.assert_allclose(found, expected[21:, 27:], rtol=1e-12)
-    quick = np.concatenate(
-        [rows for _, rows in FarFieldDisplacement(window, spacing, HALF_SPACE, single=True).rows(1e-300 * corner)]
-    )
-    np.testing.assert_allclose(1e300 * quick, expected[21:, 27:], rtol=0, atol=1e-6 * expected.max())
-    assert np.sum(corner * mean_influence(window, spacing, HALF_SPACE)) == pytest.approx(np.mean(expected), rel=1e-12)
 
 
 def test_window__that_would_begin_or_end_at_the_border_is_the_domain():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import closing_time, march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -20,7 +20,7 @@ def sphere(program, material=MATERIAL, **settings):
     shape, spacing = (9, 7), (0.1, 0.12)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Grid(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def contacts(steps):
@@ -82,7 +82,7 @@ def test_dent_of_a_punch__is_touched_again_when_it_has_recovered_so_far():
     shape = (9, 7)
     x, y = (np.arange(n) - n // 2 for n in shape)
     present = x[:, None] ** 2 + y[None, :] ** 2 < 6
-    half_space, material = Operator(shape, (1.0, 1.0)), rv.zener(1.0, 0.5, 0.5)  # retarded in 1 s
+    half_space, material = Grid(shape, (1.0, 1.0)), rv.zener(1.0, 0.5, 0.5)  # retarded in 1 s
     first = Scene(half_space, np.zeros(shape), material, Modes(material), program, present=present)
     left = list(march(first))[-1].shown.approach  # where it would be touched
     assert left > 0

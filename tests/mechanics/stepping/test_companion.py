@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment.stated import error_columns, meets_tolerance
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.mechanics.stepping.march import march
@@ -33,7 +33,7 @@ def sphere(material, program, **settings):
     shape, spacing = (19, 16), (0.08, 0.09)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Grid(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def rough(material, program, **settings):
@@ -48,7 +48,7 @@ def rough(material, program, **settings):
                 phase = i * x[:, None] + j * y[None, :] + 2 * np.pi * rng.random()
                 height += 0.02 * (i**2 + j**2) ** -0.9 * np.cos(phase)
     gap = height.max() - height
-    return Scene(Operator(shape, spacing, "periodic"), gap, material, Modes(material), program, **settings)
+    return Scene(Grid(shape, spacing, "periodic"), gap, material, Modes(material), program, **settings)
 
 
 SURFACES = {"sphere": sphere, "rough": rough}

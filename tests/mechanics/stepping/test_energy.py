@@ -10,7 +10,7 @@ import references
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.prony import one_less_mean_decay
 from roughvisc.mechanics.sparse import Sparse
@@ -29,7 +29,7 @@ NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 
 def dense(boundary="free"):
     """The influence matrix, column by column."""
-    operator = Operator(SHAPE, SPACING, boundary)
+    operator = Grid(SHAPE, SPACING, boundary)
     return np.array([operator.displacement(unit.reshape(SHAPE)).ravel() for unit in np.eye(np.prod(SHAPE))])
 
 
@@ -41,7 +41,7 @@ def pressures(count, seed=3):
 
 def carried(material, fields, lengths, rule, acts_on="displacement", boundary="free", fresh=False):
     """The energies after steps between fields, a step of no length being a jump."""
-    operator = Operator(SHAPE, SPACING, boundary)
+    operator = Grid(SHAPE, SPACING, boundary)
     memory = Modes(material, acts_on)
     state, found = memory.start(SHAPE), energy.at_rest(memory)
     pairs = [(field, operator.displacement(field)) for field in fields]
@@ -132,7 +132,7 @@ def test_first_step_after_an_event__is_exact_while_it_resolves_what_relaxes():
 def test_step_that_stands_for_a_jump__works_as_a_held_load():
     """All of the pressure on all of the displacement, where nothing gives way at once."""
     material, step = rv.Prony(0.0, 0.2, (1.0, 0.4), (0.3, 2.0)), 0.1
-    operator, memory = Operator(SHAPE, SPACING), Modes(material)
+    operator, memory = Grid(SHAPE, SPACING), Modes(material)
     rest, pressure = pressures(1)
     state = memory.start(SHAPE)
     ends = rest, (Sparse.whole(pressure), operator.displacement(pressure))
@@ -172,7 +172,7 @@ def punch(material, program, cells=(11, 9), radius=3.6, **settings):
     """A flat punch of a few cells, and the radius of the round one that is as stiff."""
     x, y = (np.arange(n) - n // 2 for n in cells)
     present = x[:, None] ** 2 + y[None, :] ** 2 <= radius**2
-    operator = Operator(cells, (1.0, 1.0))
+    operator = Grid(cells, (1.0, 1.0))
     units = [unit.reshape(cells) for unit in np.eye(present.size)[present.ravel()]]
     matrix = np.array([operator.displacement(unit)[present] for unit in units])
     stiff_as = 0.5 * np.linalg.solve(matrix, np.ones(len(units))).sum()  # F = 2 a E* delta
@@ -184,7 +184,7 @@ def sphere(material, program, **settings):
     shape, spacing = (17, 15), (0.1, 0.11)
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    return Scene(Operator(shape, spacing), gap, material, Modes(material), program, **settings)
+    return Scene(Grid(shape, spacing), gap, material, Modes(material), program, **settings)
 
 
 def rows(scene):

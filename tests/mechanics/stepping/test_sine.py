@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.march import march
 from roughvisc.mechanics.stepping.scene import Scene
@@ -14,7 +14,7 @@ SHAPE, MEAN, AMPLITUDE, PERIOD = (5, 4), 1.0, 0.5, 1.0
 
 def punch(material, program, **settings):
     """A flat punch of five by four cells, all of them always in contact: approach is linear in load."""
-    operator = Operator(SHAPE, (1.0, 1.2))
+    operator = Grid(SHAPE, (1.0, 1.2))
     return march(Scene(operator, np.zeros(SHAPE), material, Modes(material), program, accept_edge=True, **settings))
 
 

@@ -10,7 +10,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import Operator
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
@@ -43,7 +43,7 @@ def scene(height, material, program, times=(), tolerance=1e-3):
     """On a square surface, or on a strip of square cells."""
     nx, ny = height.shape
     spacing = (PERIOD / nx, PERIOD / ny if ny > 3 else PERIOD / nx)
-    operator = Operator((nx, ny), spacing, "periodic")
+    operator = Grid((nx, ny), spacing, "periodic")
     gap = height.max() - height
     return Scene(operator, gap, material, Modes(material), program, times=times, tolerance=tolerance)
 
@@ -179,7 +179,7 @@ def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_d
     """At every instant: the profile is pushed along the wave's normal, q_y / q_x = 2.5, and left of y lies -x."""
     nx, ny = 15, 21
     x, y = (2 * np.pi * k * (np.arange(n) + 0.5) / n for n, k in ((nx, 1), (ny, 2)))
-    operator = Operator((nx, ny), (PERIOD / nx, 0.8 * PERIOD / ny), "periodic")
+    operator = Grid((nx, ny), (PERIOD / nx, 0.8 * PERIOD / ny), "periodic")
     height = AMPLITUDE * np.cos(x[:, None] + y)
     program = rv.Program().load(0.05, over=0).slide(0.6 * PERIOD, speed=0.1, direction=direction).hold(TIME)
     found = Scene(operator, height.max() - height, rubber(), Modes(rubber()), program, times=None, tolerance=1e-3)
@@ -275,6 +275,6 @@ def test_slide__is_of_whole_cells_and_periodic():
     with pytest.raises(InputError, match=r"a slide of 40 µm is less than half a cell of 100 µm"):
         Slide(4e-5).cells((1e-4, 1e-4))
     found = scene(wave(12), rubber(), rv.Program().load(1e-6, over=0).slide(PERIOD, speed=0.1))
-    free = replace(found, operator=Operator((12, 1), (PERIOD / 12, PERIOD / 12), "free"), accept_edge=True)
+    free = replace(found, operator=Grid((12, 1), (PERIOD / 12, PERIOD / 12), "free"), accept_edge=True)
     with pytest.raises(InputError, match="periodic"):
         list(march(free))

@@ -16,7 +16,6 @@ RUBBER = rv.zener(3e6, 1e6, 1e5, poisson=0.4)
 #: The same but for rounding, so that the waves are solved for.
 SAME = rv.zener(3e6 * (1 + 1e-9), 1e6, 1e5, poisson=0.4)
 ROUGH = rv.self_affine(size=1e-3, shape=(21, 18), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
-MIRRORED = rv.mirror(ROUGH.isel(x=slice(7), y=slice(6)))
 BALL = rv.sphere(radius=1e-3, size=2e-4, shape=(19, 18))
 FLUID, SAME_FLUID = (rv.maxwell(modulus, 1e5, poisson=0.4) for modulus in (3e6, 3e6 * (1 + 1e-9)))
 TOLERANCE = 3e-4
@@ -98,12 +97,12 @@ def test_jump__of_a_layer_without_instantaneous_compliance_is_refused():
     [
         (ROUGH, PRESS, "periodic", (RUBBER, SAME)),
         (ROUGH, rv.Program().pressure(1e5, over=0).hold(0.2), "periodic", (RUBBER, SAME)),
-        (MIRRORED, PRESS, "periodic", (RUBBER, SAME)),
+        (ROUGH, PRESS, "mirror", (RUBBER, SAME)),
         (ROUGH, rv.Program().pressure(1e4, over=0.05).hold(0.05), "periodic", (FLUID, SAME_FLUID)),
         (ROUGH, rv.Program().pressure(1e5, over=0.05).slide(distance=5e-4, speed=1e-2), "periodic", (RUBBER, SAME)),
         (BALL, rv.Program().load(5e-4, over=0.05).hold(0.2), "free", (RUBBER, SAME)),
     ],
-    ids=["ramp", "jump", "mirrored", "flow", "slide", "free space"],
+    ids=["ramp", "jump", "mirror", "flow", "slide", "free space"],
 )
 def test_work__of_equal_materials_is_that_of_a_half_space(height, program, boundary, materials):
     found, expected = (

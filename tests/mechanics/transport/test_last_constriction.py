@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.transport.flow import flow
 
 CELLS, AMPLITUDE = 128, 0.01
@@ -17,7 +17,7 @@ def conductance():
     wave = np.cos(2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS)
     undeformed = AMPLITUDE * (1 - wave[:, None] * wave)
     cell = (1 / CELLS, 1 / CELLS)
-    operator = Operator(undeformed.shape, cell, "periodic")
+    operator = Grid(undeformed.shape, cell, "periodic")
 
     def at(load):
         state = solve_contact(operator, undeformed, load=load * FULL * CELLS**2, tolerance=1e-10)

@@ -8,9 +8,9 @@ from references.sheet import PunchOnSheet
 from support import rough_gap
 
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.transport.spots import frozen_contact
 
 #: Stiffness of a square of unit side over the contact modulus: pi times the capacity of a square plate, 0.36678742 of
@@ -102,7 +102,7 @@ def hertz(cells, radius, centre, boundary="free"):
     x = np.arange(cells) + 0.5 - cells / 2
     gap = ((x[:, None] - centre[0]) ** 2 + (x - centre[1]) ** 2) / 2e3
     load = 4 * radius**3 / 3e3
-    return solve_contact(Operator((cells, cells), UNIT, boundary), gap, load=load, tolerance=1e-9).pressure > 0
+    return solve_contact(Grid((cells, cells), UNIT, boundary), gap, load=load, tolerance=1e-9).pressure > 0
 
 
 def test_hertz__has_the_stiffness_of_its_exact_radius():
@@ -123,7 +123,7 @@ def test_stiffness__is_the_slope_of_force_over_approach(boundary, make):
     """Of the whole contact problem, at a load where no cell comes into contact within the increment."""
     x, y = np.arange(24) - 11.3, np.arange(22) - 10.8
     gap = (x[:, None] ** 2 + 1.1 * y**2) / 200 + (0.3 * rough_gap((24, 22), seed=5) if make == "rough" else 0)
-    body = Operator(gap.shape, UNIT, boundary)
+    body = Grid(gap.shape, UNIT, boundary)
     load, eps = 3.0, 1e-3
     states = [solve_contact(body, gap, load=load * (1 + part * eps), tolerance=1e-14) for part in (-1, 1)]
     contact = states[0].pressure > 0

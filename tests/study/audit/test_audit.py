@@ -352,12 +352,12 @@ def test_resolution__of_heights_that_are_no_longer_the_recipe_s_is_by_the_last_o
 def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
     assert rv.audit(rough)["border"].verdict == "holds"
     heights, program = rough.height + 2e-5 * rough.x / 1e-3, rv.Program().pressure(2e4, over=1.0)
-    tilted, mirrored = (
-        rv.audit(rv.simulate(one, RUBBER, program, boundary="periodic", **QUICK))["border"]
-        for one in (heights, rv.mirror(heights))
+    tilted, mirrored, unfolded = (
+        rv.audit(rv.simulate(one, RUBBER, program, boundary=boundary, **QUICK))["border"]
+        for one, boundary in ((heights, "periodic"), (heights, "mirror"), (rv.mirror(heights), "periodic"))
     )
     assert tilted.verdict in ("doubtful", "broken")
-    assert mirrored.number == 0
+    assert mirrored.number == unfolded.number == 0
 
 
 # ----------------------------------------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.operator import Operator
 from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
 from roughvisc.study.cost import first_pressure as first_module
 from roughvisc.study.cost.first_pressure import first_pressure
 from roughvisc.study.cost.press import Push, press
@@ -18,7 +18,7 @@ from roughvisc.topography.inspection import inspect_scan
 RADIUS, SIZE = 1e-2, 1e-3
 
 
-@pytest.mark.parametrize("shape", [(96, 80), (97, 81)], ids=["mirrored", "odd"])
+@pytest.mark.parametrize("shape", [(96, 80), (97, 81)], ids=["even", "odd"])
 @pytest.mark.parametrize("given", ["load", "approach"])
 def test_press__hertz(shape, given):
     """Hertz: approach ``a^2 / R``, load times compliance ``4 a^3 / 3 R``."""
@@ -33,7 +33,7 @@ def test_press__hertz(shape, given):
     assert not found.at_border
 
 
-@pytest.mark.parametrize("shape", [(24, 30), (25, 31)], ids=["mirrored", "odd"])
+@pytest.mark.parametrize("shape", [(24, 30), (25, 31)], ids=["even", "odd"])
 def test_press__sees_the_border(shape):
     ball = rv.sphere(RADIUS, SIZE, shape)
     inside, beyond = (
@@ -54,7 +54,7 @@ def test_press__nothing_and_everything():
 
 def touching(surface, pressure, compliance):
     """By the solver itself, on all cells; less 0.088 of the staircase at the rim."""
-    operator = Operator(surface.shape, spacing(surface), "periodic")
+    operator = Grid(surface.shape, spacing(surface), "periodic")
     gap = float(surface.max()) - surface.values
     contact = solve_contact(operator, gap, load=pressure * gap.size * compliance, tolerance=1e-6).pressure > 0
     rim = sum((contact & ~np.roll(contact, turn, axis)).sum() for axis in (0, 1) for turn in (1, -1))
@@ -67,7 +67,7 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     monkeypatch.setattr(first_module, "MOST_PRESSED", most)
     scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=1.7e-5, seed=3)
     found = inspect_scan(scan)
-    assert "mirror" not in found.steps
+    assert found.boundary == "periodic"
     first = first_pressure(scan, found)
     assert max(first.shape) == min(most, 128)
     surface = rv.level(scan, found.steps["level"])

@@ -23,6 +23,7 @@ def study(tmp_path):
     h.to_netcdf(tmp_path / "other.nc")
     (tmp_path / "ball.toml").write_text('generate = "cone"\nslope = 0.1\nsize = 1e-3\nshape = [12, 10]\n')
     (tmp_path / "scan.toml").write_text('file = "rough.nc"\n')
+    (tmp_path / "rough.toml").write_text(ROUGH.removeprefix("[surface]\n"))
 
     def written(text):
         (tmp_path / "study.toml").write_text(text)
@@ -37,15 +38,14 @@ def study(tmp_path):
         (BALL, "free"),
         (ROUGH, "periodic"),
         (WAVES, "periodic"),
-        (BALL + "mirror = true\n", "periodic"),
         (BALL + "level = false\n", "free"),
         (ROUGH + "resample = 8\n", "periodic"),
-        (ROUGH + "mirror = true\n" + SECOND, "periodic"),
+        (ROUGH + "realisation = 1\n" + SECOND, "periodic"),
         (SCAN + "realisation = 3\n", "periodic"),
-        (SCAN + "level = 1\nmirror = true\n", "periodic"),
+        (SCAN + "level = 1\nrealisation = 1\n", "periodic"),
         (SCAN + '[solve]\nedge = "accept"\n', "free"),
         ('[surface]\nfile = "ball.toml"\n', "free"),
-        ('[surface]\nfile = "scan.toml"\nmirror = true\n', "periodic"),
+        ('[surface]\nfile = "scan.toml"\nrealisation = 1\n', "periodic"),
     ],
 )
 def test_key__holds_the_word_that_auto_stands_for(study, text, word):
@@ -79,14 +79,15 @@ def test_study__of_any_other_surface_is_asked(study, text):
 
 
 def test_sweep__over_surfaces_decides_for_each_case(study):
-    sweep = '[sweep]\n"surface.mirror" = [false, true]\n'
-    assert [case.solving().boundary for case in read_cases(study(BALL + BODY + sweep))] == ["free", "periodic"]
+    sweep = '[sweep]\n"surface.file" = ["ball.toml", "rough.toml"]\n'
+    surface = '[surface]\nfile = "ball.toml"\n'
+    assert [case.solving().boundary for case in read_cases(study(surface + BODY + sweep))] == ["free", "periodic"]
 
 
 def test_sweep__over_scans_is_asked_once(study):
     for sweep, case in (
         ('"surface.file" = ["rough.nc", "other.nc"]', ""),
-        ('"surface.mirror" = [true, false]', "case 1"),
+        ('"surface.level" = [1, 2]', ""),
     ):
         with pytest.raises(rv.InputError, match=rf"solve\.boundary: .*{case}"):
             read_cases(study(SCAN + BODY + f"[sweep]\n{sweep}\n"))

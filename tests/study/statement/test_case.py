@@ -281,7 +281,7 @@ def test_program__table_from_csv(study, tmp_path, rows):
         ("[material]", 'filter = "5 N"\n[material]', "surface.filter.cutoff", "5 N"),
         ("[material]", 'crop = { y = ["9 mm", "1 um"] }\n[material]', "surface.crop.y", ["9 mm", "1 um"]),
         ("[material]", "resample = [1, 9]\n[material]", "surface.resample.0", 1),
-        ("[material]", 'mirror = "x"\n[material]', "surface.mirror", "x"),
+        ("[material]", "mirror = true\n[material]", "surface.mirror", True),
         ('"2 N"', '"2"', "program.0.load", "2"),
         ('"2 N"', "true", "program.0.load", True),
         ('over = "50 ms"', "", "program.0.over", None),

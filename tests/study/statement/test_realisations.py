@@ -21,8 +21,8 @@ seed = 5
 SCAN = """
 [surface]
 file = "rough.nc"
-mirror = true
 """
+MIRROR = '[solve]\nboundary = "mirror"\n'
 BODY = """
 [material]
 model = "elastic"
@@ -57,8 +57,8 @@ def test_realisations__of_generated_roughness_are_the_seeds_from_the_stated_one(
 
 
 def test_realisations__of_a_scan_are_the_scan_itself_and_its_surrogates(study):
-    plain = read_study(study(SCAN))
-    cases = read_cases(study(SCAN, "[sweep]\nrealisations = 2\n"))
+    plain = read_study(study(SCAN, MIRROR))
+    cases = read_cases(study(SCAN, MIRROR + "[sweep]\nrealisations = 2\n"))
     assert [dict(case.varied) for case in cases] == [{"realisation": number} for number in (0, 1, 2)]
     assert cases[0].key == plain.key
     assert [c.key for c in cases[1:]] == [vary(plain, {"surface.realisation": number}).key for number in (1, 2)]
@@ -71,8 +71,8 @@ def test_realisations__are_crossed_with_lists_and_belong_to_their_table(study):
     tables = '[[sweep]]\nrealisations = 3\n"surface.hurst" = [0.6, 0.7]\n[[sweep]]\n"surface.hurst" = 0.9\n'
     found = [(case.settings.surface.hurst, case.varied.get("realisation")) for case in read_cases(study(ROUGH, tables))]
     assert found == [(0.6, 1), (0.6, 2), (0.6, 3), (0.7, 1), (0.7, 2), (0.7, 3), (0.9, None)]
-    kinds = '[[sweep]]\nrealisations = 2\nsurface = [{ file = "rough.nc", mirror = true }]\n'
-    assert [case.varied["realisation"] for case in read_cases(study(ROUGH, kinds))] == [0, 1, 2]
+    kinds = '[[sweep]]\nrealisations = 2\nsurface = [{ file = "rough.nc" }]\n'
+    assert [case.varied["realisation"] for case in read_cases(study(ROUGH, MIRROR + kinds))] == [0, 1, 2]
 
 
 def test_realisations__of_two_generated_faces_draw_both(study):
@@ -105,9 +105,8 @@ def test_realisations__are_refused_where_they_make_no_sense(study, surface, swee
 
 
 def test_realisations__a_case_that_is_refused_says_which_it_is(study):
-    open_border = SCAN.replace("mirror = true", "")  # whose surrogates repeat, while it does not
-    with pytest.raises(InputError, match=r"solve.boundary: .*case 0"):
-        read_cases(study(open_border, "[sweep]\nrealisations = 2\n"))
+    with pytest.raises(InputError, match=r"solve.boundary: .*case 0"):  # its surrogates repeat, while it does not
+        read_cases(study(SCAN, "[sweep]\nrealisations = 2\n"))
 
 
 def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatment(tmp_path):

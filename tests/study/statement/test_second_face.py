@@ -53,13 +53,11 @@ def test_second__is_the_sum_of_both_faces_the_second_turned_over(one, two):
 
 
 def test_second__each_face_is_conditioned_and_what_is_pressed_is_framed(one, two):
-    """Steps of a face come before the sum; resampling and mirror after it."""
-    case = vary(
-        two, {"surface.invert": True, "surface.second.level": 2, "surface.resample": 20, "surface.mirror": True}
-    )
+    """Steps of a face come before the sum; resampling after it."""
+    case = vary(two, {"surface.invert": True, "surface.second.level": 2, "surface.resample": 20})
     other = rv.level(rv.self_affine(1e-3, (64, 48), hurst=0.7, rms_height=5e-7, seed=4), 2)
     both = rv.combine(rv.invert(one.height()), other, "x", align="centre")
-    np.testing.assert_array_equal(case.height(), rv.mirror(rv.resample(both, 20)))
+    np.testing.assert_array_equal(case.height(), rv.resample(both, 20))
 
 
 def test_second__counts_in_the_key_and_nothing_does_without_one(one, two):
@@ -93,7 +91,7 @@ def test_second__is_data_of_which_a_trade_keeps_the_waves_that_a_coarser_grid_ho
             "surface.second.generate: found 'con', which is no known recipe; did you mean",
         ),
         ({"second.flip": "z"}, "surface.second.flip: found 'z': expected 'x' or 'y' or 'none'"),
-        ({"second.mirror": True}, "surface.second.mirror: unknown key"),
+        ({"second.resample": 8}, "surface.second.resample: unknown key"),
         ({"second.second": ROUGH}, "surface.second.second: unknown key"),
         ({"second": {"file": "gone.x3p"}}, "surface.second.file: found 'gone.x3p', which does not exist"),
     ],

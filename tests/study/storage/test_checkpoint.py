@@ -16,7 +16,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InUseError
-from roughvisc.mechanics.bodies.transforms import transform_library
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_study, vary

@@ -184,12 +184,6 @@ def test_card_of_a_punch__is_made_coarser_by_means(tmp_path):
     assert np.isfinite(ds.run_time).all()
 
 
-def test_mirrored_surface__is_made_coarser_before_it_is_mirrored(tmp_path):
-    case = case_of(tmp_path, ROUGH.replace("seed = 3", "seed = 3\nmirror = true"))
-    assert case.height().shape == (60, 52)
-    assert changed(case, (60, 52), Setting(coarsening=2.0)).height().shape == (30, 26)
-
-
 def test_ladder__has_finer_grids_of_a_recipe_only(tmp_path):
     ball, rough = (case_of(tmp_path, text) for text in (STUDY, ROUGH))
     assert min(one.coarsening for one in ladder(ball, (48, 48))) < 1

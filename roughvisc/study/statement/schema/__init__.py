@@ -42,7 +42,7 @@ def _with_boundary(solve: SolveSection, info: ValidationInfo) -> SolveSection:
     friction = info.data["friction"]
     found = known_boundary(solve, friction.experiment().boundary if friction else None, info.data["surface"].boundary)
     if found is None:
-        raise refuse("boundary", OPEN_BOUNDARY.format(mirror="mirror = true in [surface]"))
+        raise refuse("boundary", OPEN_BOUNDARY)
     if found == solve.boundary:
         return solve
     return SolveSection.model_construct(solve.model_fields_set - {"boundary"}, **dict(solve) | {"boundary": found})

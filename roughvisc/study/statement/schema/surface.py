@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, create_model
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.operator import Boundary
+from roughvisc.mechanics.grid import Boundary
 from roughvisc.settings import WORDS, Settings
 from roughvisc.study.statement.schema.section import (
     FilePath,
@@ -131,7 +131,6 @@ class Conditioned(Prepared):
     shortest_wave: nullable(LENGTH) = None
     realisation: nullable(whole(1)) = None
     resample: nullable(SHAPE) = None
-    mirror: Flag = False
     missing: choice(*WORDS["missing"]) = Settings.missing
 
 

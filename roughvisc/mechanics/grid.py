@@ -1,0 +1,425 @@
+"""Cells on which pressure acts: convolution with the kernel of a body, and its approximate inverse.
+
+Three boundaries:
+
+- ``free``: nothing is loaded outside the grid. Zeros beyond the cells make the convolution linear.
+- ``periodic``: the grid is one period of an endless surface.
+- ``mirror``: the surface and its mirror images repeat. Cosine transforms (type 2) need the cells of the surface only.
+
+Displacement is per unit contact compliance ``C = 1/E*``. Fields are arrays of NumPy, or of CuPy on a grid with ``xp``
+CuPy.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.arrays import threads_of
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
+
+try:
+    import ducc0
+except ImportError:
+    ducc0 = None
+
+Array = Any  # an array of NumPy or CuPy
+Boundary = Literal["free", "periodic", "mirror"]
+BOUNDARIES: tuple[Boundary, ...] = ("free", "periodic", "mirror")
+
+#: Rows that are transformed together, bytes of such columns and the fewest columns, which stay in the cache. Measured
+#: from 64 to 1,024 cells a side: whole fields take up to 1.5 times as long.
+ROWS, COLUMN_BYTES, COLUMNS = 128, 1 << 18, 32
+#: Cells from which periodic convolutions are done by blocks of columns too; below, whole fields are faster.
+BLOCKS_FROM = 1024**2
+#: Cells a side of a block of the coarse grid.
+COARSE = 8
+
+
+class Grid:
+    """Rectangular cells of a body's surface.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+    boundary : {"free", "periodic", "mirror"}
+        What lies outside the grid.
+    workers : int, optional
+        Threads of the transforms from a million cells on. Default: as set by ``scipy.fft.set_workers``, or one.
+    kernel : Kernel
+        Displacement of the body's surface under pressure.
+    symbol : array, optional
+        Transform of the kernel, if known from :meth:`symbol_of`. [m]
+    xp : module
+        NumPy, or CuPy for a grid on a device.
+
+    Attributes
+    ----------
+    points : tuple of int
+        Points of the transforms: in free space at least twice the cells.
+    period : tuple of int
+        Cells of a period, mirror images included; the cells in free space.
+    symbol : array
+        Transform of the kernel at non-negative wave numbers. [m]
+    definite : bool
+        Whether a uniform pressure displaces the surface too.
+    convolutions : int
+        Number of convolutions so far, applications of the inverse included.
+
+    Raises
+    ------
+    InputError
+        If the boundary is unknown, the grid is impossible or the kernel's transfer function is not positive.
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        spacing: tuple[float, float],
+        boundary: Boundary = "free",
+        workers: int | None = None,
+        *,
+        kernel: Kernel = HALF_SPACE,
+        symbol: Array | None = None,
+        xp: Any = np,
+    ) -> None:
+        if boundary not in BOUNDARIES:
+            raise InputError(key="boundary", found=boundary, expected="'free', 'periodic' or 'mirror'")
+        self.shape, self.spacing, self.boundary, self.kernel = shape, spacing, boundary, kernel
+        self.workers, self.xp = workers, xp
+        images = 2 if boundary == "mirror" else 1
+        self.period = images * shape[0], images * shape[1]
+        self.points = shape
+        if boundary == "free":
+            self.points = 2 * _fast_length(shape[0]), 2 * _fast_length(shape[1])
+        if symbol is None:
+            symbol = self._periodic_symbol if boundary != "free" else self.symbol_of(kernel)
+        self.symbol = xp.asarray(symbol)
+        self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
+        self.convolutions = 0
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self.shape[0] * self.shape[1]
+
+    @property
+    def cell_area(self) -> float:
+        """Area of a cell. [m2]"""
+        return self.spacing[0] * self.spacing[1]
+
+    @property
+    def threads(self) -> int:
+        """Number of threads that work on one field."""
+        return threads_of(self.size, self.workers)
+
+    @property
+    def wave_numbers(self) -> tuple[float, float]:
+        """Wave numbers of the longest and of the shortest wave. [1/m]"""
+        return wave_limits(self.period, self.spacing)
+
+    # ----------------------------------------------------------------------------------------- other grids and kernels
+
+    def on(self, shape: tuple[int, int]) -> Grid:
+        """Return a grid of the same body, boundary and extent with another number of cells."""
+        (nx, ny), (mx, my), (dx, dy) = self.shape, shape, self.spacing
+        spacing = dx * (nx / mx), dy * (ny / my)
+        return Grid(shape, spacing, self.boundary, self.workers, kernel=self.kernel, xp=self.xp)
+
+    def answering(self, symbol: Array, kernel: Kernel) -> Grid:
+        """Return the same cells with another kernel and its transform."""
+        cells = self.shape, self.spacing, self.boundary, self.workers
+        return Grid(*cells, kernel=kernel, symbol=symbol, xp=self.xp)
+
+    @cached_property
+    def coarse(self) -> Grid:
+        """Grid of blocks of about 8 by 8 cells."""
+        return self.on((-(-self.shape[0] // COARSE), -(-self.shape[1] // COARSE)))
+
+    @cached_property
+    def block_of_cell(self) -> Array:
+        """Block of each cell on the coarse grid, as flat indices."""
+        xp = self.xp
+        rows, columns = (xp.arange(n) * m // n for n, m in zip(self.shape, self.coarse.shape, strict=True))
+        return (rows[:, None] * self.coarse.shape[1] + columns).astype(xp.int32).reshape(-1)
+
+    def symbol_of(self, kernel: Kernel) -> np.ndarray:
+        """Return the transform of a kernel of either sign at non-negative wave numbers. [m]"""
+        if self.boundary == "free":
+            return free_space_symbol(kernel, self.points, self.spacing)
+        waves = periodic_waves(self.period, self.spacing)
+        return self._without_shortest(np.asarray(kernel.transfer(*waves), dtype=float))
+
+    @cached_property
+    def _periodic_symbol(self) -> np.ndarray:
+        """Transform of the kernel on the cells themselves, checked to be positive. [m]"""
+        return self._without_shortest(periodic_symbol(self.kernel, self.period, self.spacing))
+
+    def _without_shortest(self, symbol: np.ndarray) -> np.ndarray:
+        """Leave out the waves that change sign at every cell of a mirrored surface: their cosines vanish there."""
+        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]]) if self.boundary == "mirror" else symbol
+
+    # ------------------------------------------------------------------------------------------------- displacement
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacement under a pressure, per unit contact compliance: one convolution. [m]
+
+        In the precision of the pressure. Under periodic and mirror boundaries the mean displacement of a half-space is
+        zero.
+        """
+        self.convolutions += 1
+        symbol = self._single_symbol if pressure.dtype == np.float32 else self.symbol
+        return self._convolved(pressure, symbol, self.points)
+
+    def inverse(self, displacement: Array) -> Array:
+        """Return approximately the pressure that causes a displacement, in single precision.
+
+        This is the inverse of the periodic kernel on the cells, or of the mirror kernel. In free space it is wrong only
+        by what wraps around; it is symmetric and positive definite, at a fifth of the cost of a convolution.
+
+        Parameters
+        ----------
+        displacement : array of float32, shape (nx, ny)
+            Of ordinary size: single precision underflows. [m]
+        """
+        self.convolutions += 1
+        return self._convolved(displacement, self._inverse_symbol, self.shape)
+
+    @cached_property
+    def stiffest(self) -> float:
+        """Largest eigenvalue of the convolution, or a bound on it. [m]"""
+        return float(self.symbol.max()) or self.spacing[0]
+
+    @cached_property
+    def self_influence(self) -> float:
+        """Displacement of a cell under unit pressure on it alone: the mean eigenvalue. [m]
+
+        With mirror images, the mean over all cells.
+        """
+        if self.boundary == "mirror":
+            return float(self.symbol.mean())
+        along_x, along_y = (self.xp.asarray(_counts(points)) / points for points in self.points)
+        return float((along_x[:, None] * self.symbol * along_y).sum())
+
+    @cached_property
+    def _single_symbol(self) -> Array:
+        return self.symbol.astype(np.float32)
+
+    @cached_property
+    def _inverse_symbol(self) -> Array:
+        known = self.boundary != "free"
+        symbol = self.symbol.copy() if known else self.xp.asarray(self._periodic_symbol)
+        symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
+        return (1 / symbol).astype(np.float32)
+
+    def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
+        """Return a field convolved on so many points."""
+        fft = self._transforms
+        if self.boundary == "mirror":
+            return fft.cosines_back(fft.cosines(field) * symbol)
+        if points == self.shape and self.size < BLOCKS_FROM:
+            spectrum = fft.waves(field)
+            self.multiply(spectrum, symbol)
+            return fft.waves_back(spectrum, points)
+        # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache.
+        (nx, ny), count, threads = self.shape, points[1] // 2 + 1, self.threads
+        spectrum = self.xp.empty((nx, count), np.result_type(field.dtype, np.complex64))
+        rows, columns = threads * ROWS, threads * max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
+        if self.xp is not np:
+            rows, columns = nx, count
+        for part in (slice(first, first + rows) for first in range(0, nx, rows)):
+            spectrum[part] = fft.rows(field[part], points[1])
+        room = self.xp.empty((points[0], min(columns, count)), spectrum.dtype)
+        for part in (slice(first, min(first + columns, count)) for first in range(0, count, columns)):
+            waves = room[:, : part.stop - part.start]
+            waves[:nx], waves[nx:] = spectrum[:, part], 0
+            waves = fft.columns(waves)
+            self.multiply(waves, symbol[:, part])
+            spectrum[:, part] = fft.columns_back(waves)[:nx]
+        found = self.xp.empty((nx, ny), field.dtype)
+        for part in (slice(first, first + rows) for first in range(0, nx, rows)):
+            found[part] = fft.rows_back(spectrum[part], points[1])[:, :ny]
+        return found
+
+    # ----------------------------------------------------------------------------------------------------- transforms
+
+    @cached_property
+    def _transforms(self) -> Transforms:
+        return transforms(self.threads, self.xp)
+
+    def spectrum(self, field: Array) -> Array:
+        """Return the transform of a field, zero beyond the cells."""
+        if self.boundary == "mirror":
+            return self._transforms.cosines(field)
+        if self.points != self.shape:
+            field = self.xp.pad(field, [(0, m - n) for n, m in zip(self.shape, self.points, strict=True)])
+        return self._transforms.waves(field)
+
+    def field_of(self, spectrum: Array) -> Array:
+        """Return the field of a transform, which is overwritten."""
+        if self.boundary == "mirror":
+            return self._transforms.cosines_back(spectrum)
+        found = self._transforms.waves_back(spectrum, self.points)
+        return self.xp.ascontiguousarray(found[: self.shape[0], : self.shape[1]])
+
+    def multiply(self, spectrum: Array, symbol: Array) -> None:
+        """Multiply a transform in place by a symbol, which is the same for negative wave numbers along x."""
+        first = len(symbol)
+        spectrum[:first] *= symbol
+        if len(spectrum) > first:
+            spectrum[first:] *= symbol[len(spectrum) - first : 0 : -1]
+
+    def even_sum(self, field: Array, symbol: Array) -> float:
+        """Return the sum of a real transform times a symbol."""
+        first = len(symbol)
+        total = float((field[:first] * symbol).sum())
+        if len(field) > first:
+            total += float((field[first:] * symbol[len(field) - first : 0 : -1]).sum())
+        return total
+
+    @cached_property
+    def parseval(self) -> Array:
+        """Weights with which the product of two transforms, one conjugate, sums up to the area integral. [m2]"""
+        mx, my = self.points
+        if self.boundary == "mirror":
+            along_x, along_y = (np.where(np.arange(n) == 0, 0.25, 0.5) for n in (mx, my))
+        else:
+            along_x, along_y = np.ones(mx), _counts(my)
+        return self.xp.asarray(np.outer(along_x, along_y) * (self.cell_area / (mx * my)))
+
+    def turn(self, cells: int, axis: int) -> Array:
+        """Return the factors of the transform of a periodic field that is seen from so many cells farther."""
+        if self.boundary != "periodic":
+            raise ValueError("only periodic fields turn")
+        count = self.shape[axis]
+        waves = np.fft.fftfreq(count, 1 / count) if axis == 0 else np.fft.rfftfreq(count, 1 / count)
+        phases = np.exp(2j * np.pi * cells / count * waves)
+        return self.xp.asarray(phases[:, None] if axis == 0 else phases)
+
+
+def _fast_length(cells: int) -> int:
+    """Return a length, at least so many cells, that transforms fast."""
+    return int(scipy.fft.next_fast_len(cells, real=True))
+
+
+def _counts(points: int) -> np.ndarray:
+    """Return how many waves of so many points have each non-negative wave number."""
+    number = np.arange(points // 2 + 1)
+    return np.where((number == 0) | (2 * number == points), 1.0, 2.0)
+
+
+# ------------------------------------------------------------------------------------------------------- transforms
+
+
+class Transforms:
+    """Transforms along both axes by SciPy, or by CuPy.
+
+    The way back may overwrite its argument.
+    """
+
+    def __init__(self, fft: Any, **settings: Any) -> None:
+        self.fft, self.settings = fft, settings
+
+    def waves(self, field: Array) -> Array:
+        """Return the Fourier transform, shape (nx, ny // 2 + 1)."""
+        return self.fft.rfftn(field, **self.settings)
+
+    def waves_back(self, spectrum: Array, shape: tuple[int, int]) -> Array:
+        """Return the field of a Fourier transform."""
+        return self.fft.irfftn(spectrum, s=shape, overwrite_x=True, **self.settings)
+
+    def rows(self, field: Array, points: int) -> Array:
+        """Return the Fourier transform along y of the field and zeros."""
+        return self.fft.rfft(field, points, axis=1, **self.settings)
+
+    def columns(self, spectrum: Array) -> Array:
+        """Return the Fourier transform along x, which may overwrite the spectrum."""
+        return self.fft.fft(spectrum, axis=0, overwrite_x=True, **self.settings)
+
+    def columns_back(self, spectrum: Array) -> Array:
+        """Return the inverse Fourier transform along x."""
+        return self.fft.ifft(spectrum, axis=0, overwrite_x=True, **self.settings)
+
+    def rows_back(self, spectrum: Array, points: int) -> Array:
+        """Return the field of a Fourier transform along y."""
+        return self.fft.irfft(spectrum, points, axis=1, overwrite_x=True, **self.settings)
+
+    def cosines(self, field: Array) -> Array:
+        """Return the cosine transform, type 2."""
+        return self.fft.dctn(field, type=2, **self.settings)
+
+    def cosines_back(self, spectrum: Array) -> Array:
+        """Return the field of a cosine transform."""
+        return self.fft.idctn(spectrum, type=2, overwrite_x=True, **self.settings)
+
+
+class DuccTransforms(Transforms):
+    """The same by ducc0, which is faster."""
+
+    def __init__(self, threads: int) -> None:
+        super().__init__(ducc0.fft, nthreads=threads)
+        self.back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, "nthreads": threads}
+
+    def waves(self, field: Array) -> Array:
+        return self.fft.r2c(field, axes=(0, 1), **self.settings)
+
+    def waves_back(self, spectrum: Array, shape: tuple[int, int]) -> Array:
+        return self.fft.c2r(spectrum, axes=(0, 1), lastsize=shape[1], **self.back)
+
+    def rows(self, field: Array, points: int) -> Array:
+        longer = _apart((field.shape[0], points), field.dtype)
+        longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
+        return self.fft.r2c(longer, axes=(1,), **self.settings)
+
+    def columns(self, spectrum: Array) -> Array:
+        return self.fft.c2c(spectrum, axes=(0,), out=spectrum, **self.settings)
+
+    def columns_back(self, spectrum: Array) -> Array:
+        return self.fft.c2c(spectrum, axes=(0,), forward=False, inorm=2, out=spectrum, **self.settings)
+
+    def rows_back(self, spectrum: Array, points: int) -> Array:
+        out = _apart((spectrum.shape[0], points), spectrum.real.dtype)
+        return self.fft.c2r(spectrum, axes=(1,), lastsize=points, out=out, **self.back)
+
+    def cosines(self, field: Array) -> Array:
+        return self.fft.dct(field, type=2, axes=(0, 1), **self.settings)
+
+    def cosines_back(self, spectrum: Array) -> Array:
+        return self.fft.dct(spectrum, type=3, axes=(0, 1), inorm=2, out=spectrum, **self.settings)
+
+
+def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
+    """Return an array whose rows are not a power of two apart: transforms of those take up to three times as long."""
+    return np.empty((shape[0], shape[1] + 16), number)[:, : shape[1]]
+
+
+def transforms(threads: int = 1, xp: Any = np) -> Transforms:
+    """Return the transforms of arrays of NumPy, or of CuPy."""
+    if xp is not np:
+        from cupyx.scipy import fft
+
+        return Transforms(fft)
+    return DuccTransforms(threads) if has_ducc0() else Transforms(scipy.fft, workers=threads)
+
+
+def has_ducc0() -> bool:
+    """Return whether ducc0 is installed and ``ROUGHVISC_TRANSFORMS`` is not ``scipy``."""
+    return ducc0 is not None and os.environ.get("ROUGHVISC_TRANSFORMS") != "scipy"
+
+
+def transform_library() -> str:
+    """Return names and versions of the libraries that determine the last digits of results.
+
+    Results are identical to the last bit only if these are the same. SciPy also transforms the sampled kernels.
+    """
+    engine = f"ducc0 {ducc0.__version__}, scipy" if has_ducc0() else "scipy.fft"
+    return f"{engine} {scipy.__version__}, numpy {np.__version__}"

@@ -1,0 +1,239 @@
+"""Displacement on a grid against direct sums, closed forms and the unfolded surface; SciPy against ducc0."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from strategies import examples, seeds, shapes
+from support import direct, refused
+
+import roughvisc as rv
+from roughvisc.mechanics import arrays
+from roughvisc.mechanics import grid as grids
+from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window
+from roughvisc.mechanics.grid import Grid, transform_library
+from roughvisc.mechanics.sliding.steady import Sliding
+
+SHAPES = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
+BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+
+
+def unfolded(field):
+    """The field and its mirror images: one period."""
+    return np.block([[field, field[:, ::-1]], [field[::-1], field[::-1, ::-1]]])
+
+
+# ---------------------------------------------------------------------------------------------------- displacement
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_free_displacement__is_the_sum_over_cells(shape):
+    pressure = np.random.default_rng(1).random(shape)
+    found = Grid(shape, (1.3, 0.7)).displacement(pressure)
+    expected = direct(pressure, (1.3, 0.7))
+    assert np.abs(found - expected).max() < 1e-14 * expected.max()
+
+
+@pytest.mark.parametrize(
+    ("shape", "waves"), [((9, 8), (0, 3)), ((9, 8), (2, 1)), ((12, 15), (3, 2)), ((12, 15), (0, 3)), ((1, 21), (0, 3))]
+)
+def test_periodic_displacement__of_a_wave(shape, waves):
+    """A wave of pressure of wave number q causes a displacement 2/q times as large."""
+    spacing = (0.4, 0.9)
+    phase = sum(2 * np.pi * k * index / n for k, index, n in zip(waves, np.indices(shape), shape, strict=True))
+    wave_number = np.hypot(*(2 * np.pi * k / (n * d) for k, n, d in zip(waves, shape, spacing, strict=True)))
+    found = Grid(shape, spacing, "periodic").displacement(np.cos(phase))
+    assert found == pytest.approx(2 / wave_number * np.cos(phase), abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("shape", "halves"), [((9, 8), (0, 3)), ((9, 8), (2, 1)), ((12, 15), (5, 14)), ((1, 21), (0, 1)), ((2, 1), (1, 0))]
+)
+def test_mirror_displacement__of_half_waves(shape, halves):
+    """Cosines of whole numbers of half waves, with crests at the borders, are their own mirror images."""
+    spacing = (0.4, 0.9)
+    lengths = [n * d for n, d in zip(shape, spacing, strict=True)]
+    centres = [(np.arange(n) + 0.5) * d for n, d in zip(shape, spacing, strict=True)]
+    along_x, along_y = (np.cos(np.pi * k * x / length) for k, x, length in zip(halves, centres, lengths, strict=True))
+    wave = np.outer(along_x, along_y)
+    wave_number = np.hypot(*(np.pi * k / length for k, length in zip(halves, lengths, strict=True)))
+    assert Grid(shape, spacing, "mirror").displacement(wave) == pytest.approx(2 / wave_number * wave, abs=1e-13)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_mirror__is_a_quarter_of_the_unfolded_surface(shape):
+    pressure = np.random.default_rng(3).random(shape)
+    mirror, whole = Grid(shape, (1.3, 0.7), "mirror"), Grid((2 * shape[0], 2 * shape[1]), (1.3, 0.7), "periodic")
+    assert mirror.cell_area == whole.cell_area
+    for name, kind, precision in (("displacement", np.float64, 1e-13), ("inverse", np.float32, 3e-6)):
+        field = (pressure - pressure.mean()).astype(kind)  # of the mean, the inverse is a convention
+        expected, found = getattr(whole, name)(unfolded(field)), getattr(mirror, name)(field)
+        assert found.dtype == kind
+        np.testing.assert_allclose(unfolded(found), expected, rtol=0, atol=precision * np.abs(expected).max())
+
+
+@given(shape=shapes(1, 12), seed=seeds)
+@examples(40)
+@BOUNDARIES
+def test_convolutions__are_symmetric_and_positive(shape, boundary, seed):
+    grid = Grid(shape, (1.0, 0.6), boundary)
+    a, b = np.random.default_rng(seed).standard_normal((2, *shape))
+    for applied, precision in ((grid.displacement, 1e-12), (grid.inverse, 1e-5)):
+        scale = np.linalg.norm(applied(a)) * np.linalg.norm(b) + 1e-300
+        assert np.sum(applied(a) * b) == pytest.approx(np.sum(a * applied(b)), abs=precision * scale)
+        assert np.sum(applied(a) * a) >= -precision * scale
+
+
+@BOUNDARIES
+def test_inverse__inverts_what_is_far_from_the_border(boundary):
+    x, y = np.indices((45, 64))
+    pressure = np.cos(2 * np.pi * 9 * x / 45) * np.exp(-(((x - 22) / 6.0) ** 2) - ((y - 32) / 6.0) ** 2)
+    grid = Grid((45, 64), (1.0, 1.0), boundary)
+    back = grid.inverse(grid.displacement(pressure))
+    assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
+
+
+@pytest.fixture
+def in_small_blocks(monkeypatch):
+    """Blocks and threads as on a large grid."""
+    monkeypatch.setattr(arrays, "_THREADED", 1)
+    for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
+        monkeypatch.setattr(grids, name, value)
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_fields__do_not_depend_on_blocks_and_threads(boundary, kind, request):
+    pressure = np.random.default_rng(4).random((65, 70)).astype(kind)
+    whole = Grid((65, 70), (1.0, 1.0), boundary)
+    fields = [(whole.displacement(pressure), whole.inverse(pressure.astype(np.float32)))]
+    request.getfixturevalue("in_small_blocks")
+    for threads in (1, 2, 3):
+        grid = Grid((65, 70), (1.0, 1.0), boundary, workers=threads)
+        assert grid.threads == threads
+        fields.append((grid.displacement(pressure), grid.inverse(pressure.astype(np.float32))))
+    for others in fields[1:]:
+        for field, other in zip(fields[0], others, strict=True):
+            assert field.dtype == other.dtype
+            precision = 1e-14 if field.dtype == np.float64 else 1e-6
+            np.testing.assert_allclose(field, other, rtol=0, atol=precision * np.abs(field).max())
+
+
+def test_boundary__is_named_when_unknown():
+    with refused("boundary", "open"):
+        Grid((4, 4), (1.0, 1.0), "open")
+
+
+# ------------------------------------------------------------------------------------------- numbers of a grid
+
+
+@pytest.mark.parametrize("shape", [(7, 5), (8, 6), (1, 9)])
+def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
+    """Johnson, Contact Mechanics, eq. (3.25) at the centre."""
+    a, b = 1.3, 0.7
+    expected = 2 / np.pi * (a * np.arcsinh(b / a) + b * np.arcsinh(a / b))
+    assert Grid(shape, (a, b)).self_influence == pytest.approx(expected, rel=1e-12)
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("shape", [(7, 6), (8, 5), (1, 4), (1, 1)])
+def test_self_influence__is_the_mean_displacement_of_a_cell_that_is_loaded_alone(boundary, shape):
+    grid = Grid(shape, (1.3, 0.7), boundary)
+    alone = np.eye(grid.size).reshape(-1, *shape)
+    expected = np.mean([np.sum(one * grid.displacement(one)) for one in alone])
+    assert grid.self_influence == pytest.approx(expected, rel=1e-12)
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
+def test_parseval__gives_the_work_of_a_pressure_on_its_displacement(shape, boundary):
+    grid = Grid(shape, (1.0, 2.0), boundary)
+    pressure = np.random.default_rng(4).random(shape)
+    displacement = grid.displacement(pressure)
+    spectrum = grid.spectrum(pressure)
+    response = spectrum.copy()
+    grid.multiply(response, grid.symbol_of(grid.kernel))
+    found = float(np.sum(grid.parseval * (spectrum * response.conj()).real))
+    assert found == pytest.approx(float((pressure * displacement).sum()) * grid.cell_area)
+    np.testing.assert_allclose(grid.field_of(response), displacement, rtol=0, atol=1e-13 * displacement.max())
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_turn__moves_a_periodic_field(axis):
+    grid, field = Grid((9, 8), (1.0, 1.0), "periodic"), np.random.default_rng(2).standard_normal((9, 8))
+    if axis == 1:
+        field -= (field * (-1.0) ** np.arange(8)).mean(axis=1, keepdims=True) * (-1.0) ** np.arange(8)
+    moved = grid.field_of(grid.spectrum(field) * grid.turn(3, axis))
+    np.testing.assert_allclose(moved, np.roll(field, -3, axis), atol=1e-14)
+    with pytest.raises(ValueError, match="periodic"):
+        Grid((9, 8), (1.0, 1.0), "mirror").turn(3, axis)
+
+
+# --------------------------------------------------------------------------------------------------- SciPy and ducc0
+
+
+@pytest.fixture
+def by_ducc0(monkeypatch):
+    monkeypatch.delenv("ROUGHVISC_TRANSFORMS")
+    assert transform_library().startswith("ducc0 ")
+
+
+@BOUNDARIES
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+@pytest.mark.parametrize("shape", [(33, 150), (9, 15), (8, 14), (1, 11), (7, 1)])
+def test_half_space__is_the_same_by_both(boundary, kind, shape, monkeypatch):
+    pressure = np.random.default_rng(0).random(shape).astype(kind)
+    found = []
+    for engine in ("scipy", "ducc0"):
+        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
+        grid = Grid(shape, (1.0, 0.7), boundary)
+        found.append((grid.displacement(pressure), grid.inverse(pressure.astype(np.float32))))
+    for a, b in zip(*found, strict=True):
+        assert a.dtype == b.dtype
+        precision = 1e-14 if a.dtype == np.float64 else 1e-5
+        np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
+
+
+def test_far_field__is_the_same_by_both(monkeypatch):
+    pressure = np.random.default_rng(0).random((13, 9))
+    window, found = Window((40, 51), (0, 0), pressure.shape), []
+    for engine in ("scipy", "ducc0"):
+        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
+        far_field = FarFieldDisplacement(window, (1.0, 0.7), HALF_SPACE)
+        found.append(np.concatenate([rows.copy() for _, rows in far_field.rows(pressure)]))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-13)
+
+
+def test_sliding__is_the_same_by_both_and_goes_by_the_one_that_is_stated(monkeypatch):
+    pressure, body, calls, found = np.random.default_rng(0).random((15, 12)), Body(rv.zener(1e6, 1e6, 1e5)), [], []
+    sound = grids.ducc0.fft.r2c
+    monkeypatch.setattr(grids.ducc0.fft, "r2c", lambda *a, **kw: calls.append(a) or sound(*a, **kw))
+    for engine, by_ducc0 in (("scipy", 0), ("ducc0", 3)):
+        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
+        sliding = Sliding(body, pressure.shape, (1e-6, 2e-6), 0.1)
+        found.append((sliding.displacement(pressure), sliding.full_contact(pressure)))
+        assert sliding.convolutions == 3
+        assert len(calls) == by_ducc0
+    for (a, b), precision in zip(zip(*found, strict=True), (1e-14, 1e-5), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
+
+
+def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(
+        '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.3 mm"\nshape = [16, 15]\n'
+        '[material]\nmodel = "elastic"\nshear_modulus = "1 MPa"\n[[program]]\nload = "1 mN"\nover = 0\n'
+    )
+    fast = rv.run(rv.read_study(study), tmp_path / "fast", progress=False)
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
+    plain = rv.run(rv.read_study(study), tmp_path / "plain", progress=False)
+    assert fast.attrs["transforms"].startswith("ducc0 ")
+    assert plain.attrs["transforms"].startswith("scipy.fft ")
+    np.testing.assert_allclose(fast.pressure, plain.pressure, rtol=0, atol=1e-9 * float(plain.pressure.max()))
+
+
+def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):
+    monkeypatch.setattr(grids, "ducc0", None)
+    assert transform_library().startswith("scipy.fft ")
+    Grid((5, 4), (1.0, 1.0)).displacement(np.ones((5, 4)))
