@@ -10,9 +10,8 @@ from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
-from roughvisc.mechanics.bodies.body import Body as Body
-from roughvisc.mechanics.bodies.body import sheet as sheet
-from roughvisc.mechanics.bodies.layer import layer as layer
+from roughvisc.mechanics.body import Body as Body
+from roughvisc.mechanics.layer import layer as layer
 from roughvisc.mechanics.materials.creep import creep as creep
 from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.derived import pair as pair
@@ -28,6 +27,7 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.materials.temperature import arrhenius as arrhenius
 from roughvisc.mechanics.materials.temperature import wlf as wlf
+from roughvisc.mechanics.sheet import sheet as sheet
 from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit

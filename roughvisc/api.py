@@ -13,7 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.labels import warnings_of
-from roughvisc.mechanics.bodies.body import Body, body_of
+from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.stepping.program import Direction, Program
 from roughvisc.problem import Problem

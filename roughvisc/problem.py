@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.body import Body
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing

@@ -19,7 +19,7 @@ from roughvisc.experiment.protocol import Experiment, Rows
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import annotate, in_order, warnings_of, warnings_text
 from roughvisc.mechanics.arrays import reused
-from roughvisc.mechanics.bodies.body import separability_error
+from roughvisc.mechanics.body import separability_error
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.problem import Problem
 from roughvisc.recorder import Checkpoint, MemoryRecorder, Recorder, RowStore

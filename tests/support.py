@@ -6,8 +6,8 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.half_space import love_kernel
 from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.study.statement.case import read_study, vary

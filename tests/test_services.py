@@ -11,8 +11,8 @@ from scipy import fft
 from support import assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import Kernel
+from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.trade.ladder import Setting

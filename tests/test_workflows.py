@@ -9,7 +9,7 @@ from references import OnSheet
 
 import roughvisc as rv
 from roughvisc.api import run
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.observables import history
 from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.variables import NOT_CONVERGED

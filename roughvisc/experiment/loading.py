@@ -39,8 +39,8 @@ from roughvisc.experiment.stated import (
 )
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.arrays import is_wide, over_rows
-from roughvisc.mechanics.bodies.body import Body
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.hereditary.exponentials import ModesState
 from roughvisc.mechanics.sparse import Sparse
 from roughvisc.mechanics.stepping.energy import Energy

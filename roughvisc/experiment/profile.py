@@ -11,9 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.kernel import Kernel
 from roughvisc.mechanics.bodies.window import Window, whole_domain, window_around
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.grid import Boundary, Grid
 from roughvisc.mechanics.stepping.scene import Scene
 from roughvisc.settings import Missing, Settings

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore

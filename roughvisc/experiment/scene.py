@@ -12,14 +12,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
+from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.kernel import has_finite_mean
+from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Boundary, Grid
 from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice
 from roughvisc.mechanics.hereditary.memory import ActsOn
+from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.mechanics.stepping.controller import SMALLEST_STEP
 from roughvisc.mechanics.stepping.program import Program, Segment, instant
@@ -301,6 +301,8 @@ def build_scene(profile: Profile, body: Body, program: Program, settings: Settin
     operator = profile.operator(settings.boundary)
     options = memory_options(program, settings, "pressure" if grows else "displacement")
     choice = choose_body_memory(body, **options, operator=operator)
+    if isinstance(body, LayeredBody):
+        _check_layers(body, choice, operator, program, settings, profile)
     if isinstance(choice.memory, WaveMemory):
         operator = choice.memory.grid
     scene = Scene(
@@ -346,6 +348,47 @@ def _check_approach(program: Program, full: float, boundary: Boundary) -> None:
                 f"program.{i}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is full at "
                 f"{full:.6g} m: expected less"
             )
+
+
+#: Compliance of the longest wave of a grid over that of the shortest, from which the contact may not converge.
+_STIFF_LAYERS = 100.0
+#: Parts of the largest load and approach at which the contact is tried.
+_TRIED = (1.0, 0.1, 0.01)
+
+
+def _check_layers(
+    body: LayeredBody, choice: Choice, operator: Grid, program: Program, settings: Settings, profile: Profile
+) -> None:
+    """Refuse stiff layers on a soft base whose contact does not converge, before anything is computed.
+
+    Their elastic contact is tried at the largest load or approach, with the first and with the last compliance.
+    """
+    segments, surface = program.segments, profile.of_scene()
+    gap, present = surface["gap"], surface["present"]
+    kernels: list[tuple[Any, float]] = [(body.kernel, float(choice.material.contact_compliance(program.duration)))]
+    if isinstance(choice.memory, WaveMemory):
+        series = choice.memory.series
+        kernels = [(series.kernel(), 1.0), (series.kernel(series.crept(program.duration)), 1.0)]
+    for kernel, compliance in kernels:
+        contrast = kernel.contrast(*operator.wave_numbers)
+        if contrast < _STIFF_LAYERS:
+            continue
+        grid = operator.answering(operator.symbol_of(kernel), kernel)
+        unit, tolerance = compliance / grid.cell_area, 0.2 * settings.tolerance
+        for control in ("load", "approach"):
+            largest = max(((s.end or 0.0) + abs(s.amplitude) for s in segments if s.control == control), default=0.0)
+            for value in (part * largest for part in _TRIED if largest > 0):
+                load, approach = (value * unit, None) if control == "load" else (None, value)
+                try:
+                    solve_contact(grid, gap, load=load, approach=approach, tolerance=tolerance, present=present)
+                except ConvergenceError as error:
+                    raise InputError(
+                        f"material is {body!r}, whose longest waves on these cells are {contrast:.3g} times as "
+                        f"compliant as the shortest, and {error}: expected layers whose moduli differ less, fewer "
+                        "cells, a smaller load or a looser tolerance",
+                        key="material",
+                        found=body,
+                    ) from error
 
 
 def memory_options(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.stepping.tangential import slope

@@ -28,7 +28,7 @@ from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.resources import curve_bytes, require_memory_of_curve
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.labels import warnings_text
-from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.sliding.steady import SteadyState
 from roughvisc.mechanics.stepping.program import Direction

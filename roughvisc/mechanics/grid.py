@@ -21,8 +21,7 @@ import scipy
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import threads_of
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.kernel import Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
+from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
 
 try:
     import ducc0

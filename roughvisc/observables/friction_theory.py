@@ -10,7 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding_grid import AxisTransform, SlidingGrid, on_rows
 from roughvisc.labels import describe
-from roughvisc.mechanics.bodies.body import Body, body_of
+from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.sliding.persson import persson as persson_estimate
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.grid import spacing

@@ -94,7 +94,7 @@ def _kernel_of(dataset: xr.Dataset, kernel: Any) -> Any:
         raise InputError(f"the result is of the kernel {attributes['kernel']}: give kernel=")
     if "thickness" not in attributes:
         return None
-    from roughvisc.mechanics.bodies.body import sheet
+    from roughvisc.mechanics.sheet import sheet
 
     material = material_of(dataset, "the result is of a sheet and does not record its material: give kernel=")
     return sheet(material, float(attributes["thickness"]), attributes["base"]).kernel

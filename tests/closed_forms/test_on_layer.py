@@ -20,9 +20,9 @@ from references.layer import layer_complement, layer_factor
 from scipy.special import j0
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.sheet import Sheet, reduction
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
+from roughvisc.mechanics.sheet import Sheet, reduction
 
 POISSON = [(0.0, 0.3), (0.3, 0.3), (0.4, 0.5), (0.5, 0.5), (0.5, 0.0)]
 SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(5e6, 5e6, 3e6, 0.3)

@@ -5,9 +5,9 @@ import pytest
 from references import OnSheet, PunchOnSheet
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
+from roughvisc.mechanics.sheet import Sheet
 
 #: W. C. Hayes, L. M. Keer, G. Herrmann, L. F. Mockros, J. Biomech. 5 (1972) 541, table 1: force over that of a
 #: half-space under a flat punch on a bonded layer, by Poisson's ratio, over the ratios of radius to thickness.
@@ -85,7 +85,7 @@ def test_displacement__is_that_of_the_pressure(sheet):
     """Outside, against the transform of the pressure: u = (1/pi) int S(q h) p_q J0(q r) dq, p_q by quadrature."""
     from scipy.special import j0
 
-    from roughvisc.mechanics.bodies.sheet import reduction
+    from roughvisc.mechanics.sheet import reduction
 
     contact, a = OnSheet(Paraboloid(10.0), sheet), 0.8
     nodes, weights = np.polynomial.legendre.leggauss(200)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE, Love, love_kernel
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import HALF_SPACE, HalfSpace, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.study.statement.case import Case
 
 FIELDS = ("pressure", "gap", "displacement")
@@ -101,7 +101,7 @@ def refuse(*_):
 @pytest.fixture
 def no_half_space(monkeypatch):
     for name in ("influence", "transfer", "under_rectangle"):
-        monkeypatch.setattr(Love, name, refuse)
+        monkeypatch.setattr(HalfSpace, name, refuse)
 
 
 def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):

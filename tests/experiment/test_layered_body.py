@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from layered_ball import POISSONS, RATIOS, WIDTHS, errors
 from references import ElasticLayer, OnSheet, PunchOnSheet
+from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
+from roughvisc.mechanics.layer import effective_compliance
 
 SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(4e6, 12e5, 4e5, 0.3)  # in proportion
 THICKNESS = 1e-4
@@ -91,3 +93,46 @@ def test_limits__are_the_half_space_and_the_sheet(boundary):
         left.append(float(abs(found.pressure - sheet.pressure).sum() / sheet.pressure.sum()))
     assert left[0] < 0.02
     assert left[1] < 0.2 * left[0]
+
+
+def far_apart(ratio, creeps):
+    """A layer on a half-space whose moduli are so many times smaller."""
+    top = 1e6 * ratio
+    if not creeps:
+        return rv.elastic(top, 0.4), rv.elastic(1e6, 0.5)
+    return rv.zener(2 * top, top, 0.1 * top, 0.4), rv.zener(2e6, 1e6, 5e5, 0.5)
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 1e3])
+@pytest.mark.parametrize(
+    ("creeps", "boundary"),
+    [(False, "free"), (False, "periodic"), (True, "periodic"), pytest.param(True, "free", marks=pytest.mark.thorough)],
+)
+def test_moduli_far_apart__converge(boundary, ratio, creeps):
+    """The pressure at two tolerances differs by less than the larger one states."""
+    height = rv.self_affine(1e-3, (21, 24), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    layer, base = far_apart(ratio, creeps)
+    for thickness in (5e-5,) if creeps else (3e-6, 5e-5):
+        body = rv.layer(layer, thickness, on=base)
+        c = float(effective_compliance(3e4, (thickness,), (0.4, 0.5), (1e-6 / ratio, 1e-6)))
+        program = rv.Program().pressure(0.01 / c, over=0.05).hold(0.05)
+        edge = {"edge": "accept"} if boundary == "free" else {}
+        coarse, fine = (
+            pressed(height, body, program, boundary=boundary, times=2, tolerance=tolerance, **edge)
+            for tolerance in (1e-3, 2e-4)
+        )
+        apart = abs(coarse.pressure - fine.pressure).sum(["x", "y"]) / fine.pressure.sum(["x", "y"])
+        assert float(apart.max()) < 1.3e-3
+        assert float(coarse.stated_error.max()) <= 1e-3
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_stiff_film__that_does_not_converge_is_refused_before_the_run(boundary):
+    """It bends over a good part of the surface."""
+    height = rv.self_affine(1e-3, (64, 63), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    layer, base = far_apart(1e4, creeps=True)
+    body, edge = rv.layer(layer, 1.5e-5, on=base), {"edge": "accept"} if boundary == "free" else {}
+    c = float(effective_compliance(3e4, (1.5e-5,), (0.4, 0.5), (1e-10, 1e-6)))
+    program = rv.Program().pressure(0.01 / c, over=0.05).hold(0.1)
+    with refused("material", body):
+        pressed(height, body, program, boundary=boundary, **edge)

@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.statement.case import Case, read_cases
 
 RADIUS, THICKNESS = 1e-3, 1e-4

@@ -9,9 +9,8 @@ from support import direct, refused
 import roughvisc as rv
 from roughvisc.mechanics import arrays
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.grid import Grid, transform_library
 from roughvisc.mechanics.sliding.steady import Sliding
 

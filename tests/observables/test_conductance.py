@@ -10,7 +10,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
 from roughvisc.observables import conductance, incremental_stiffness
 

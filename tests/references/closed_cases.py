@@ -32,14 +32,14 @@ from references.layer import ElasticLayer
 from references.sheet import OnSheet
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
-from roughvisc.mechanics.bodies.body import Body, body_of
-from roughvisc.mechanics.bodies.body import sheet as sheet_of
-from roughvisc.mechanics.bodies.layer import layer as layer_of
-from roughvisc.mechanics.bodies.sheet import Base, Sheet
+from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
+from roughvisc.mechanics.layer import layer as layer_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
 from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.sheet import Base, Sheet
+from roughvisc.mechanics.sheet import sheet as sheet_of
 from roughvisc.mechanics.stepping.program import Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings

@@ -24,8 +24,8 @@ from scipy.special import j0
 
 from references.layer import ElasticLayer
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import SHORTEST_WAVE, Sheet, panels
 from roughvisc.mechanics.closed_forms.indenters import Indenter, places, positive, punch_pressure
+from roughvisc.mechanics.sheet import SHORTEST_WAVE, Sheet, panels
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.grid import transforms
 
 Array = NDArray[np.float64]

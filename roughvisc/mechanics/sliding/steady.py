@@ -37,7 +37,7 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import threads_of
-from roughvisc.mechanics.bodies.body import Body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import transforms
 from roughvisc.mechanics.sliding.gmres import gmres
 

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.arrays import empty, weighted
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.layer import LayeredBody
-from roughvisc.mechanics.bodies.wave_series import Strata, WaveSeries, wave_series
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.choice import (
     SERIES_SHARE,
@@ -30,6 +28,7 @@ from roughvisc.mechanics.hereditary.choice import (
 )
 from roughvisc.mechanics.hereditary.exponentials import Modes, ModesState
 from roughvisc.mechanics.hereditary.memory import ActsOn, Rule
+from roughvisc.mechanics.layer import LayeredBody, Layers, LayerSeries, layer_series
 from roughvisc.mechanics.materials.creep import Creep, complete
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
@@ -49,7 +48,7 @@ class WaveMemory:
 
     Attributes
     ----------
-    series : WaveSeries
+    series : LayerSeries
         Of the body.
     duration : float
         Of the program. [s]
@@ -57,7 +56,7 @@ class WaveMemory:
         The grid; None where only the number of exponentials is of interest.
     """
 
-    series: WaveSeries
+    series: LayerSeries
     duration: float
     operator: Grid | None = None
     acts_on: ActsOn = "waves"
@@ -66,7 +65,7 @@ class WaveMemory:
     def material(self) -> Prony:
         """The wave of the grid that creeps most, by which steps are judged."""
         limits = _EVERY if self.operator is None else self.operator.wave_numbers
-        return self.series.material(*limits, self.duration)
+        return self.series.fastest_wave(*limits)
 
     @property
     def rules(self) -> tuple[Rule, ...]:
@@ -253,7 +252,7 @@ def choose_body_memory(
         series(one, shortest, duration, _MATERIALS * share) if duration > 0 else (at_once(one), 0.0) for one in given
     ]
     materials, of_materials = tuple(one for one, _ in found), max(error for _, error in found)
-    waves = wave_series(Strata(body.thicknesses, materials), shortest, duration, share - of_materials)
+    waves = layer_series(Layers(body.thicknesses, materials), shortest, duration, share - of_materials)
     memory = WaveMemory(waves, duration, operator)
     error = waves.error + of_materials
     count = len(waves.times)

@@ -27,8 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary, Grid

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Base
+from roughvisc.mechanics.sheet import Base
 from roughvisc.notebook import table
 from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from roughvisc.mechanics.bodies.body import BASE
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.sheet import BASE, Sheet
 from roughvisc.study.audit.evidence import Evidence
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.audit.limits import LIMITS, Finding, as_text, percent, unknown

@@ -14,9 +14,9 @@ from scipy import fft, ndimage
 
 from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units
-from roughvisc.mechanics.bodies.body import BASE, separability_error
-from roughvisc.mechanics.bodies.sheet import Sheet, complement
+from roughvisc.mechanics.body import separability_error
 from roughvisc.mechanics.materials.creep import complete
+from roughvisc.mechanics.sheet import BASE, Sheet, complement
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.statement.case import Case

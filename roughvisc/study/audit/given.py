@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Base
+from roughvisc.mechanics.sheet import Base
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.schema.evaluation import BOUNDS
 from roughvisc.units import stated_quantity

@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.units import Quantity, quantities
 
 

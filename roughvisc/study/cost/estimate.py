@@ -19,7 +19,7 @@ from roughvisc.experiment.profile import GROWTH, MOST_CELLS, Profile
 from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import build_scene, check_slides, kept_times
 from roughvisc.experiment.stated import in_slide, staircase_area
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.hereditary.choice import Choice

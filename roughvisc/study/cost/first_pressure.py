@@ -6,7 +6,7 @@ import math
 
 import xarray as xr
 
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.materials.models import zener
 from roughvisc.study.cost.press import MOST_PRESSED, Push, copy_to_press, press
 from roughvisc.study.statement.starter import (

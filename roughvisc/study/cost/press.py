@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.bodies.kernel import Kernel
+from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.grid import Boundary

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from roughvisc.experiment.protocol import Experiment
-    from roughvisc.mechanics.bodies.body import Body
+    from roughvisc.mechanics.body import Body
     from roughvisc.mechanics.materials.creep import Material
     from roughvisc.mechanics.stepping.program import Program
     from roughvisc.settings import Settings

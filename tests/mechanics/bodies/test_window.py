@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
 from roughvisc.mechanics.bodies.window import (
     FarFieldDisplacement,
     Window,
@@ -16,6 +15,7 @@ from roughvisc.mechanics.bodies.window import (
     whole_domain,
     window_around,
 )
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import padded
 

@@ -8,8 +8,7 @@ import sys
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 

@@ -7,8 +7,7 @@ import pytest
 from references import sliding_cylinder
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 
 RADIUS, LOAD, TIME = 1e-2, 100.0, 1e-3

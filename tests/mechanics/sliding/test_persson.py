@@ -8,10 +8,9 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.sliding.persson import persson
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 

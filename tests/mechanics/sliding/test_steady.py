@@ -9,12 +9,11 @@ from scipy import fft
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid, transforms
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.sliding import steady
 from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 

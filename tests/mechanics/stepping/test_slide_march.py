@@ -8,8 +8,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.body import Body
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.hereditary.exponentials import Modes
 from roughvisc.mechanics.materials.frequency import complex_compliance

@@ -6,7 +6,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.loading import Loading
-from roughvisc.mechanics.bodies.body import body_of
+from roughvisc.mechanics.body import body_of
 from roughvisc.problem import Problem
 from roughvisc.recorder import Checkpoint
 from roughvisc.settings import Settings

@@ -7,10 +7,10 @@ import pytest
 from references.sheet import PunchOnSheet
 from support import rough_gap
 
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
 
 #: Stiffness of a square of unit side over the contact modulus: pi times the capacity of a square plate, 0.36678742 of

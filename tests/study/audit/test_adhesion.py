@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
-from roughvisc.mechanics.bodies.sheet import Sheet, complement
+from roughvisc.mechanics.sheet import Sheet, complement
 from roughvisc.study.audit import adhesion, validity
 
 

@@ -10,7 +10,7 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms as cf
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.audit import adhesion, validity
 from roughvisc.study.audit.limits import LIMITS, STATED, VERDICTS
 from roughvisc.study.execution.run import run_case

@@ -9,8 +9,8 @@ from references import OnSheet
 from scipy import special
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Sheet
 from roughvisc.mechanics.closed_forms import Paraboloid
+from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.audit import validity
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.study.cost import first_pressure as first_module

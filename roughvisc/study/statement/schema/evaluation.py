@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, get_args
 from pydantic import Field, create_model, model_validator
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.sheet import Base
+from roughvisc.mechanics.sheet import Base
 from roughvisc.observables.resistivity import WANTED as RESISTIVITIES
 from roughvisc.observables.resistivity import Kind, resistivities
 from roughvisc.study.statement.schema.section import Section, choice, measured, nullable, refuse

@@ -17,9 +17,8 @@ from pydantic import (
 )
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.body import BASE, Body, sheet
-from roughvisc.mechanics.bodies.layer import layer
-from roughvisc.mechanics.bodies.sheet import Base
+from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials.checks import tensile_to_shear
 from roughvisc.mechanics.materials.creep import Material, power_law
 from roughvisc.mechanics.materials.derived import LARGEST_SHIFT, pair, shift, stiffened
@@ -28,6 +27,7 @@ from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
 from roughvisc.mechanics.materials.temperature import arrhenius, wlf
+from roughvisc.mechanics.sheet import BASE, Base, sheet
 from roughvisc.study.statement.schema.section import (
     FilePath,
     Section,

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.bodies.layered import Layered
-from roughvisc.mechanics.bodies.sheet import Sheet
-from roughvisc.mechanics.bodies.wave_series import Strata, wave_series
+from roughvisc.mechanics.layer import Layers, layer_series
+from roughvisc.mechanics.sheet import Sheet
 
 RUBBER, POLYMER = rv.zener(3e6, 1e6, 1e5, poisson=0.4), rv.zener(1e7, 2e6, 2e4, poisson=0.3)
 FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
@@ -15,13 +14,13 @@ Q, T = np.geomspace(1e2, 3e5, 19), np.geomspace(1e-5, 1.0, 17)
 
 @pytest.mark.parametrize("material", [RUBBER, FLUID, SOFT])
 def test_creep__of_one_material_is_its_own(material):
-    found = Strata((1e-4,), (material, material)).creep(Q, T)
+    found = Layers((1e-4,), (material, material)).creep(Q, T)
     np.testing.assert_allclose(found, np.tile(material.contact_compliance(T), (Q.size, 1)), rtol=1e-8)
 
 
 def test_creep__on_a_rigid_base_is_that_of_a_bonded_sheet():
     q = Q[Q > 2e3]
-    found = Strata((1e-4,), (RUBBER, rv.elastic(1e15))).creep(q, T)
+    found = Layers((1e-4,), (RUBBER, rv.elastic(1e15))).creep(q, T)
     factor = q / 2 * Sheet(1e-4, RUBBER.poisson).transfer(q, 0.0)
     np.testing.assert_allclose(found, np.outer(factor, RUBBER.contact_compliance(T)), rtol=1e-5)
 
@@ -37,9 +36,9 @@ def test_creep__on_a_rigid_base_is_that_of_a_bonded_sheet():
         (RUBBER, SOFT),
     ],
 )
-def test_wave_series__is_as_near_as_it_says_and_has_no_negative_term(materials):
-    strata = Strata((1e-4,), materials)
-    found = wave_series(strata, 1e-5, 1.0, 1e-3)
+def test_layer_series__is_as_near_as_it_says_and_has_no_negative_term(materials):
+    strata = Layers((1e-4,), materials)
+    found = layer_series(strata, 1e-5, 1.0, 1e-3)
     assert found.error <= 1e-3
     assert (found.compliances >= 0).all()
     q, t = np.exp(np.random.default_rng(1).uniform(np.log(1e2), np.log(3e5), 40)), np.geomspace(1.3e-5, 0.9, 23)
@@ -55,25 +54,33 @@ def _each(series):
     return [(1.0, np.zeros(count)), *((0.0, one) for one in np.eye(count))]
 
 
-def test_wave_series__of_one_material_has_its_times_alone():
-    found = wave_series(Strata((1e-4,), (RUBBER, RUBBER)), 1e-5, 1.0, 1e-4)
+def test_layer_series__of_one_material_has_its_times_alone():
+    found = layer_series(Layers((1e-4,), (RUBBER, RUBBER)), 1e-5, 1.0, 1e-4)
     np.testing.assert_allclose(found.times, RUBBER.times)
     assert found.error < 1e-8
 
 
-def test_wave_series__its_kernel_in_free_space_is_that_of_elastic_layers():
-    found = wave_series(Strata((1e-4,), (rv.elastic(1e6, poisson=0.5), rv.elastic(5e6, poisson=0.3))), 0.0, 0.0, 1e-5)
-    kernel, elastic = found.kernel(np.zeros(0)), Layered((1e-4,), (0.5, 0.3), (1.0, 0.2))
-    far = kernel.influence((3001, 1), (1e-3, 1e-3))[1000::1000, 0]
-    np.testing.assert_allclose(far, 0.25e-6 * elastic.influence((3001, 1), (1e-3, 1e-3))[1000::1000, 0], rtol=1e-4)
-    expected = elastic.influence((41, 23), (1e-5, 3e-5)) * 0.25e-6
-    np.testing.assert_allclose(
-        kernel.influence((41, 23), (1e-5, 3e-5)), expected, rtol=1e-4, atol=1e-5 * expected.max()
-    )
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_layer_series__its_kernels_add_up_to_those_of_the_elastic_body_after_some_time(boundary):
+    """In free space the kernel of each exponential has images of its own."""
+    materials, t = (RUBBER, POLYMER), 0.03
+    found = layer_series(Layers((1e-4,), materials), 1e-5, 1.0, 1e-4)
+    elastic = [rv.elastic(1 / one.glassy, one.poisson) for one in materials]
+    exact = rv.layer(elastic[0], 1e-4, on=elastic[1]).kernel
+    unit = float(materials[0].contact_compliance(0.0))
+
+    def of(kernel):
+        return kernel.transfer(Q, 0.0) if boundary == "periodic" else kernel.influence((41, 23), (2e-5, 3e-5))
+
+    np.testing.assert_allclose(of(found.kernel()), unit * of(exact), rtol=3e-5)
+    crept = found.crept(t)
+    terms = sum(weight * of(found.kernel(one, 0.0)) for weight, one in zip(crept, np.eye(crept.size), strict=True))
+    whole = of(found.kernel(crept))
+    np.testing.assert_allclose(of(found.kernel()) + terms, whole, rtol=1e-5)
 
 
-def test_wave_series__at_once_is_rigid_where_the_top_is():
-    assert not Strata((1e-4,), (SOFT, RUBBER)).at_once(np.append(1e-8, Q)).any()
-    below = Strata((1e-4,), (RUBBER, SOFT)).at_once(Q[Q > 2e3])
+def test_layer_series__at_once_is_rigid_where_the_top_is():
+    assert not Layers((1e-4,), (SOFT, RUBBER)).at_once(np.append(1e-8, Q)).any()
+    below = Layers((1e-4,), (RUBBER, SOFT)).at_once(Q[Q > 2e3])
     factor = Q[Q > 2e3] / 2 * Sheet(1e-4, RUBBER.poisson).transfer(Q[Q > 2e3], 0.0)
     np.testing.assert_allclose(below, factor * RUBBER.contact_compliance(0.0), rtol=1e-6)

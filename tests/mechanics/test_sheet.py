@@ -8,12 +8,12 @@ import pytest
 from references import OnSheet
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.kernel import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.bodies.sheet import Sheet, complement, reduction
+from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
 from roughvisc.mechanics.closed_forms import Paraboloid
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.sheet import Sheet, complement, reduction
 
 BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
 

@@ -1,4 +1,4 @@
-"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``, the half-space's kernel for waves shorter than the thickness.
+"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``. Short waves respond as on a half-space: ``S = 1``.
 
 With a constant Poisson's ratio space and time separate as for a half-space: ``u = C(t) K * p``.
 """
@@ -15,11 +15,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import love_kernel, rectangle_displacement
-from roughvisc.mechanics.bodies.kernel import Kernel, check_grid
+from roughvisc.mechanics.body import Body, Kernel, separability_error
+from roughvisc.mechanics.half_space import check_grid, love_kernel, rectangle_displacement
+from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
+Base = Literal["bonded", "slipping"]
+#: Default base of a sheet.
+BASE: Base = "bonded"
+# In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
+_REACH = 46.0
+# 1 - S(x) decreases as x^2 exp(-2 x): below rounding from here.
+SHORTEST_WAVE = 24.0
+# The correction over the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
+_PIECE, _NODES = 0.15, 10
+# Gauss points per side of a cell of so many thicknesses that give the mean of the correction to 1e-13.
+_GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
+# Cells of more thicknesses than the first are long, see :func:`long_cell_influence`; beyond the second: refused.
+_LONG, _LONGEST = 0.5, 50.0
 # With this kappa the response to long waves is right to 1e-3 of 4/3 q^2 on cells of any length (measured).
 _KAPPA = 3.0
 # Distance at which erfc(kappa r) is below rounding, and Gauss points that integrate over as much to rounding.
@@ -29,6 +43,171 @@ _LAST_WAVE = 12 * _KAPPA
 # Minus the second derivative, to fourth order in the spacing.
 _SECOND_DIFFERENCE = (-1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12)
 _MARGIN = len(_SECOND_DIFFERENCE) // 2
+# Below this, sinh(2 x) - 2 x is computed from its series.
+_SERIES_BELOW = 0.5
+
+
+@quantities(thickness="m")
+def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
+    """Return a sheet of a material on a rigid base.
+
+    Parameters
+    ----------
+    material : Material
+        Material of one body with a Poisson ratio that is constant in time.
+    thickness : float or str
+        Thickness; infinite for a half-space. [m]
+    base : {"bonded", "slipping"}
+        Whether the sheet sticks to its base, or slides on it without friction.
+
+    Returns
+    -------
+    Body
+        A body, which functions accept as `material`.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive or the base is unknown; if the material describes two bodies, or its Poisson
+        ratio is negative or changes in time: space and time do not separate then.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> gel = rv.sheet(rv.zener(3e6, 1e6, 1e5), thickness=1e-4)
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=45)
+    >>> ds = rv.simulate(ball, gel, rv.Program().load(1e-4, over=0), progress=False)
+    >>> ds.attrs["thickness"], ds.attrs["base"]
+    (0.0001, 'bonded')
+    """
+    amiss = separability_error(material)
+    if amiss:
+        raise InputError(
+            f"thickness is {thickness!r}, and the material is {amiss}: expected one body, Poisson's ratio constant"
+        )
+    endless = thickness == math.inf
+    kernel = Sheet(1.0 if endless else thickness, complete(material).poisson, base)  # checks all arguments
+    return Body(material) if endless else Body(material, kernel)
+
+
+@quantities(thickness="m")
+@dataclass(frozen=True)
+class Sheet(Kernel):
+    r"""Kernel of a homogeneous sheet on a rigid base.
+
+    Parameters
+    ----------
+    thickness : float or str
+        [m]
+    poisson : float
+        Poisson's ratio, from 0 to 1/2. On a slipping base the kernel does not depend on it.
+    base : {"bonded", "slipping"}
+        Whether the sheet sticks to its base, or slides on it without friction.
+
+    Raises
+    ------
+    InputError
+        If an argument is none of these.
+
+    Notes
+    -----
+    With ``x = |q| h`` and ``k = 3 - 4 nu`` the factor ``S`` is, on a bonded and on a slipping base [1]_,
+
+    .. math::
+        S = \frac{k \sinh 2x - 2x}{k \cosh 2x + 2x^2 + 5 - 12 \nu + 8 \nu^2},
+        \qquad S = \frac{\cosh 2x - 1}{\sinh 2x + 2x}.
+
+    In free space the kernel is that of the half-space less a smooth correction,
+    ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
+    the thickness it is that of :func:`long_cell_influence`.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.8.
+    """
+
+    thickness: Quantity
+    poisson: float = 0.5
+    base: Base = BASE
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.thickness, int | float) and 0 < self.thickness < math.inf):
+            raise InputError(f"thickness is {self.thickness!r}: expected a positive number [m]")
+        if not 0 <= self.poisson <= 0.5:
+            raise InputError(f"Poisson's ratio of a sheet is {self.poisson!r}: expected 0 to 1/2")
+        if self.base not in get_args(Base):
+            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
+
+    @property
+    def uniform_displacement(self) -> float:
+        """Displacement of the sheet under uniform unit pressure. [m]"""
+        slope = (1 - 2 * self.poisson) / (1 - self.poisson) ** 2 if self.base == "bonded" else 1.0
+        return slope * self.thickness
+
+    @property
+    def long_wave_factor(self) -> float:
+        """``S`` of the longest waves: they do not displace a surface above a rigid base."""
+        return 0.0
+
+    def complement(self, x: ArrayLike) -> Array:
+        """Return ``1 - S`` of waves, without cancellation. `x` is the wave number times the thickness."""
+        return complement(x, self.poisson, self.base)
+
+    @property
+    def relief(self) -> float:
+        """What the base takes off the displacement far inside the thickness, over load and compliance. [1/m]
+
+        A contact much smaller than the thickness has that much less approach than on a half-space, to first order.
+        """
+        s, weights = panels(96, SHORTEST_WAVE, 16)
+        return float(weights @ complement(s, self.poisson, self.base)) / (math.pi * self.thickness)
+
+    def described(self) -> dict[str, Any]:
+        """Return thickness [m] and base."""
+        return {"thickness": self.thickness, "base": self.base}
+
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """Return ``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit, zero if the sheet is incompressible. [m]"""
+        q = np.asarray(np.hypot(qx, qy), dtype=float)
+        long = q * self.thickness < 1e-150
+        q = np.where(long, 1.0, q)
+        return np.where(long, self.uniform_displacement, 2 / q * reduction(q * self.thickness, self.poisson, self.base))
+
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Return Love's kernel less the correction, to 1e-13 of the largest value; or the kernel of long cells. [m]"""
+        check_grid(shape, spacing)
+        dx, dy = (side / self.thickness for side in spacing)
+        if max(dx, dy) > _LONG:
+            uniform = self.uniform_displacement / self.thickness
+            return self.thickness * long_cell_influence(shape, (dx, dy), self._scaled_transfer, uniform, _REACH)
+        kernel = love_kernel(shape, spacing)
+        x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
+        near = np.hypot(x[:, None], y) <= _REACH - math.hypot(dx, dy) / 2
+        kernel[~near] = 0
+        rows, columns = np.nonzero(near)
+        mean = np.zeros(rows.size)
+        correction = _correction(self.poisson if self.base == "bonded" else 0.5, self.base)
+        along_x, along_y = _gauss(dx), _gauss(dy)
+        for a, weight_a in zip(*along_x, strict=True):
+            square = (x[rows] + a) ** 2
+            for b, weight_b in zip(*along_y, strict=True):
+                mean += weight_a * weight_b * correction(np.sqrt(square + (y[columns] + b) ** 2))
+        kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
+        return kernel
+
+    def _scaled_transfer(self, x: Array) -> Array:
+        """Return the transfer function over the thickness, of wave numbers times the thickness."""
+        return 2 / x * reduction(x, self.poisson, self.base)
+
+    def check_cells(self, spacing: tuple[float, float]) -> None:
+        """Refuse cells longer than fifty thicknesses."""
+        ratio = max(spacing) / self.thickness
+        if ratio > _LONGEST * (1 + 1e-9):
+            raise InputError(
+                f"thickness is {self.thickness:.6g} m and a cell is {max(spacing):.6g} m long, {ratio:.4g} times the "
+                f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
+                "periodic boundaries, or a thicker sheet"
+            )
 
 
 def long_cell_influence(
@@ -38,7 +217,7 @@ def long_cell_influence(
     uniform: float,
     reach: float,
 ) -> Array:
-    """Displacement of cells due to unit pressure on the cell at the origin.
+    """Return the displacement of cells under unit pressure on the cell at the origin, for cells of any length.
 
     Parameters
     ----------
@@ -92,156 +271,20 @@ def long_cell_influence(
 
 
 def _clipped_cells(cells: NDArray[np.intp], side: float, reach: float) -> tuple[Array, Array]:
-    """Centre and length of what lies within a distance of the origin, of each cell along an axis."""
+    """Return centre and length of the part of each cell within a distance of the origin, along an axis."""
     lower, upper = (np.clip((cells + end) * side, -reach, reach) for end in (-0.5, 0.5))
     return (lower + upper) / 2, upper - lower
 
 
 def _cell_waves(count: int, side: float, waves: Array, reach: float) -> Array:
-    """Integrals of waves over so many cells from the origin on, and over some on either side of these."""
+    """Return integrals of waves over cells from the origin on, and over some cells on either side."""
     centre, length = _clipped_cells(np.arange(-_MARGIN, count + _MARGIN), side, reach)
     integrals = np.cos(np.outer(centre, waves)) * np.sin(np.outer(length / 2, waves)) * (2 / waves)
     return np.asarray(integrals / reach)
 
 
-Base = Literal["bonded", "slipping"]
-# In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
-_REACH = 46.0
-# 1 - S(s) dies as s^2 exp(-2 s): below rounding from here.
-SHORTEST_WAVE = 24.0
-# The correction in the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
-_PIECE, _NODES = 0.15, 10
-# Gauss points per side over a cell of so many thicknesses, that give the mean of the correction to 1e-13.
-_GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cells of more thicknesses than the first are long, see :func:`long_cell_influence`; beyond the second: refused.
-_LONG, _LONGEST = 0.5, 50.0
-# Below this, sinh(2 x) - 2 x comes from its series.
-_SERIES_BELOW = 0.5
-
-
-@quantities(thickness="m")
-@dataclass(frozen=True)
-class Sheet(Kernel):
-    r"""A homogeneous sheet on a rigid base.
-
-    Parameters
-    ----------
-    thickness : float or str
-        [m]
-    poisson : float
-        Poisson's ratio, from 0 to 1/2. A slipping base does not depend on it.
-    base : {"bonded", "slipping"}
-        Whether the sheet sticks to its base, or slides on it without friction.
-
-    Raises
-    ------
-    InputError
-        If a value is none of those expected.
-
-    Notes
-    -----
-    With ``x = |q| h`` and ``k = 3 - 4 nu`` the factor ``S`` is, on a bonded and on a slipping base [1]_,
-
-    .. math::
-        S = \frac{k \sinh 2x - 2x}{k \cosh 2x + 2x^2 + 5 - 12 \nu + 8 \nu^2},
-        \qquad S = \frac{\cosh 2x - 1}{\sinh 2x + 2x}.
-
-    In free space the kernel is that of the half-space less a smooth correction,
-    ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
-    the thickness it is that of :func:`long_cell_influence`.
-
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.8.
-    """
-
-    thickness: Quantity
-    poisson: float = 0.5
-    base: Base = "bonded"
-
-    def __post_init__(self) -> None:
-        if not (isinstance(self.thickness, int | float) and 0 < self.thickness < math.inf):
-            raise InputError(f"thickness is {self.thickness!r}: expected a positive number [m]")
-        if not 0 <= self.poisson <= 0.5:
-            raise InputError(f"Poisson's ratio of a sheet is {self.poisson!r}: expected 0 to 1/2")
-        if self.base not in get_args(Base):
-            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
-
-    @property
-    def uniform_displacement(self) -> float:
-        """Displacement under uniform unit pressure: what the sheet itself gives way by. [m]"""
-        slope = (1 - 2 * self.poisson) / (1 - self.poisson) ** 2 if self.base == "bonded" else 1.0
-        return slope * self.thickness
-
-    @property
-    def long_wave_factor(self) -> float:
-        """``S`` of the longest waves: none of them displaces a surface above a rigid base."""
-        return 0.0
-
-    def complement(self, x: ArrayLike) -> Array:
-        """``1 - S`` of waves of so many wave numbers times the thickness, of which nothing is lost."""
-        return complement(x, self.poisson, self.base)
-
-    @property
-    def relief(self) -> float:
-        """What the base takes off the displacement far inside the thickness, over load and compliance. [1/m]
-
-        A contact much smaller than the thickness has that much less approach than on a half-space, to first order.
-        """
-        s, weights = panels(96, SHORTEST_WAVE, 16)
-        return float(weights @ complement(s, self.poisson, self.base)) / (math.pi * self.thickness)
-
-    def described(self) -> dict[str, Any]:
-        """Thickness [m] and base."""
-        return {"thickness": self.thickness, "base": self.base}
-
-    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit of long waves, zero if the sheet keeps its volume. [m]"""
-        q = np.asarray(np.hypot(qx, qy), dtype=float)
-        long = q * self.thickness < 1e-150
-        q = np.where(long, 1.0, q)
-        return np.where(long, self.uniform_displacement, 2 / q * reduction(q * self.thickness, self.poisson, self.base))
-
-    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-        """Love's kernel less the correction, to 1e-13 of a cell's displacement of itself; or that of long cells. [m]"""
-        check_grid(shape, spacing)
-        dx, dy = (side / self.thickness for side in spacing)
-        if max(dx, dy) > _LONG:
-            uniform = self.uniform_displacement / self.thickness
-            return self.thickness * long_cell_influence(shape, (dx, dy), self._scaled_transfer, uniform, _REACH)
-        kernel = love_kernel(shape, spacing)
-        x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
-        margin = _REACH - math.hypot(dx, dy) / 2
-        near = np.hypot(x[:, None], y) <= margin
-        kernel[~near] = 0
-        rows, columns = np.nonzero(near)
-        mean = np.zeros(rows.size)
-        correction = _correction(self.poisson if self.base == "bonded" else 0.5, self.base)
-        along_x, along_y = _gauss(dx), _gauss(dy)
-        for a, weight_a in zip(*along_x, strict=True):
-            square = (x[rows] + a) ** 2
-            for b, weight_b in zip(*along_y, strict=True):
-                mean += weight_a * weight_b * correction(np.sqrt(square + (y[columns] + b) ** 2))
-        kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
-        return kernel
-
-    def _scaled_transfer(self, x: Array) -> Array:
-        """The transfer function over the thickness, of wave numbers times the thickness."""
-        return 2 / x * reduction(x, self.poisson, self.base)
-
-    def check_cells(self, spacing: tuple[float, float]) -> None:
-        """Refuse cells longer than fifty thicknesses."""
-        ratio = max(spacing) / self.thickness
-        if ratio > _LONGEST * (1 + 1e-9):
-            raise InputError(
-                f"thickness is {self.thickness:.6g} m and a cell is {max(spacing):.6g} m long, {ratio:.4g} times the "
-                f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
-                "periodic boundaries, or a thicker sheet"
-            )
-
-
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """The factor ``S`` of a wave: its displacement over that of a half-space.
+    """Return the factor ``S`` of a wave: its displacement over that of a half-space.
 
     Parameters
     ----------
@@ -271,7 +314,7 @@ def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
 
 
 def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """``1 - S``, of which nothing is lost where it is small."""
+    """Return ``1 - S`` without cancellation."""
     x = np.asarray(x, dtype=float)
     e = np.exp(-2 * x)
     if base == "slipping":
@@ -283,12 +326,12 @@ def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
 
 
 def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
-    """``k``, and what stands beside ``k cosh 2x`` in the denominator."""
+    """Return ``k``, and the rest of the denominator next to ``k cosh 2x``."""
     return 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
 
 
 def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
-    """Gauss nodes and weights on equal parts of an interval from zero."""
+    """Return Gauss nodes and weights on equal parts of an interval from zero."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     side = end / count
     at = (np.arange(count)[:, None] + (nodes + 1) / 2) * side
@@ -297,7 +340,7 @@ def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=8)
 def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
-    """What the half-space's kernel has more, over the distance in thicknesses and in their inverse; to the reach."""
+    """Return the kernel of the half-space less that of a sheet, at a distance in thicknesses. [1/thickness]"""
     from scipy.interpolate import PPoly  # slow to import
     from scipy.special import j0
 
@@ -315,7 +358,7 @@ def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
 
 
 def _gauss(side: float) -> tuple[Array, Array]:
-    """Gauss nodes about the centre of a side, in thicknesses, and weights that add up to one."""
+    """Return Gauss nodes about the centre of a side, in thicknesses, and weights that add up to one."""
     points = next(count for longest, count in _GAUSS if side <= longest)
     nodes, weights = np.polynomial.legendre.leggauss(points)
     return nodes * side / 2, weights / 2

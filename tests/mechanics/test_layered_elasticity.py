@@ -5,7 +5,7 @@ import pytest
 from layered import elastic_factor
 from references.layer import layer_factor
 
-from roughvisc.mechanics.bodies.layered import effective_compliance
+from roughvisc.mechanics.layer import effective_compliance
 
 X = np.array([1e-6, 1e-3, 0.05, 0.4, 1.5, 6.0])
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import HALF_SPACE, love_kernel
-from roughvisc.mechanics.bodies.kernel import free_space_symbol, periodic_symbol
+from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.half_space import love_kernel
 
 
 def love_exact(x, y, dx, dy):

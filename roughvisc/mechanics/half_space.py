@@ -1,16 +1,17 @@
-r"""The elastic half-space: ``K = 1 / (pi r)`` averaged over the loaded cell, ``K_q = 2 / |q|``."""
+r"""Displacement of an elastic half-space under pressure on rectangles, at unit contact compliance.
+
+The displacement under a point force is ``1 / (pi r)``.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from roughvisc.mechanics.bodies.kernel import Counts, Kernel, check_grid
+from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ _GAUSS = ((4.0, 8), (16.0, 5), (40.0, 4), (200.0, 3))
 
 
 def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    r"""Displacement of a half-space's surface under one uniformly loaded cell.
+    r"""Return the surface displacement of a half-space under one uniformly loaded cell.
 
     Parameters
     ----------
@@ -80,19 +81,19 @@ def _corner_sum(x: Array, y: Array, dx: float | Array, dy: float | Array) -> Arr
 
 
 def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float | Array, float | Array]) -> Array:
-    """Displacement due to unit pressure on a rectangle and unit contact compliance, in closed form.
+    """Return the displacement under unit pressure on a rectangle, in closed form.
 
     Parameters
     ----------
     x, y : ndarray
-        Positions, which broadcast, from the rectangle's centre; none on its edges' lines. [m]
+        Positions relative to the centre, which broadcast; none may lie on the lines of the edges. [m]
     sides : tuple of float or ndarray
-        Of the rectangle, or of one rectangle for each position. [m]
+        Sides of the rectangle, or of one rectangle for each position. [m]
 
     Returns
     -------
     ndarray
-        Exact to rounding within the rectangle and near it. [m]
+        Displacement at unit contact compliance; exact to rounding in and near the rectangle. [m]
     """
     positions = np.broadcast_arrays(x, y)
     return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
@@ -111,39 +112,9 @@ def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
     return total * (dx * dy / 4)
 
 
-@dataclass(frozen=True)
-class Love(Kernel):
-    """The elastic half-space.
-
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, sections 3.2 and 13.2.
-    """
-
-    raises_surface = False
-
-    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-        """As :func:`love_kernel`. [m]"""
-        return love_kernel(shape, spacing)
-
-    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """``2 / |q|``; zero at ``q = 0``: the mean displacement of a periodic half-space is undefined. [m]"""
-        magnitude = np.asarray(np.hypot(qx, qy), dtype=float)
-        return np.asarray(2 / np.where(magnitude > 0, magnitude, math.inf))
-
-    def described(self) -> dict[str, Any]:
-        """Nothing: it is what is pressed if nothing else is said."""
-        return {}
-
-    def under_rectangle(
-        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
-    ) -> Array:
-        """As for any kernel, by the closed form. [m]"""
-        axes = list(zip(before, after, spacing, strict=True))
-        x, y = ((a - b) / 2 * side for a, b, side in axes)
-        sides = [int(a[0] + b[0] + 1) * side for a, b, side in axes]
-        return rectangle_displacement(x[:, None], y, (sides[0], sides[1]))
-
-
-#: The body that is pressed if nothing else is said.
-HALF_SPACE = Love()
+def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
+    """Refuse an impossible grid."""
+    if any(int(n) != n or n < 1 for n in shape):
+        raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")
+    if not all(math.isfinite(side) and side > 0 for side in spacing):
+        raise InputError(f"spacing is {spacing}: expected two positive lengths [m]")

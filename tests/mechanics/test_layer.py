@@ -8,10 +8,10 @@ from scipy.special import j0
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.bodies.half_space import love_kernel
-from roughvisc.mechanics.bodies.layered import Layered, effective_compliance
-from roughvisc.mechanics.bodies.sheet import Sheet
+from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.layer import effective_compliance
 from roughvisc.mechanics.materials.frequency import complex_compliance
+from roughvisc.mechanics.sheet import Sheet
 
 X = np.geomspace(1e-3, 50, 23)
 
@@ -47,23 +47,39 @@ def test_effective_compliance__of_a_stiff_film_on_a_soft_base_bends_as_a_plate()
     assert 2 * found / x == pytest.approx(1 / stiffness, rel=2e-3)
 
 
-@pytest.mark.parametrize("compliances", [(1.0, 0.02), (1.0, 50.0)])
-def test_layered__its_kernel_in_free_space_is_the_transform_of_its_response(compliances):
-    kernel, side = Layered((1.0,), (0.5, 0.3), compliances), 0.05
+def elastic(thicknesses, poissons, compliances):
+    """Kernel of elastic layers, whose shear compliances are given."""
+    *layers, body = (rv.elastic(1 / one, poisson=nu) for one, nu in zip(compliances, poissons, strict=True))
+    for h, material in zip(thicknesses[::-1], layers[::-1], strict=True):
+        body = rv.layer(material, h, on=body)
+    return body.kernel
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 0.02, 50.0, 1e3, 1e5])
+def test_kernel__its_transform_is_the_exact_response_between_its_waves_too(ratio):
+    q = np.geomspace(1e-6, 100, 1000)
+    exact = effective_compliance(q, (1.0,), (0.5, 0.3), (4.0, 4.0 * ratio))
+    np.testing.assert_allclose(elastic((1.0,), (0.5, 0.3), (1.0, ratio)).transfer(q, 0.0) * q / 2, exact, rtol=2e-6)
+
+
+@pytest.mark.parametrize(("ratio", "relative"), [(1e-3, 1e-3), (0.02, 2e-4), (50.0, 2e-4), (1e3, 2e-4), (1e5, 2e-4)])
+def test_kernel__in_free_space_is_the_transform_of_its_response(ratio, relative):
+    """At distances of one and of three thicknesses. A cell's mean differs from its centre by the square of the cell."""
+    kernel, side = elastic((1.0,), (0.5, 0.3), (1.0, ratio)), 0.05
     found, love = kernel.influence((61, 2), (side, side)), love_kernel((61, 2), (side, side))
     nodes, weights = np.polynomial.legendre.leggauss(20)
     ends = np.concatenate([[0], np.geomspace(1e-8, 1e-2, 200), np.linspace(1e-2, 30, 600)[1:]])
     halves = np.diff(ends)[:, None] / 2
     q, weights = (ends[:-1, None] + halves * (nodes + 1)).ravel(), (halves * weights).ravel()
+    factor = effective_compliance(q, (1.0,), (0.5, 0.3), (4.0, 4.0 * ratio))
     for cell in (20, 60):
-        rest = weights @ ((kernel.factor(q) - 1) * j0(q * cell * side)) / math.pi * side**2
-        # a cell's mean differs from its centre by the square of the cell
-        assert found[cell, 0] - love[cell, 0] == pytest.approx(rest, abs=1e-4 * love[cell, 0], rel=2e-4)
+        rest = weights @ ((factor - 1) * j0(q * cell * side)) / math.pi * side**2
+        assert found[cell, 0] - love[cell, 0] == pytest.approx(rest, abs=1e-4 * love[cell, 0], rel=relative)
 
 
 @pytest.mark.parametrize("side", [0.3, 4.0])
-def test_layered__displacement_by_a_cell_is_that_by_its_nine_parts(side):
-    kernel = Layered((0.5, 0.5), (0.5, 0.1, 0.3), (1.0, 0.1, 8.0))
+def test_kernel__displacement_by_a_cell_is_that_by_its_nine_parts(side):
+    kernel = elastic((0.5, 0.5), (0.5, 0.1, 0.3), (1.0, 0.1, 8.0))
     whole = kernel.influence((15, 17), (side, 1.3 * side))
     parts = kernel.influence((50, 50), (side / 3, 1.3 * side / 3))
     for i, j in ((0, 0), (2, 1), (14, 5), (3, 15)):
@@ -71,23 +87,26 @@ def test_layered__displacement_by_a_cell_is_that_by_its_nine_parts(side):
         assert parts[np.ix_(*near)].sum() == pytest.approx(whole[i, j], rel=1e-7)
 
 
-def test_layered__far_away_is_the_half_space_below():
-    kernel = Layered((1.0,), (0.5, 0.3), (1.0, 0.02))
-    found = kernel.influence((401, 1), (1.0, 1.0))[-1, 0]
+def test_kernel__far_away_is_the_half_space_below():
+    found = elastic((1.0,), (0.5, 0.3), (1.0, 0.02)).influence((401, 1), (1.0, 1.0))[-1, 0]
     assert found == pytest.approx(0.7 / 0.5 * 0.02 * love_kernel((401, 1), (1.0, 1.0))[-1, 0], rel=1e-3)
 
 
-def test_layer__of_elastic_materials_is_pressed_as_one_of_its_kernel():
-    layer = rv.layer(rv.elastic(2e6, poisson=0.3), "0.1 mm", on=rv.elastic(1e8))
-    assert layer.kernel == Layered((1e-4,), (0.3, 0.5), (1.0, 0.02))
-    assert layer.separates
+def test_kernel__of_equal_layers_is_equal():
+    one, same = (rv.layer(rv.elastic(2e6, poisson=0.3), "0.1 mm", on=rv.elastic(1e8)) for _ in range(2))
+    assert one == same
+    assert hash(one.kernel) == hash(same.kernel)
+    assert one.kernel != rv.layer(rv.elastic(2e6, poisson=0.3), "0.2 mm", on=rv.elastic(1e8)).kernel
+    assert one.separates
 
 
 def test_layer__lies_on_another_one():
     soft, hard, base = rv.elastic(1e6), rv.elastic(1e8), rv.elastic(1e7)
     both = rv.layer(soft, 1e-4, on=rv.layer(hard, 2e-4, on=base))
     assert both.thicknesses == (1e-4, 2e-4)
-    np.testing.assert_allclose(both.kernel.compliances, (1.0, 0.01, 0.1))
+    assert both.materials == (soft, hard, base)
+    exact = 4 * effective_compliance(1e4, both.thicknesses, (0.5, 0.5, 0.5), (1.0, 0.01, 0.1))
+    assert float(both.kernel.transfer(1e4, 0.0)) * 1e4 / 2 == pytest.approx(float(exact), rel=2e-6)
     assert rv.layer(soft, math.inf, on=base) == rv.Body(soft)
 
 

@@ -1,0 +1,345 @@
+"""Body that a profile is pressed on: a material, and the displacement of the body's surface under pressure.
+
+The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*`` of the material and the kernel ``K`` of the
+body. A material alone is a half-space. A body is accepted wherever a material is.
+
+Fourier convention: ``p_q = sum_x p exp(-i q x)`` with ``q = 2 pi n / size``, as in ``scipy.fft``. Kernels are real and
+even in x and in y, and so are their transforms. A *symbol* holds the non-negative wave numbers of both axes, shape
+``(mx // 2 + 1, my // 2 + 1)`` for ``(mx, my)`` points; symmetry gives the others.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.half_space import check_grid, love_kernel, rectangle_displacement
+from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
+from roughvisc.mechanics.materials.prony import Prony
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
+
+
+class Kernel(Protocol):
+    """Displacement of a surface under pressure, at unit contact compliance.
+
+    The surface is the same everywhere, and its own mirror image in x and y. A class needs two methods:
+    :meth:`influence` for free space, :meth:`transfer` for periodic boundaries and the preconditioner. Both describe one
+    linear, symmetric and positive operator. The other methods are inherited. A kernel is a value: frozen, and equal to
+    another one with the same parameters.
+
+    Attributes
+    ----------
+    raises_surface : bool
+        Whether pressure may raise the surface anywhere. Default: it may. Otherwise no point deeper than the approach
+        touches, and a window follows the contact in free space.
+    """
+
+    raises_surface: bool = True
+
+    @abstractmethod
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Return the displacement at cell centres under unit pressure on the cell at the origin.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Number of cells ``(nx, ny)``, counted from the one at the origin.
+        spacing : tuple of float
+            Cell sides ``(dx, dy)``. Any are possible: coarser cells are requested too. [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            [m]
+        """
+
+    @abstractmethod
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """Return the displacement over the pressure of a wave, the Fourier transform of the kernel.
+
+        Parameters
+        ----------
+        qx, qy : ndarray
+            Wave numbers, which broadcast. [1/m]
+
+        Returns
+        -------
+        ndarray
+            Positive. At ``q = 0`` the displacement under uniform pressure if it is finite, otherwise zero: the mean
+            displacement is then left out, and the approach under periodic boundaries counts without it. [m]
+        """
+
+    def check_cells(self, spacing: tuple[float, float]) -> None:
+        """Refuse cells on which :meth:`influence` is not accurate; default: none. Called for the grid of a surface.
+
+        Parameters
+        ----------
+        spacing : tuple of float
+            Cell sides ``(dx, dy)``. [m]
+
+        Raises
+        ------
+        InputError
+            If the cells are too long.
+        """
+        return
+
+    def described(self) -> dict[str, Any]:
+        """Return the attributes of a result that describe the body: names and values."""
+        return {"kernel": repr(self)}
+
+    def under_rectangle(
+        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
+    ) -> Array:
+        """Return the displacement of cells in a rectangle of cells that all carry unit pressure.
+
+        Parameters
+        ----------
+        before, after : pair of ndarray of int, shapes (nx,) and (ny,)
+            Number of cells of the rectangle on either side of each cell, along x and along y.
+        spacing : tuple of float
+            Cell sides. [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            Sums of :meth:`influence`. A kernel with a closed form overrides this method. [m]
+        """
+        reach = [max(int(np.max(a)), int(np.max(b))) + 1 for a, b in zip(before, after, strict=True)]
+        quadrant = np.array(self.influence((reach[0], reach[1]), spacing))
+        quadrant[0] /= 2  # a cell's own row and column are in two quadrants
+        quadrant[:, 0] /= 2
+        total = np.cumsum(np.cumsum(quadrant, axis=0), axis=1)
+        x, y = ((a, b) for a, b in zip(before, after, strict=True))
+        return np.asarray(sum(total[np.ix_(i, j)] for i in x for j in y))
+
+
+@dataclass(frozen=True)
+class HalfSpace(Kernel):
+    """The elastic half-space: ``K = 1 / (pi r)`` averaged over the loaded cell, ``K_q = 2 / |q|``.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, sections 3.2 and 13.2.
+    """
+
+    raises_surface = False
+
+    def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Return :func:`roughvisc.mechanics.half_space.love_kernel`. [m]"""
+        return love_kernel(shape, spacing)
+
+    def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
+        """Return ``2 / |q|``; zero at ``q = 0``, since the mean displacement is undefined. [m]"""
+        magnitude = np.asarray(np.hypot(qx, qy), dtype=float)
+        return np.asarray(2 / np.where(magnitude > 0, magnitude, math.inf))
+
+    def described(self) -> dict[str, Any]:
+        """Return nothing: a half-space is the default."""
+        return {}
+
+    def under_rectangle(
+        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
+    ) -> Array:
+        """Return the same as for any kernel, in closed form. [m]"""
+        axes = list(zip(before, after, spacing, strict=True))
+        x, y = ((a - b) / 2 * side for a, b, side in axes)
+        sides = [int(a[0] + b[0] + 1) * side for a, b, side in axes]
+        return rectangle_displacement(x[:, None], y, (sides[0], sides[1]))
+
+
+#: The default kernel.
+HALF_SPACE = HalfSpace()
+
+
+def has_finite_mean(kernel: Kernel) -> bool:
+    """Return whether the mean displacement under uniform pressure is finite, and known."""
+    return float(kernel.transfer(0.0, 0.0)) > 0
+
+
+def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the symbol of a kernel on a zero-padded grid.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Kernel of the body.
+    padded : tuple of int
+        Even numbers of points, at least ``2 n - 1`` of the unpadded grid's along each axis.
+    spacing : tuple of float
+        Cell sides. [m]
+
+    Returns
+    -------
+    ndarray, shape (padded[0] // 2 + 1, padded[1] // 2 + 1)
+        Real; positive for a half-space. [m]
+
+    Notes
+    -----
+    Every offset of the padded grid is filled with the kernel, also the one at half its length that no pair of
+    cells has: with a zero there the symbol turns negative for slender cells (aspect 16: -1.5) and its inverse
+    is no preconditioner.
+    """
+    offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
+    if padded[0] % 2 or padded[1] % 2:
+        raise ValueError(f"padded is {padded}: expected even numbers of points")
+    symbol: Array = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
+    return symbol
+
+
+def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the symbol of a kernel under periodic pressure.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        Kernel of the body.
+    shape : tuple of int
+        Number of cells ``(nx, ny)`` of one period.
+    spacing : tuple of float
+        Cell sides. [m]
+
+    Returns
+    -------
+    ndarray, shape (nx // 2 + 1, ny // 2 + 1)
+        Positive, but zero at ``q = 0`` if the mean displacement is undefined and left out. [m]
+
+    Raises
+    ------
+    InputError
+        If the grid is impossible, or the transfer function is not positive.
+    """
+    check_grid(shape, spacing)
+    waves = periodic_waves(shape, spacing)
+    symbol = np.array(kernel.transfer(*waves), dtype=float)
+    amiss = ~(np.isfinite(symbol) & (symbol > 0))
+    amiss[0, 0] = not 0 <= symbol[0, 0] < math.inf
+    if amiss.any():
+        i, j = (int(n) for n in np.argwhere(amiss)[0])
+        qx, qy = (float(one.ravel()[at]) for one, at in zip(waves, (i, j), strict=True))
+        raise InputError(
+            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {qx:g} and {qy:g} 1/m: "
+            "expected a positive number, or zero where both are zero"
+        )
+    return symbol
+
+
+def periodic_waves(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
+    """Return the wave numbers of a symbol under periodic pressure, along x and along y, which broadcast. [1/m]"""
+    qx, qy = (
+        np.array(2 * math.pi / (n * side) * np.arange(n // 2 + 1), dtype=np.float64)
+        for n, side in zip(shape, spacing, strict=True)
+    )
+    return qx[:, None], qy[None, :]
+
+
+def wave_limits(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:
+    """Return the wave numbers of the longest and of the shortest wave on a grid. [1/m]"""
+    longest = max(count * side for count, side in zip(shape, spacing, strict=True))
+    return 2 * math.pi / longest, math.hypot(*(math.pi / side for side in spacing))
+
+
+@dataclass(frozen=True)
+class Body:
+    """Viscoelastic body whose surface is the same everywhere.
+
+    Parameters
+    ----------
+    material : Material
+        A material of roughvisc, or any object with a contact compliance, see
+        :class:`roughvisc.mechanics.materials.creep.Material`.
+    kernel : Kernel
+        Displacement of the surface under pressure at unit contact compliance. Default: that of a half-space.
+
+    Raises
+    ------
+    InputError
+        If either has a wrong type.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.Body(rv.elastic(1e6)) == rv.sheet(rv.elastic(1e6), thickness=float("inf"))
+    True
+    """
+
+    material: Material
+    kernel: Kernel = HALF_SPACE
+
+    def __post_init__(self) -> None:
+        if isinstance(self.material, Body):
+            raise InputError(f"material is the body {self.material!r}: expected a material")
+        complete(self.material)
+        for name in ("influence", "transfer"):
+            if not callable(getattr(self.kernel, name, None)):
+                found = type(self.kernel).__name__
+                raise InputError(f"kernel is a {found}: expected a Kernel; it has no {name}")
+
+    @property
+    def separates(self) -> bool:
+        """Whether space and time separate: all waves creep equally, and kernel and material describe the body."""
+        return True
+
+    @property
+    def materials(self) -> tuple[Prony | Creep, ...]:
+        """Materials of the body."""
+        return (complete(self.material),)
+
+    @property
+    def note(self) -> str:
+        """How the materials were found, for the notes of a result; often empty."""
+        return "; ".join(one.note for one in self.materials if one.note)
+
+    def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> Self:
+        """Return the body with materials that represent its own at some frequencies, see :func:`over_frequencies`.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Angular frequencies. [1/s]
+        tolerance : float
+            Relative error of the compliance.
+        """
+        return replace(self, material=over_frequencies(self.material, frequency, tolerance))
+
+    def waves(self, qx: Array, qy: Array, frequency: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Return the displacement over the pressure of oscillating waves: kernel and complex contact compliance.
+
+        Parameters
+        ----------
+        qx, qy : ndarray
+            Wave numbers, which broadcast. [1/m]
+        frequency : ndarray
+            Angular frequencies among those given to :meth:`over_frequencies`; they broadcast with the wave numbers.
+            [1/s]
+
+        Returns
+        -------
+        kernel, compliance : ndarray
+            Their product is the response [m], [1/Pa]. The compliance is infinite if the material creeps without end.
+        """
+        return self.kernel.transfer(qx, qy), complex_compliance(self.material, frequency)
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the attributes of a result that describe the body beside its material: names and values."""
+        return self.kernel.described()
+
+
+def body_of(material: Any) -> Body:
+    """Return a body itself, or the half-space of a material."""
+    return material if isinstance(material, Body) else Body(material)
+
+
+def separability_error(material: Any) -> str:
+    """Return what a material represents if it is not one body of a constant Poisson ratio; otherwise empty."""
+    return str(getattr(material, "stands_for", ""))
