@@ -34,7 +34,7 @@ BOUNDARIES: tuple[Boundary, ...] = ("free", "periodic", "mirror")
 
 #: Rows that are transformed together, bytes of such columns and the fewest columns, which stay in the cache. Measured
 #: from 64 to 1,024 cells a side: whole fields take up to 1.5 times as long.
-ROWS, COLUMN_BYTES, COLUMNS = 128, 1 << 18, 32
+ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
 #: Cells from which periodic convolutions are done by blocks of columns too; below, whole fields are faster.
 BLOCKS_FROM = 1024**2
 #: Cells a side of a block of the coarse grid.
@@ -42,7 +42,7 @@ COARSE = 8
 
 
 class Grid:
-    """Rectangular cells of a body's surface.
+    """Rectangular cells of a body's surface. Two threads may not use one grid at the same time.
 
     Parameters
     ----------
@@ -105,6 +105,7 @@ class Grid:
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.convolutions = 0
+        self._memories: dict[Any, Array] = {}
 
     @property
     def size(self) -> int:
@@ -221,7 +222,7 @@ class Grid:
         return (1 / symbol).astype(np.float32)
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
-        """Return a field convolved on so many points."""
+        """Return the convolution of a field with a symbol on a number of points."""
         fft = self._transforms
         if self.boundary == "mirror":
             return fft.cosines_back(fft.cosines(field) * symbol)
@@ -231,13 +232,13 @@ class Grid:
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache.
         (nx, ny), count, threads = self.shape, points[1] // 2 + 1, self.threads
-        spectrum = self.xp.empty((nx, count), np.result_type(field.dtype, np.complex64))
+        spectrum = self._memory((nx, count), np.result_type(field.dtype, np.complex64))
         rows, columns = threads * ROWS, threads * max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
         if self.xp is not np:
             rows, columns = nx, count
         for part in (slice(first, first + rows) for first in range(0, nx, rows)):
             spectrum[part] = fft.rows(field[part], points[1])
-        room = self.xp.empty((points[0], min(columns, count)), spectrum.dtype)
+        room = self._memory((points[0], min(columns, count)), spectrum.dtype)
         for part in (slice(first, min(first + columns, count)) for first in range(0, count, columns)):
             waves = room[:, : part.stop - part.start]
             waves[:nx], waves[nx:] = spectrum[:, part], 0
@@ -248,6 +249,12 @@ class Grid:
         for part in (slice(first, first + rows) for first in range(0, nx, rows)):
             found[part] = fft.rows_back(spectrum[part], points[1])[:, :ny]
         return found
+
+    def _memory(self, shape: tuple[int, int], number: Any) -> Array:
+        """Return an array to work in, the same in each convolution: new memory takes up to a third more time."""
+        if (shape, number) not in self._memories:
+            self._memories[shape, number] = self.xp.empty(shape, number)
+        return self._memories[shape, number]
 
     # ----------------------------------------------------------------------------------------------------- transforms
 
@@ -296,7 +303,7 @@ class Grid:
         return self.xp.asarray(np.outer(along_x, along_y) * (self.cell_area / (mx * my)))
 
     def turn(self, cells: int, axis: int) -> Array:
-        """Return the factors of the transform of a periodic field that is seen from so many cells farther."""
+        """Return the factors by which the transform of a periodic field changes if the field moves back by `cells`."""
         if self.boundary != "periodic":
             raise ValueError("only periodic fields turn")
         count = self.shape[axis]
@@ -306,12 +313,12 @@ class Grid:
 
 
 def _fast_length(cells: int) -> int:
-    """Return a length, at least so many cells, that transforms fast."""
+    """Return the next length from `cells` on that transforms fast."""
     return int(scipy.fft.next_fast_len(cells, real=True))
 
 
 def _counts(points: int) -> np.ndarray:
-    """Return how many waves of so many points have each non-negative wave number."""
+    """Return the number of waves on these points at each non-negative wave number."""
     number = np.arange(points // 2 + 1)
     return np.where((number == 0) | (2 * number == points), 1.0, 2.0)
 

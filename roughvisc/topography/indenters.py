@@ -40,7 +40,7 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
     -------
     xarray.DataArray
         Height over (x, y), not above zero. [m] The apex is at ``size / 2``, which lies between the cells if their
-        number is even. With even numbers of cells only a quarter of the contact is solved, in half the time or less.
+        number is even.
 
     Raises
     ------

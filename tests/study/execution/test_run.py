@@ -66,7 +66,7 @@ def test_run__reports_progress(study):
 
 def test_run__writes_nothing_where_the_input_is_wrong(study):
     case = vary(read_study(study), {"program.0.load": 50.0})
-    with pytest.raises(EdgeContactError, match=r"ball\.toml: .*periodic"):
+    with pytest.raises(EdgeContactError, match=r"ball\.toml: .*'mirror'"):
         rv.run(case, progress=False)
     assert [p.name for p in study.parent.iterdir()] == ["ball.toml"]
 
