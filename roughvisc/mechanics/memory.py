@@ -1,0 +1,268 @@
+"""Memory of a linear viscoelastic body: from a history of pressure to the displacement after the next step.
+
+The contact compliance is an exponential series,
+
+    C(t) = glassy + fluidity t + sum_i c_i (1 - exp(-t/tau_i)).
+
+``v = K p`` is the displacement per unit compliance under the present pressure. Each exponential keeps one field ``m_i``
+with ``dm_i/dt = (v - m_i)/tau_i``; the fluidity keeps ``dm/dt = v``. The displacement is ``glassy v + sum_i c_i m_i``.
+A step of length ``h`` is an elastic problem with the compliance ``alpha``,
+
+    displacement = alpha v_new + history,
+
+so that the history costs no convolution. ``v`` runs linearly within a step: second order, and exact for such ``v``.
+If the body creeps far within a step this rule rings. BDF2 then takes its place, after a first step with constant ``v``.
+
+The same recursion holds for the pressure. A memory may keep both fields, ``(v, p)``, so that the pressure that causes
+the present displacement is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+
+Array = Any  # an array of NumPy or CuPy
+Rule = Literal["linear", "bdf2", "constant"]
+
+#: BDF2 is used if the compliance grows by more than this factor within a step.
+STIFF = 3.0
+#: BDF2 is stable while steps grow by no more than 1 + sqrt(2) [1]_; after a longer growth it starts anew.
+#:
+#: .. [1] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, section III.5.
+LARGEST_GROWTH = 2.4
+
+
+@dataclass(frozen=True)
+class History:
+    """Memory at an instant.
+
+    Attributes
+    ----------
+    fields : array, shape (k, nx, ny)
+        Displacement per unit compliance ``v`` [m Pa], and with ``k = 2`` the pressure [Pa].
+    modes : array, shape (m, k, nx, ny)
+        The fields ``m_i`` of each exponential, and last of the fluidity.
+    earlier : array or None
+        The modes before the last step, if BDF2 may need them.
+    step : float
+        Length of the last step; zero if the next one must not use it. [s]
+    """
+
+    fields: Array
+    modes: Array
+    earlier: Array | None = None
+    step: float = 0.0
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Elastic problem of a step: ``displacement = compliance K p + carried``.
+
+    Attributes
+    ----------
+    compliance : float
+        ``alpha``. [1/Pa]
+    carried : array, shape (k, nx, ny)
+        Displacement due to the history [m], and with ``k = 2`` the pressure that causes it, times a compliance [-].
+    modes : array, shape (m, k, nx, ny)
+        Part of the new modes that the history determines.
+    new : ndarray, shape (m,)
+        Weight of the new fields in the modes.
+    step : float
+        Length of the step. [s]
+    grid : Grid or None
+        Cells with the kernel of the step, if that is not the same in all steps; `compliance` is one then.
+    """
+
+    compliance: float
+    carried: Array
+    modes: Array
+    new: np.ndarray
+    step: float
+    grid: Any = None
+
+
+class Memory:
+    """Exponential series of a body in which space and time separate.
+
+    Parameters
+    ----------
+    series : Prony
+        The material.
+    duration : float
+        Length of the program: no step is longer. [s]
+    keeps_pressure : bool
+        Whether the pressure that causes the displacement is kept too.
+    """
+
+    def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
+        factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
+        self.series = series
+        self.glassy = factor * series.glassy
+        flow = [series.fluidity] if series.fluidity else []
+        self.compliances = factor * np.array([*series.compliances, *flow])
+        self.times = np.array([*series.times, *([np.inf] if flow else [])])
+        self.fields = 2 if keeps_pressure else 1
+        self.may_ring = self.is_stiff(duration)
+
+    def compliance(self, time: float) -> float:
+        """Return the contact compliance after a time. [1/Pa]"""
+        return float(self.series.contact_compliance(time))
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether the history does not matter."""
+        return not self.compliances.any()
+
+    def is_stiff(self, step: float) -> bool:
+        """Return whether the body creeps so far within a step that ``v`` cannot be linear in it."""
+        return step > 0 and self.compliance(step) > STIFF * self.glassy
+
+    def start(self, shape: tuple[int, int]) -> History:
+        """Return the memory of an undisturbed body."""
+        return History(np.zeros((self.fields, *shape)), np.zeros((self.times.size, self.fields, *shape)))
+
+    def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
+        """Return the elastic problem of a step. [s]"""
+        rule = rule or self.rule(history, step)
+        own, earlier, before, new = self.recursion(step, history.step, rule)
+        modes = np.empty_like(history.modes)
+        carried = np.zeros_like(history.fields)
+        for i, mode in enumerate(modes):
+            np.multiply(history.modes[i], own[i], out=mode)
+            if earlier[i]:
+                mode += earlier[i] * history.earlier[i]
+            if before[i]:
+                mode += before[i] * history.fields
+            carried += self.compliances[i] * mode
+        alpha = self.glassy + float((self.compliances * new).sum())
+        return Prediction(alpha, carried, modes, new, step)
+
+    def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
+        """Return the memory after a step.
+
+        Parameters
+        ----------
+        history, prediction : History, Prediction
+            Memory before the step, and its problem. The modes of the prediction are used up.
+        unit : array, shape (nx, ny)
+            Displacement per unit compliance at the end. [m Pa]
+        pressure : array, shape (nx, ny)
+            Pressure at the end. [Pa]
+        """
+        fields = unit[None] if self.fields == 1 else np.stack([unit, pressure])
+        if prediction.step == 0:
+            return History(fields, history.modes)
+        for mode, weight in zip(prediction.modes, prediction.new, strict=True):
+            mode += weight * fields
+        return History(fields, prediction.modes, history.modes if self.may_ring else None, prediction.step)
+
+    def present(self, history: History) -> Array:
+        """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
+        total = self.glassy * history.fields
+        for compliance, mode in zip(self.compliances, history.modes, strict=True):
+            total += compliance * mode
+        return total
+
+    def at_once(self, history: History) -> Array:
+        """Return the instantaneous part of the displacement. [m]"""
+        return self.glassy * history.fields[0]
+
+    def unit(self, history: History) -> Array | None:
+        """Return the displacement per unit compliance; None if the body has no common kernel. [m Pa]"""
+        return history.fields[0]
+
+    def after_rest(self, history: History, time: float) -> Array:
+        """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
+        own = self.recursion(time, 0.0, "linear")[0]
+        total = np.zeros_like(history.fields[0])
+        for compliance, mode in zip(self.compliances * own, history.modes, strict=True):
+            total += compliance * mode[0]
+        return total
+
+    def restart(self, history: History) -> History:
+        """Return the memory whose next step does not use the last one."""
+        return History(history.fields, history.modes)
+
+    def roll(self, history: History, cells: int, axis: int) -> History:
+        """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
+
+        def rolled(fields: Array) -> Array:
+            return np.roll(fields, -cells, axis - 2)
+
+        earlier = None if history.earlier is None else rolled(history.earlier)
+        return History(rolled(history.fields), rolled(history.modes), earlier, history.step)
+
+    def remaining(self, time: float) -> float:
+        """Return the part of an error of the history that relaxation leaves after a time. [s]
+
+        At a held displacement ``glassy v = -sum_i c_i m_i``, so that the modes decay together.
+        """
+        if self.glassy == 0 or self.is_elastic:
+            return 1.0
+        rates, parts = self._relaxation
+        return float(np.clip((parts * np.exp(-rates * time)).sum() / parts.sum(), 0.0, 1.0))
+
+    @cached_property
+    def _relaxation(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rates at which errors decay [1/s], and their parts in an error that is equal in all modes."""
+        active = self.compliances > 0
+        own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
+        driven = np.where(own > 0, own, 1.0)
+        equal = np.where(own > 0, 1.0, 1 / weights)  # of the fluidity: what relaxes at the rate fluidity / glassy
+        # diag(own) + driven weights^T, in a basis in which it is symmetric
+        root = np.sqrt(driven * weights)
+        rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
+        parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
+        return np.maximum(rates, 0.0), parts
+
+    def rule(self, history: History, step: float) -> Rule:
+        """Return the rule of a step. [s]"""
+        if not self.may_ring or not self.is_stiff(step):
+            return "linear"
+        return "bdf2" if history.earlier is not None and step <= LARGEST_GROWTH * history.step else "constant"
+
+    def recursion(self, step: float, last: float, rule: Rule) -> tuple[np.ndarray, ...]:
+        """Return the weights of ``m_new = own m + earlier m_before + before v + new v_new``.
+
+        Parameters
+        ----------
+        step, last : float
+            Length of the step and of the one before. [s]
+        rule : {"linear", "bdf2", "constant"}
+            How ``v`` runs within the step.
+
+        Returns
+        -------
+        own, earlier, before, new : ndarray, shape (m,)
+        """
+        ratio, flows, none = step / self.times, np.isinf(self.times), np.zeros(self.times.size)
+        if step == 0:
+            return none + 1, none, none, none
+        if rule == "linear":
+            own = np.exp(-ratio)
+            new = np.where(flows, step / 2, one_less_mean_decay(ratio))
+            before = np.where(flows, step / 2, -np.expm1(-ratio) - new)
+            small = ratio < 0.3  # the difference cancels
+            before[small & ~flows] = _early_weight(ratio[small & ~flows])
+            return own, none, before, new
+        if rule == "constant":
+            return np.exp(-ratio), none, none, np.where(flows, step, -np.expm1(-ratio))
+        growth = step / last
+        beta = (1 + growth) / (1 + 2 * growth)
+        divisor = 1 + beta * ratio
+        own, earlier = (1 + growth) ** 2 / (1 + 2 * growth) / divisor, -(growth**2) / (1 + 2 * growth) / divisor
+        return own, earlier, none, beta * np.where(flows, step, ratio) / divisor
+
+
+def _early_weight(ratio: np.ndarray) -> np.ndarray:
+    """Return ``(1 - (1 + x) exp(-x)) / x`` for small ``x``, without cancellation."""
+    order = np.arange(2.0, 16)
+    terms = (-1) ** order * (order - 1) / np.cumprod(order)
+    return np.asarray((terms * ratio[:, None] ** (order - 1)).sum(axis=-1))
