@@ -30,14 +30,15 @@ Array = NDArray[np.float64]
 _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
 #: A fit with fewer terms may have an rms misfit larger by this factor than the smallest one.
 _FEWER = 1.1
-#: No rheometer measures better than this rms misfit. Terms of creep are chosen later, for a program.
-_ACCURATE, _EXACT = 2e-4, 1e-7
-#: Rows per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the differences
-#: between neighbouring terms next to the misfit of the rows.
-_FEW, _SMOOTH, _STEPS = 4, 3, 0.01
-#: Terms are offered beyond the first and the last row by these factors: a slower one is a plateau, a faster one is
-#: not seen.
-_FASTER, _SLOWER = 10.0, 3.0
+#: Number of values per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the
+#: differences between neighbouring terms next to the misfit of the rows.
+_FEW, _SMOOTH, _STEPS = 2.5, 3, 0.01
+#: Terms are offered beyond the last time by this factor: a slower one is a plateau.
+_SLOWER = 3.0
+#: Terms are offered before the first time by this factor, and an rms misfit below which nothing is gained. Moduli: the
+#: rows hardly determine a faster term, and no rheometer measures better. Creep: a fast term rises from the given
+#: instantaneous compliance, and the terms are chosen later, for a program.
+_MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
 #: Largest ratio of the times of neighbouring rows without a warning.
 _DECADE = 10.0 * (1 + 1e-9)
 
@@ -99,7 +100,7 @@ def creep_table(
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau = _fitted(columns, rows, measured, measured - glassy, measured, _EXACT)
+    weights, tau = _fitted(columns, rows, measured, measured - glassy, measured, *_CREEP)
     misfit = (glassy + columns(tau) @ weights) / measured - 1
     note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
     if t[0] > 0:
@@ -162,7 +163,7 @@ def relaxation_table(
     def columns(theta: Array) -> Array:
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
-    fitted, theta = _fitted(columns, t[later], shear[later], shear, shear, _ACCURATE)
+    fitted, theta = _fitted(columns, t[later], shear[later], shear, shear, *_MODULI)
     misfit = columns(theta) @ fitted / shear - 1
     note = _note(theta.size + 1, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
     return _relaxing(fitted, theta, poisson, note)
@@ -233,7 +234,7 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    fitted, theta = _fitted(columns, 1 / omega, np.hypot(elastic, viscous), target, scale, _ACCURATE)
+    fitted, theta = _fitted(columns, 1 / omega, np.hypot(elastic, viscous), target, scale, *_MODULI)
     misfit = (columns(theta) @ fitted - target) / scale
     span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
     note = _note(theta.size + 1, omega.size, misfit, span, _gap("dynamic", np.unique(1 / omega)))
@@ -241,9 +242,15 @@ def dynamic_table(
 
 
 def _fitted(
-    columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, accurate: float
+    columns: Callable[[Array], Array],
+    at: Array,
+    course: Array,
+    target: Array,
+    scale: Array,
+    faster: float,
+    accurate: float,
 ) -> tuple[Array, Array]:
-    """Return the non-negative weights of a series and its times. [s]
+    """Return the non-negative weights of a series, and its times. [s]
 
     Parameters
     ----------
@@ -251,8 +258,8 @@ def _fitted(
         Function of the times; the first of its columns has no time. It is fitted to `target`, relative to `scale`.
     at, course : ndarray
         Times of the measurements [s] and their values, by which the size of a term is judged.
-    accurate : float
-        An rms misfit below which nothing is gained.
+    faster, accurate : float
+        See :data:`_MODULI`.
 
     Notes
     -----
@@ -261,9 +268,9 @@ def _fitted(
     """
     order = np.argsort(at)
     at, course = at[order], course[order]
-    within = float(at[0]) / _FASTER, float(at[-1]) * _SLOWER
+    within = float(at[0]) / faster, float(at[-1]) * _SLOWER
     fits = []
-    sparse = np.unique(at).size - 1 < _FEW * np.log10(at[-1] / at[0])
+    sparse = target.size - 1 < _FEW * np.log10(at[-1] / at[0])
     for per_decade in (_SMOOTH,) if sparse else _OFFERED:
         times = lattice(*within, per_decade)
         offered = columns(times)

@@ -217,6 +217,25 @@ def test_relaxation_table__finds_the_creep(first):
     assert stated_misfit(material) == pytest.approx(misfit, rel=0.06, abs=0)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_noisy_moduli__leave_the_creep_at_early_times(seed):
+    """A term faster than the first row is hardly seen there, and would make the material as stiff as it likes."""
+    noise = 1 + 0.02 * np.random.default_rng(seed).standard_normal((3, 60))
+    t, omega = np.geomspace(1e-4, 100.0, 60), np.geomspace(1e-2, 1e4, 60)
+    storage, loss = dynamic(omega)
+    assert distance(rv.relaxation_table(t, relaxation(t) * noise[0], poisson=0.4)) < 0.04
+    moduli = storage * noise[1], loss * noise[2]
+    assert distance(rv.dynamic_table(omega, *moduli, frequency_unit="rad/s", poisson=0.4)) < 0.03
+
+
+@pytest.mark.parametrize(("rows", "most"), [(12, 2e-3), (24, 1e-3)])
+def test_dynamic_table__of_few_rows_finds_few_terms(rows, most):
+    omega = np.geomspace(1e-2, 1e4, rows)
+    material = rv.dynamic_table(omega, *dynamic(omega), frequency_unit="rad/s", poisson=0.4)
+    assert distance(material) < most
+    assert len(material.times) <= 7
+
+
 def test_relaxation_table__in_tension():
     t = np.geomspace(1e-4, 100.0, 60)
     shear = rv.relaxation_table(t, relaxation(t), poisson=0.3)
