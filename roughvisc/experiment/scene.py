@@ -364,6 +364,7 @@ def _check_layers(
     Their elastic contact is tried at the largest load or approach, with the first and with the last compliance.
     """
     segments, surface = program.segments, profile.of_scene()
+    parts = _TRIED if program.duration > 0 else _TRIED[:1]  # jumps pass no smaller loads
     gap, present = surface["gap"], surface["present"]
     kernels: list[tuple[Any, float]] = [(body.kernel, float(choice.material.contact_compliance(program.duration)))]
     if isinstance(choice.memory, WaveMemory):
@@ -377,7 +378,7 @@ def _check_layers(
         unit, tolerance = compliance / grid.cell_area, 0.2 * settings.tolerance
         for control in ("load", "approach"):
             largest = max(((s.end or 0.0) + abs(s.amplitude) for s in segments if s.control == control), default=0.0)
-            for value in (part * largest for part in _TRIED if largest > 0):
+            for value in (part * largest for part in parts if largest > 0):
                 load, approach = (value * unit, None) if control == "load" else (None, value)
                 try:
                     solve_contact(grid, gap, load=load, approach=approach, tolerance=tolerance, present=present)
