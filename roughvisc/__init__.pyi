@@ -27,15 +27,15 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.materials.temperature import arrhenius as arrhenius
 from roughvisc.mechanics.materials.temperature import wlf as wlf
+from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
-from roughvisc.mechanics.stepping.program import Program as Program
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.budget.budget import budget as budget
-from roughvisc.study.cost.plan import plan as plan
 from roughvisc.study.ensembles import over_realisations as over_realisations
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.observed import observe as observe
+from roughvisc.study.plan import plan as plan
 from roughvisc.study.statement.case import Case as Case
 from roughvisc.study.statement.case import read_cases as read_cases
 from roughvisc.study.statement.case import read_study as read_study

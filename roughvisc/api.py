@@ -15,7 +15,7 @@ from roughvisc.experiment.steady_sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material
-from roughvisc.mechanics.stepping.program import Direction, Program
+from roughvisc.mechanics.program import Direction, Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve

@@ -103,6 +103,10 @@ class Recorder(Protocol):
         """Take note of how far the solve has come; it may be stopped here."""
         ...
 
+    def restart(self) -> None:
+        """Forget all rows: the solve begins anew."""
+        ...
+
 
 class MemoryRecorder:
     """Keeps the rows in memory; what is not finished is lost."""
@@ -112,6 +116,10 @@ class MemoryRecorder:
     def __init__(self) -> None:
         self.rows: RowStore = RowsInMemory()
         self.latest = Checkpoint()
+
+    def restart(self) -> None:
+        """Forget all rows."""
+        self.rows = RowsInMemory()
 
     def update(self, reached: Checkpoint) -> None:
         """Nothing: the state of a step is not needed while the next one is computed."""

@@ -15,10 +15,9 @@ from scipy import fft
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.grid_error import with_grid_error
-from roughvisc.experiment.protocol import Experiment, Rows
+from roughvisc.experiment.protocol import Experiment, Outgrown, Rows
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import annotate, in_order, warnings_of, warnings_text
-from roughvisc.mechanics.arrays import reused
 from roughvisc.mechanics.body import separability_error
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.problem import Problem
@@ -105,24 +104,27 @@ def _solve_once(
 
     began = time.perf_counter()
     reached = recorder.latest
-    spent = reached.wall_time - began
-    with fft.set_workers(threads):
-        rows = experiment.rows(problem, reached.state, in_memory=recorder.in_memory)
-        if reached.state is not None:
-            log.info("resumes after %s", experiment.progress(reached.done, rows.end))
-        count, transforms = reached.rows, reached.transforms
-        del reached  # its fields are not needed beyond the first row
-        with reused(), reporting(progress, experiment.doing, at=experiment.progress) as report:
-            for row in rows:
-                took = spent + time.perf_counter()
-                if row.values:
-                    values = {experiment.axis: row.at, **row.values, "wall_time": took}
-                    recorder.rows.append({"row": values, "kept": row.kept, "facts": row.facts}, row.fields)
-                    count += 1
-                report(row.done, rows.end)
-                if row.state is not None:
-                    recorder.update(Checkpoint(row.state, row.done, count, took, transforms))
-                del row  # its fields are not needed while the next one is computed
+    spent, state, count = reached.wall_time - began, reached.state, reached.rows
+    with fft.set_workers(threads), reporting(progress, experiment.doing, at=experiment.progress) as report:
+        while True:
+            rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
+            if reached.state is not None:
+                log.info("resumes after %s", experiment.progress(reached.done, rows.end))
+            try:
+                for row in rows:
+                    took = spent + time.perf_counter()
+                    if row.values:
+                        values = {experiment.axis: row.at, **row.values, "wall_time": took}
+                        recorder.rows.append({"row": values, "kept": row.kept, "facts": row.facts}, row.fields)
+                        count += 1
+                    report(row.done, rows.end)
+                    if row.state is not None:
+                        recorder.update(Checkpoint(row.state, row.done, count, took, reached.transforms))
+                break
+            except Outgrown as outgrown:
+                log.info("contact has outgrown its domain: the run begins anew on a larger one")
+                recorder.restart()
+                reached, state, count = recorder.latest, outgrown.state, 0
         if not rows.order(recorder.rows):
             raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
         return dataset_of(problem, experiment, rows, recorder.rows)

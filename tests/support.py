@@ -8,8 +8,8 @@ import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.memory import Memory
+from roughvisc.mechanics.stepping import Scene
 from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage.store import open_result
 
@@ -111,8 +111,13 @@ def scene(material, program, *, shape=(31, 28), size=1.6, **settings):
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
     gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * UNIT_RADIUS)
     boundary = settings.pop("boundary", "free")
-    acts_on = settings.pop("acts_on", "displacement")
-    return Scene(Grid(shape, spacing, boundary), gap, material, Modes(material, acts_on), program, **settings)
+    memory = Memory(material, program.duration, settings.pop("keeps_pressure", False))
+    return Scene(Grid(shape, spacing, boundary), gap, memory, program, settings.pop("times", None), **settings)
+
+
+def displaced(scene, step):
+    """Displacement after a step. [m]"""
+    return scene.memory.present(step.point.history)[0]
 
 
 STEP_LOAD = rv.Program().load(0.05, over=0).hold(2.0)

@@ -5,9 +5,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.hereditary.choice import choose_memory
-from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.mechanics.stepping import Scene, march
 
 DURATION = 2.0
 COMMON = np.array([0.5, 1.0, 1.5, 2.0])
@@ -41,9 +40,9 @@ def run(material, program, times, shape=(19, 17)):
     gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * radius)
     program = scaled(program, load)
     memory = choose_memory(material, DURATION, 1e-7).memory
-    scene = Scene(Grid(shape, spacing), gap, material, memory, program, tuple(times), 1e-9, time_step=1e9)
-    steps = [s for s in march(scene) if np.isclose(s.shown.time, COMMON, rtol=0, atol=1e-9).any()]
-    unique = {round(s.shown.time, 9): s.shown for s in steps}
+    scene = Scene(Grid(shape, spacing), gap, memory, program, tuple(times), 1e-9, time_step=1e9)
+    steps = [s for s in march(scene) if np.isclose(s.point.time, COMMON, rtol=0, atol=1e-9).any()]
+    unique = {round(s.point.time, 9): s.point for s in steps}
     assert len(unique) == COMMON.size
     return [(s.pressure / load, s.approach, s.force / load) for s in unique.values()]
 

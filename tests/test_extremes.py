@@ -418,11 +418,11 @@ def counted(height, material, program, **settings):
 
 
 def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
-    from roughvisc.mechanics.hereditary.exponentials import Modes
+    from roughvisc.mechanics.memory import Memory
 
     kept = []
-    sound = Modes.advance
-    monkeypatch.setattr(Modes, "advance", lambda *a: kept.append(sound(*a).modes.shape[0]) or sound(*a))
+    sound = Memory.advance
+    monkeypatch.setattr(Memory, "advance", lambda *a: kept.append(sound(*a).modes.shape[0]) or sound(*a))
     ds, steps = counted(BALL, ELASTIC, rv.Program().load(0.1, over=1.0).load(0.01, over=1.0), times=5)
     assert set(kept) == {0}
     assert steps == 5

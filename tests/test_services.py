@@ -158,7 +158,8 @@ def test_resume__ends_with_the_same_bits(kind, done, tmp_path):
     run_case(done.case, tmp_path, progress=lambda now, end: seen.append(now / end))
     whole = []
     run_case(done.case, tmp_path / "whole", progress=lambda now, end: whole.append(now / end))
-    assert seen == whole[2:], "two rows are not computed again"
+    assert len(seen) <= len(whole) - 2, "two rows at least are not computed again"
+    assert seen == whole[-len(seen) :]
     assert_same(numbers(tmp_path), numbers(done.out))
 
 

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Show what a study will model and what it will cost.
 
-    Writes nothing. The contact area is estimated by an elastic solve on at most 256 x 256 cells, the numbers
-    of steps and FFTs by coarse runs, and the time by a solve timed on this machine. The exit status is 2 if the study
-    does not fit into memory or on the disk.
+    Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 64 x 64 cells, the time
+    by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on the disk.
 
     \b
     Example:
@@ -32,7 +31,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.cost.plan import plan as planned
+    from roughvisc.study.plan import plan as planned
     from roughvisc.views.console.tables import plan_tables
 
     costs = planned(study, out, workers=workers)

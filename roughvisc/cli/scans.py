@@ -119,7 +119,7 @@ def new(file: Path | None, out: Path | None, contact: str, **given: str | None) 
     """
     from rich.console import Console
 
-    from roughvisc.study.cost.first_pressure import first_pressure
+    from roughvisc.study.first_pressure import first_pressure
     from roughvisc.study.statement.starter import starter_study
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.study.trade.files import part_of_one

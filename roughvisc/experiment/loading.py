@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.errors import EdgeContactError
+from roughvisc.experiment.domain import enlarged_indenter, estimated
 from roughvisc.experiment.notes import (
     accuracy_note,
     border_note,
@@ -25,33 +25,38 @@ from roughvisc.experiment.notes import (
     tolerance_note,
     wake_note,
 )
-from roughvisc.experiment.profile import Profile, uses_window
-from roughvisc.experiment.protocol import Experiment, Row, Rows
+from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.protocol import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.resources import least_rows, march_bytes, require_memory
-from roughvisc.experiment.scene import build_scene, kept_times, memory_options, slide_note, snap_to_cells
+from roughvisc.experiment.scene import (
+    build_scene,
+    check_program,
+    domain_of,
+    kept_times,
+    memory_options,
+    slide_note,
+    snap_to_cells,
+)
 from roughvisc.experiment.stated import (
+    Fields,
     area_columns,
     error_columns,
+    fields_of,
     friction_columns,
-    is_end_value,
     meets_tolerance,
     staircase_area,
+    time_error,
 )
 from roughvisc.labels import warnings_text
-from roughvisc.mechanics.arrays import is_wide, over_rows
-from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window, mean_influence
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.hereditary.exponentials import ModesState
-from roughvisc.mechanics.sparse import Sparse
-from roughvisc.mechanics.stepping.energy import Energy
-from roughvisc.mechanics.stepping.march import march
-from roughvisc.mechanics.stepping.program import Program, Slid
-from roughvisc.mechanics.stepping.state import ControllerState, Instant, State, Step, Trajectory, Uncertainty
-from roughvisc.mechanics.stepping.step import at_border
-from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
+from roughvisc.mechanics.materials.creep import complete
+from roughvisc.mechanics.memory import History
+from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.mechanics.program import Program
+from roughvisc.mechanics.stepping import Difference, Point, State, Step, at_rest, march
 from roughvisc.problem import Problem
-from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
+from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
@@ -59,8 +64,6 @@ log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 #: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
 _FEW = 9
-#: Tolerance from which single precision, 1e-6 of a displacement, is precise enough.
-_SINGLE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -69,19 +72,20 @@ class LoadingState:
 
     Attributes
     ----------
-    march : State
-        Of the march itself.
+    march : State or None
+        Of the march itself; None at the start.
     largest : tuple of float
         Largest force [N] and approach [m] of the kept rows.
-    growths : int
-        How many times the grid or the window has grown.
+    enlarged, outgrown : int
+        How many times the surface of an indenter has been made larger, and the domain has been outgrown.
     border : float or None
-        When contact was found at the border of a free-space domain first, where that is accepted. [s]
+        When contact was first found at the border of a free surface, if that is accepted. [s]
     """
 
-    march: State
+    march: State | None = None
     largest: tuple[float, float] = (0.0, 0.0)
-    growths: int = 0
+    enlarged: int = 0
+    outgrown: int = 0
     border: float | None = None
 
 
@@ -101,18 +105,7 @@ class Loading(Experiment):
     table: ClassVar[str] = "program"
     called: ClassVar[str] = "a loading program"
     doing: ClassVar[str] = "pressing"
-    states: ClassVar[tuple[type, ...]] = (
-        LoadingState,
-        State,
-        Trajectory,
-        ControllerState,
-        Slid,
-        Instant,
-        Sparse,
-        Uncertainty,
-        Energy,
-        ModesState,
-    )
+    states: ClassVar[tuple[type, ...]] = (LoadingState, State, Point, History, Difference)
 
     def __repr__(self) -> str:
         return repr(self.program)
@@ -168,7 +161,7 @@ class Loading(Experiment):
     def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
         """Memory of the march, its contact sparse unless it is known. [byte]"""
         options = memory_options(self.program.on_area(area), settings)
-        memory = choose_body_memory(body, **options).memory
+        memory = choose_memory(body, **options).memory
         counts = {"rows": least_rows(settings, self.program)} | counts
         return march_bytes(settings, cells, memory, **counts)
 
@@ -176,18 +169,14 @@ class Loading(Experiment):
 class LoadingRows(Rows):
     """Accepted steps of one march, in order: histories of all of them, fields of those that are kept.
 
-    Where the march goes on in a window, or the grid may grow, a row keeps what was in contact and the effective
-    pressure there, from which its fields over the final domain follow: nothing outside ever carried pressure.
-
     Parameters
     ----------
     problem : Problem
-        Surface, body and settings. Where the tolerance leaves room for single precision, what lies beyond a window is
-        computed so.
+        Surface, body and settings.
     program : Program
         The loading program.
-    state : LoadingState or None
-        From which the march goes on.
+    state : LoadingState, optional
+        From which the march continues. Default: from rest.
     in_memory : bool
         Whether the kept fields stay in memory.
     """
@@ -196,25 +185,23 @@ class LoadingRows(Rows):
         self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
     ) -> None:
         height, body, settings = problem.height, problem.body, problem.settings
-        self._problem, self._settings, self._start = problem, settings, state
+        self._problem, self._settings = problem, settings
         require_memory(problem, program, in_memory=in_memory)
-        self.profile = Profile(height, settings.missing, follow=uses_window(settings), kernel=body.kernel)
-        self._scene, self._choice = build_scene(self.profile, body, program, settings)
-        self._followed = not self.profile.window.whole
+        check_program(Profile(height, settings.missing, body.kernel), body, program, settings)
+        self._start = state or LoadingState(enlarged=enlargements(problem, program))
+        larger = enlarged_indenter(height, self._start.enlarged)
+        assert larger is not None, "it was made before"
+        self.profile = Profile(larger, settings.missing, body.kernel)
+        self.profile.nominal_area = nominal_area(height)
+        self._domain = domain_of(self.profile, body, program, settings, self._start.outgrown)
+        self._scene, self._choice = build_scene(self.profile, body, program, settings, self._domain)
         log.info("memory: %s", self._choice.note)
-        for _ in range(0 if state is None else state.growths):
-            larger = self.profile.enlarge(self._scene)
-            assert larger is not None, "it grew before"
-            self._scene = larger[0]
         self.end = program.duration
-        self._border = None if state is None else state.border
-        spacing, kernel, single = self.profile.spacing, body.kernel, settings.tolerance >= _SINGLE
-        self._reach = lru_cache(maxsize=2)(lambda window: FarFieldDisplacement(window, spacing, kernel, single=single))
-        self._mean_influence = lru_cache(maxsize=2)(lambda window: mean_influence(window, spacing, kernel))
+        self._border = self._start.border
 
     @property
     def height(self) -> xr.DataArray:  # type: ignore[override]
-        """Of the surface, as far as it has grown. [m]"""
+        """Height of the surface, that of an indenter as large as it was made. [m]"""
         return self.profile.height
 
     @property
@@ -223,79 +210,143 @@ class LoadingRows(Rows):
         return self.profile.highest
 
     def __iter__(self) -> Iterator[Row]:
-        """March to the end of the program."""
-        scene, start = self._scene, self._start
-        self._start = None  # its fields are not needed beyond the first step
-        every = scene.times is None
-        to_keep = set(scene.program.corners if scene.times is None else scene.times)
-        largest = (0.0, 0.0) if start is None else start.largest
-        steps = march(scene, None if start is None else start.march)
-        del start
-        for step in steps:
-            # when contact comes to the border of a free-space domain, in a step that is kept or not
-            if self._border is None and self._settings.edge == "accept" and at_border(step.scene, step.shown.contact):
-                self._border = float(step.shown.time)
-            # of every step those that keep the tolerance: the first ones from rest cannot, relative to themselves
-            shown, before = step.shown, largest
-            largest = max(before[0], shown.force), max(before[1], abs(shown.approach))
-            kept = shown.time in to_keep or (every and meets_tolerance(step, self._choice.series_error, largest))
-            state = LoadingState(step.state, largest if kept else before, self.profile.growths, self._border)
-            if kept or (not every and is_end_value(step)):
-                row = self.row(step, largest, kept, state)
-            else:
-                row = Row(step.shown.time, state=state, done=step.shown.time)
-            largest = largest if kept else before
-            del step, state, shown  # their fields are not needed while the next one is computed
-            yield row
-            del row
+        """March to the end of the program.
 
-    def row(
-        self, step: Step, largest: tuple[float, float], kept: bool = True, state: LoadingState | None = None
-    ) -> Row:
-        """Make the row of an accepted step.
-
-        ``largest`` are force [N] and approach [m] of the kept rows so far, this one included; ``state`` is that from
-        which an interrupted run continues.
+        Raises
+        ------
+        Outgrown
+            If contact outgrows the domain: the march must begin anew.
         """
-        if not is_wide(step.scene.gap.size):
-            step = step.with_fields()  # on wide grids a field had anew by parts costs less than its memory
-        shown, window = step.shown, self.profile.window
-        contact = shown.contact.positive()
-        count = int(np.count_nonzero(contact))
-        touching = count * step.scene.operator.cell_area
-        area = max(touching - staircase_area(contact, step.scene), 0.0)
-        arrays: dict[str, Array] = {}
-        if window.whole:
-            arrays = {name: self._field(name, step, contact) for name in self._settings.fields if kept}
-            mean_gap = self._mean_of_gap(step, contact, arrays.get("gap"))
-        else:
-            assert step.effective is not None, "a window asks for a memory of pressures"
-            mean_gap = self._mean_gap(window, step.effective, step.level)
-        if kept and step.scene.enlarge is not None and step.effective is not None:
-            arrays |= {"source_pressure": shown.pressure, "source": step.effective}
+        scene, start = self._scene, self._start
+        every = scene.kept is None
+        to_keep = set(scene.corners if scene.kept is None else scene.kept)
+        largest, reached = start.largest, start.march or at_rest(scene)
+        for step in march(scene, start.march):
+            point, before = step.point, largest
+            self._check_border(step)
+            largest = max(before[0], point.force), max(before[1], abs(point.approach))
+            reached = step.state or reached
+            of_all = max(reached.largest_force, point.force), max(reached.largest_approach, abs(point.approach))
+            stated = error_columns(step, scene, self._choice.series_error, largest, of_all)
+            kept = point.time in to_keep or (every and meets_tolerance(step, scene, stated["stated_error"]))
+            state = None
+            if step.state is not None:
+                told = largest if kept else before
+                state = LoadingState(step.state, told, start.enlarged, start.outgrown, self._border)
+            if kept or (not every and self._is_end_value(step)):
+                yield self._row(step, largest, stated, kept, state)
+            else:
+                yield Row(point.time, state=state, done=point.time)
+            largest = largest if kept else before
+
+    def _check_border(self, step: Step) -> None:
+        """Take note of contact at the border of a free surface, or refuse it; find out if the domain is outgrown."""
+        scene, start, point = self._scene, self._start, step.point
+        if scene.grid.boundary != "free" or point.force == 0:
+            return
+        if self._domain.is_outgrown(point.approach):
+            raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
+        touches = point.pressure > 0
+        lines = [line for i in (0, -1) for line in (touches[i], touches[:, i])]
+        if not self._domain.is_whole or not any(bool(line.any()) for line in lines):
+            return
+        if self._settings.edge == "accept":
+            self._border = point.time if self._border is None else self._border
+            return
+        if enlarged_indenter(self.profile.height, 1) is not None:
+            raise Outgrown(LoadingState(enlarged=start.enlarged + 1, outgrown=start.outgrown))
+        nx, ny = scene.gap.shape
+        raise EdgeContactError(
+            f"at {point.time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected "
+            "contact inside it; use boundary='mirror' for a nominally flat scan, a larger scan, a smaller load, or "
+            "edge='accept' to treat the scan outline as a punch"
+        )
+
+    def _is_end_value(self, step: Step) -> bool:
+        """Return whether pressure and force of a step that is not kept are those at its end.
+
+        With hardly any instantaneous compliance they belong to the whole step; a given load is right all the same.
+        """
+        before = step.point.before
+        length = step.point.time - (before[0] if before else self._scene.corners[step.segment])
+        by_load = self._scene.program.segments[step.segment].control == "load"
+        return by_load or not self._scene.is_soft(length)
+
+    def _row(
+        self, step: Step, largest: tuple[float, float], stated: dict[str, float], kept: bool, state: LoadingState | None
+    ) -> Row:
+        """Return the row of a step.
+
+        Parameters
+        ----------
+        step : Step
+            An accepted step.
+        largest : tuple of float
+            Largest force [N] and approach [m] of the kept rows so far, this one included.
+        stated : dict
+            Its stated errors.
+        kept : bool
+            Whether it is a row of the result, or of the histories of all steps only.
+        state : LoadingState or None
+            From which an interrupted run continues.
+        """
+        scene, point, domain = self._scene, step.point, self._domain
+        fields = fields_of(step, scene)
+        count = int(np.count_nonzero(fields.contact))
+        touching = count * scene.grid.cell_area
+        area = max(touching - staircase_area(fields.contact, scene, domain), 0.0)
         row: dict[str, Any] = {
-            "force": shown.force,
-            "approach": shown.approach,
+            "force": point.force,
+            "approach": point.approach,
             "work": step.work,
-            "time_error": step.uncertainty.relative(*largest),
-            "iterations": step.state.iterations,
-            "convolutions": step.state.convolutions,
+            "time_error": time_error(step, largest),
+            "iterations": step.iterations,
+            "convolutions": step.convolutions,
             "status": self._status(step, count),
             "contact_area": area,
             "contact_area_counted": touching,
             "contact_fraction": self.profile.contact_fraction(area),
-            "mean_gap": mean_gap,
-            **friction_columns(step),
+            "mean_gap": self._mean_gap(step, fields),
+            **friction_columns(step, scene, fields.displacement),
         }
+        arrays: dict[str, Array] = {}
         if kept:
-            row |= error_columns(step, self._choice.series_error, largest) | area_columns(step, contact, touching, area)
-        facts = {
-            "level": step.level,
-            "corner": self.profile.corner,
-            "shape": window.shape,
-            "domain": window.domain,
-        }
-        return Row(shown.time, row, _copy_views(arrays), kept, state, facts, shown.time)
+            row |= stated | area_columns(step, scene, fields, touching, area)
+            arrays = self._stored(step, fields)
+        return Row(point.time, row, arrays, kept, state, {}, point.time)
+
+    def _stored(self, step: Step, fields: Fields) -> dict[str, Array]:
+        """Return the fields that are stored, on the whole surface."""
+        domain, names = self._domain, self._settings.fields
+        stored = {"pressure": step.point.pressure, "displacement": fields.displacement, "gap": fields.gap}
+        if domain.is_whole:
+            stored["gap"] = np.where(self.profile.present, fields.gap, np.nan)
+        else:
+            stored["pressure"] = domain.padded(step.point.pressure)
+            if "displacement" in names or "gap" in names:
+                displacement = domain.displacement(self._scene.memory.present(step.point.history)[1])
+                displacement[domain.cells] = fields.displacement
+                stored["displacement"] = displacement
+                gap = np.maximum(self.profile.gap + displacement - step.point.approach, 0.0)
+                gap[domain.cells] = fields.gap
+                stored["gap"] = gap
+        return {name: stored[name] for name in names}
+
+    def _mean_gap(self, step: Step, fields: Fields) -> float:
+        """Return the mean gap of the whole surface. [m]"""
+        if self._domain.is_whole:
+            return float(np.mean(fields.gap, where=self.profile.present))
+        effective = self._scene.memory.present(step.point.history)[1]
+        return self.profile.mean_gap + self._domain.mean_displacement(effective) - step.point.approach
+
+    def _status(self, step: Step, count: int) -> int:
+        if step.point.force == 0:
+            meaning = "open"
+        elif self._domain.is_whole and count == np.count_nonzero(self.profile.present):
+            meaning = "full_contact"
+        else:
+            meaning = "converged"
+        return STATUS_MEANINGS.index(meaning)
 
     def columns(self, columns: dict[str, Array]) -> dict[str, Array]:
         """What each row has cost, from the sums till then; and the nominal pressure."""
@@ -304,33 +355,6 @@ class LoadingRows(Rows):
         columns["nominal_pressure"] = columns["force"] / self.profile.nominal_area
         return columns
 
-    def settled(self, records: RowStore, number: int) -> dict[str, Any]:
-        """What is counted over the domain, where that has grown since the row was found."""
-        row, facts = records.plain[number]["row"], records.plain[number]["facts"]
-        if tuple(facts["domain"]) == self.profile.window.domain:
-            return {}
-        dx, dy = self.profile.spacing
-        fraction = row["contact_area"] / (dx * dy * self.profile.height.size)
-        if not records.plain[number]["kept"]:  # its pressure is not known any more
-            return {"contact_fraction": fraction, "mean_gap": math.nan}
-        source = records.arrays(number, "source")["source"]
-        window = self.profile.window_at(facts["corner"], facts["shape"])
-        if self.profile.all_present:
-            mean_gap = self._mean_gap(window, source, facts["level"])
-        else:
-            gap = np.empty(window.domain)
-            self._fill(records, "gap", number, window, gap)
-            mean_gap = float(np.nanmean(gap))
-        return {"contact_fraction": fraction, "mean_gap": mean_gap}
-
-    def field(self, records: RowStore, name: str, number: int, out: Array) -> Array:
-        """A field of a row over the final surface, written to ``out``, which holds zeros."""
-        facts = records.plain[number]["facts"]
-        window = self.profile.window_at(facts["corner"], facts["shape"])
-        touched = out[window.cells] if name == "pressure" else out  # zeros that stay cost nothing
-        self._fill(records, name, number, window, touched)
-        return out
-
     def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
         """Return the memory model, numbers for an audit, and warnings; warnings are logged too."""
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
@@ -338,7 +362,7 @@ class LoadingRows(Rows):
         repeats = settings.boundary == "periodic"
         warnings = {
             "slope": slope_note(
-                profile.height[profile.window.cells],
+                profile.height[self._domain.cells],
                 settings.boundary,
                 approach - profile.least_gap,  # below the highest cell
             ),
@@ -353,12 +377,12 @@ class LoadingRows(Rows):
         stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
         stated["material"] = table_note(self._problem.body.materials)
         # of what was pressed, a series or not; of layers those of the top one
-        pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.final}
+        pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.compliance(self.end)}
         return {
             "memory": choice.note,
             "series_error": choice.series_error,
             "warnings": warnings_text(stated | warnings),
-            **({} if isinstance(choice.memory, WaveMemory) else pressed),
+            **(pressed if self._problem.body.separates else {}),
         }
 
     def _wake_note(self, dataset: xr.Dataset) -> str:
@@ -377,86 +401,22 @@ class LoadingRows(Rows):
             if single is None and "pressure" in dataset:
                 single = contact_stands_alone(dataset["pressure"][-1].values, axis)
             if single:
-                left = {speed: creep_left(scene.compliance(period / speed), scene.final) for _, speed in strokes}
+                left = {
+                    speed: creep_left(scene.compliance(min(period / speed, self.end)), scene.compliance(self.end))
+                    for _, speed in strokes
+                }
                 notes.append(wake_note(left, period))
         return " ".join(filter(None, notes))
 
-    def _field(self, name: str, step: Step, contact: NDArray[np.bool_]) -> Array:
-        """A field of a step on the whole domain, in memory that nobody changes."""
-        if name == "pressure":
-            return step.shown.pressure
-        if name == "displacement":
-            return step.displacement
-        gap = np.empty(contact.shape)
 
-        def fill(rows: slice) -> None:
-            gap[rows] = self._gap(step, contact, rows)
-
-        over_rows(fill, contact.shape, step.scene.operator.threads)
-        return gap
-
-    def _gap(self, step: Step, contact: NDArray[np.bool_], rows: slice) -> Array:
-        """Some rows of the gap on the whole domain, missing at absent cells. [m]"""
-        gap = self.profile.gap[rows] + step.on_rows(step.displaced, rows)
-        self._clip_gap(gap, step.level, rows)
-        gap[contact[rows]] = 0.0
-        return gap
-
-    def _mean_of_gap(self, step: Step, contact: NDArray[np.bool_], known: Array | None) -> float:
-        """Its mean over the present cells, from some rows at a time where it is not known. [m]"""
-        present = self.profile.present
-
-        def total(rows: slice) -> float:
-            gap = self._gap(step, contact, rows) if known is None else known[rows]
-            return float(np.sum(gap, where=present[rows]))
-
-        gaps = over_rows(total, contact.shape, step.scene.operator.threads)
-        return sum(gaps) / np.count_nonzero(present)
-
-    def _mean_gap(self, window: Window, source: Array, level: float) -> float:
-        """Mean gap over a domain without absent cells, from the effective pressure in a window of it. [m]"""
-        return self.profile.mean_gap + float(np.sum(source * self._mean_influence(window))) - level
-
-    def _fill(self, records: RowStore, name: str, index: int, window: Window, out: Array) -> None:
-        """Write a field over the domain, the pressure over the window alone."""
-        if window.whole:
-            out[...] = records.arrays(index, name)[name]
-            return
-        arrays = records.arrays(index, "source_pressure", "source")
-        if name == "pressure":
-            out[...] = arrays["source_pressure"]
-            return
-        for rows, displacement in self._reach(window).rows(arrays["source"]):
-            if name == "displacement":
-                out[rows] = displacement
-            else:
-                np.add(displacement, self.profile.gap[rows], out=out[rows])
-                self._clip_gap(out[rows], records.plain[index]["facts"]["level"], rows)
-        if name == "gap":
-            out[window.cells][arrays["source_pressure"] > 0] = 0.0
-
-    def _clip_gap(self, gap: Array, level: float, rows: slice = slice(None)) -> None:
-        """Bring some rows of a gap to the level of the approach; it is missing at absent cells. [m]"""
-        gap -= level
-        np.maximum(gap, 0.0, out=gap)  # below the solver's tolerance inside the contact
-        if not self.profile.all_present:
-            gap[~self.profile.present[rows]] = np.nan
-
-    def _status(self, step: Step, count: int) -> int:
-        if step.shown.force == 0:
-            meaning = "open"
-        elif self.profile.window.whole and count == np.count_nonzero(self.profile.present):
-            meaning = "full_contact"
-        else:
-            meaning = "converged"
-        return STATUS_MEANINGS.index(meaning)
-
-
-def _copy_views(arrays: dict[str, Array]) -> dict[str, Array]:
-    """The arrays; what is a part of a larger one is copied, once, since it would keep all of that in memory."""
-    own: dict[int, Array] = {}
-    for array in arrays.values():
-        if id(array) not in own:
-            whole = array.base is None or array.base.nbytes == array.nbytes
-            own[id(array)] = array if whole else array.copy()
-    return {name: own[id(array)] for name, array in arrays.items()}
+def enlargements(problem: Problem, program: Program) -> int:
+    """Return how many times the surface of an indenter must be made larger for the contact that is expected."""
+    height, settings = problem.height, problem.settings
+    if settings.boundary != "free" or settings.edge != "error" or enlarged_indenter(height, 1) is None:
+        return 0
+    program, times = program.on_area(nominal_area(height)), 0
+    compliance = float(complete(problem.body.material).contact_compliance(program.duration))
+    larger: xr.DataArray | None = height
+    while larger is not None and estimated(larger, problem.body.kernel, compliance, program)[1]:
+        larger, times = enlarged_indenter(height, times + 1), times + 1
+    return times if larger is not None else times - 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roughvisc.mechanics.materials.creep import Creep
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.stepping.scene import Scene
+from roughvisc.mechanics.stepping import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import grown
 from roughvisc.topography.parameters import rms_slope

@@ -56,6 +56,20 @@ class Row:
     done: float = 0.0
 
 
+class Outgrown(Exception):
+    """Contact has outgrown the domain of a solve, which begins anew on a larger one.
+
+    Parameters
+    ----------
+    state : Any
+        From which the rows begin anew.
+    """
+
+    def __init__(self, state: Any) -> None:
+        super().__init__("contact has outgrown the domain")
+        self.state = state
+
+
 class Rows:
     """The rows of an experiment on a problem, and what becomes of them in the end.
 

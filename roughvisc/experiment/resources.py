@@ -13,16 +13,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy import fft
 
 from roughvisc.errors import InputError, TooLargeError
-from roughvisc.experiment.profile import uses_window
 from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.arrays import is_wide
-from roughvisc.mechanics.hereditary.exponentials import Modes
-from roughvisc.mechanics.hereditary.memory import Memory
-from roughvisc.mechanics.stepping.program import Program
-from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
+from roughvisc.mechanics.layer_memory import LayerMemory
+from roughvisc.mechanics.memory import Memory
+from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.mechanics.program import Program
+from roughvisc.mechanics.stepping import SOFT
 from roughvisc.problem import Problem
 from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
@@ -152,29 +152,24 @@ def threads_for(asked: int | None) -> int:
     return cores() if stated == 1 and alone else stated
 
 
-#: What the interpreter and the libraries take, measured. [byte]
-PROCESS = 210e6
-#: Fields of the surface: heights and gaps, and the marks of present cells.
+#: Interpreter and libraries, measured. [byte]
+PROCESS = 190e6
+#: Fields of the surface: heights, gaps, and the marks of present cells.
 _SURFACE = 2.1
-#: Fields of a march without a past, what a contact on all cells adds to them, and what a narrow grid adds: transforms
-#: of whole fields, and the separation.
-_ELASTIC, _IN_CONTACT, _NARROW = 7.0, 11.0, 1.5
-#: Spectrum, symbols and what a transform gives.
-_TRANSFORMS = {"periodic": 2.0, "mirror": 2.0, "free": 6.0}
-#: Fields of the companion beside those of the memories; fields of each exponential in both marches' memories, before
-#: and after a step, and in the checkpoint that may be asked for.
-_COMPANION, _EXPONENTIAL = 1.5, 5.2
-#: What a march adds whose window or grid follows the contact, since it may go back to the state before; and what moving
-#: a state to a larger one adds. Measured on balls at 770 x 460 to 1131 x 1096.
-_FOLLOWING, _MOVED = 13.0, 12.0
-#: What the memory of waves adds beside the companion: total displacements and effective pressures.
-_TOTALS = 6.5
-#: Spectra of each exponential where every wave has its own compliances, and its symbol; what the two-step rule adds to
-#: these; those of pressure and displacement; and numbers of a padded spectrum over cells (251 to 513 squared).
-_WAVE, _WAVE_BEFORE, _SPECTRA, _PADDED = 3.3, 1.4, 4.0, 5.0
-#: What the two-step rule adds: states of the memory one step ago, and the short solve that shows the end of a step.
-_SHOWN = 3.0
-#: Fields of the state while the file is written, a frame as it was kept among them.
+#: Fields of a contact problem and of the step around it, and further ones of a contact on all cells.
+_SOLVE, _IN_CONTACT = 8.0, 12.0
+#: Operator and spectrum.
+_TRANSFORMS = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}
+#: Operator and spectrum of the whole surface, if a part of it is solved on.
+_WHOLE = 6.0
+#: Solutions at the peak, a pressure and its displacement each: of a march without memory, and of a pair with its coarse
+#: solution and first guesses. A pair of soft steps also has solutions at the ends of its steps.
+_SINGLE, _PAIR, _SOFT_ENDS = 4, 9, 2
+#: Solutions of a pair that keep exponentials, and those whose exponentials one step ago are kept too, for BDF2.
+_KEEPING, _EARLIER = 5, 2
+#: Fields of each exponential if each wave has its own compliances: a spectrum, padded in free space.
+_SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
+#: Fields of the state while the file is written, a frame among them.
 _STATE = 4.5
 #: Rows wait for the disk until they take more. [byte]
 _WAITING = 8e6
@@ -193,9 +188,8 @@ def march_bytes(
     rows: float = 1.0,
     part: float = 1.0,
     in_memory: bool = False,
-    grows: bool = False,
 ) -> float:
-    """Memory of a march at its peak, without what the process takes in any case.
+    """Return the memory of a march at its peak, without interpreter and libraries.
 
     Parameters
     ----------
@@ -204,7 +198,7 @@ def march_bytes(
     cells : float
         Of the surface.
     memory : Memory
-        Of the material's past.
+        Of the body.
     contact : float
         Largest contact fraction.
     rows : float
@@ -213,8 +207,6 @@ def march_bytes(
         Part of the cells that is solved on.
     in_memory : bool
         Whether the kept fields stay in memory, as those of :func:`roughvisc.simulate` do; else they go to a file.
-    grows : bool
-        Whether the window or the grid, which the cells are those of in the end, was smaller before.
 
     Returns
     -------
@@ -223,32 +215,25 @@ def march_bytes(
 
     Notes
     -----
-    The larger one of the peaks while the contact is solved and while the file is written. Measured by
+    The larger one of the peaks while the contact is solved and while the file is written. The fields are those of
+    :mod:`roughvisc.mechanics.stepping`: two solutions with the points before them, and three trial steps. Measured by
     ``workflows/benchmarks/memory.py``.
     """
-    field = 8.0 * cells
-    state = _STATE
-    solved = _ELASTIC + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
-    if not is_wide(math.ceil(part * cells)):
-        solved += _NARROW
-    if isinstance(memory, Modes):
-        modes = len(memory.material.times) + bool(memory.material.fluidity)
-        if modes:
-            solved += _COMPANION + _EXPONENTIAL * modes
-            state += 3 * modes
-            if "bdf2" in memory.rules:
-                solved += _SHOWN + _EXPONENTIAL * modes
-            if memory.acts_on != "displacement":
-                solved += _FOLLOWING + (_EXPONENTIAL * modes if memory.acts_on == "both" else 0.0)
-                solved += _MOVED if grows else 0.0
-    elif isinstance(memory, WaveMemory):
-        modes, padded = len(memory.series.compliances), _PADDED if settings.boundary == "free" else 1.0
-        solved += _COMPANION + _TOTALS + padded * (modes * _WAVE + _SPECTRA)
-        state += 3 * padded * modes
-        if "bdf2" in memory.rules:
-            solved += _SHOWN + padded * _WAVE_BEFORE * modes
+    field, boundary, count = 8.0 * cells, settings.boundary, memory.times.size
+    kept = 1.0 if part == 1 else 2.0  # a part of the surface keeps the pressure that causes the displacement
+    solved = _SOLVE + _TRANSFORMS[boundary] + _IN_CONTACT * contact
+    if isinstance(memory, LayerMemory):
+        kept = _SPECTRUM[boundary]
+        solved += 0.5 * kept * (count + 1)  # symbols
+    solutions, keeping, earlier, ends = _SINGLE, 0, 0, 0
+    if not memory.is_elastic:
+        solutions, keeping, earlier = _PAIR, _KEEPING, _EARLIER if memory.may_ring else 0
+        crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
+        ends = _SOFT_ENDS if memory.glassy <= SOFT * crept else 0
+    solved += (1 + kept) * (solutions + ends) + count * kept * (1 + keeping + ends + earlier)
+    state = _STATE + 2 * kept * count * (1 + memory.may_ring)
+    surface = (_SURFACE + (_WHOLE if part < 1 else 0.0)) * field
     frames = rows * len(settings.fields) * field
-    surface = _SURFACE * field
     if in_memory:
         return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
     layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
@@ -288,9 +273,10 @@ def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> No
     cells = height.size
     if cells < WORTH_ASKING:
         return
-    memory = choose_body_memory(body, **memory_options(program.on_area(nominal_area(height)), settings)).memory
+    memory = choose_memory(body, **memory_options(program.on_area(nominal_area(height)), settings)).memory
     rows = least_rows(settings, program)
-    part = 0.0 if uses_window(settings) and not body.kernel.raises_surface else 1.0
+    free = settings.boundary == "free" and settings.edge == "error"
+    part = 0.0 if free and body.separates and not body.kernel.raises_surface else 1.0  # of an unknown domain
 
     def needed(cells: float, settings: Settings = settings, in_memory: bool = in_memory) -> float:
         return march_bytes(settings, cells, memory, rows=rows, part=part, in_memory=in_memory)

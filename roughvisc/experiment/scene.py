@@ -13,18 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.domain import GROWTH, Domain, choose_domain, estimated, whole_domain
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Boundary, Grid
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, Choice
-from roughvisc.mechanics.hereditary.memory import ActsOn
 from roughvisc.mechanics.layer import LayeredBody
+from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.materials.creep import Material, complete
-from roughvisc.mechanics.stepping.controller import SMALLEST_STEP
-from roughvisc.mechanics.stepping.program import Program, Segment, instant
-from roughvisc.mechanics.stepping.scene import Scene
-from roughvisc.mechanics.stepping.wave_memory import WaveMemory, choose_body_memory
+from roughvisc.mechanics.memory_choice import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.program import Program, Segment, instant
+from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene
 from roughvisc.settings import Settings
 from roughvisc.units import said
 
@@ -270,70 +269,77 @@ def slide_note(program: Program, spacing: Spacing) -> str:
     return "; ".join(notes)
 
 
-#: Cells of the longer side on which the window after a jump at the start is foreseen.
-_FORESEEN_ON = 40
-
-
-def build_scene(profile: Profile, body: Body, program: Program, settings: Settings) -> tuple[Scene, Choice]:
-    """Scene of a case and what models its body.
+def check_program(profile: Profile, body: Body, program: Program, settings: Settings) -> None:
+    """Refuse surface, material, program and settings that do not go together.
 
     Raises
     ------
     InputError
-        If surface, material, program and settings do not go together; nothing has been computed then.
+        Naming the segment or the setting, and what is expected.
     """
     program = program.on_area(profile.nominal_area)
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
     check_times(program, settings.time_step)
     check_slides(program, settings, profile.spacing)
-    material = complete(body.material)
     (nx, ny), (dx, dy) = profile.height.shape, profile.spacing
+    material = complete(body.material)
     check_loads(program, material, settings.boundary, (nx * dx, ny * dy), profile.gap[profile.present])
     if settings.boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):
         _check_approach(program, profile.mean_gap, settings.boundary)
-    foreseen = 0.0 if profile.window.whole else _foreseen(profile, program, material)
-    while profile.window.outside <= foreseen:
-        profile.widen_window()
-    grows = body.separates and (
-        not profile.window.whole or (settings.boundary == "free" and settings.edge == "error" and profile.can_grow())
-    )
-    operator = profile.operator(settings.boundary)
-    options = memory_options(program, settings, "pressure" if grows else "displacement")
-    choice = choose_body_memory(body, **options, operator=operator)
+
+
+def build_scene(
+    profile: Profile, body: Body, program: Program, settings: Settings, domain: Domain | None = None
+) -> tuple[Scene, Choice]:
+    """Return the scene of a case, and what represents its material.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    body, program, settings
+        Of the case.
+    domain : Domain, optional
+        Part of the surface that is solved on. Default: all of it.
+
+    """
+    program = program.on_area(profile.nominal_area)
+    domain = domain or whole_domain(profile.gap, profile.spacing, profile.kernel)
+    gap = np.ascontiguousarray(profile.gap[domain.cells])
+    grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel)
+    keeps = not domain.is_whole
+    choice = choose_memory(body, **memory_options(program, settings), grid=grid, keeps_pressure=keeps)
     if isinstance(body, LayeredBody):
-        _check_layers(body, choice, operator, program, settings, profile)
-    if isinstance(choice.memory, WaveMemory):
-        operator = choice.memory.grid
+        _check_layers(body, choice, grid, program, settings, profile)
     scene = Scene(
-        operator=operator,
-        material=choice.material,
+        grid=grid,
+        gap=gap,
         memory=choice.memory,
         program=program,
-        times=snap_to_cells(program, kept_times(program, settings.times), profile.spacing),
+        kept=snap_to_cells(program, kept_times(program, settings.times), profile.spacing),
         tolerance=settings.tolerance,
         time_step=None if settings.time_step == "auto" else settings.time_step,
-        accept_edge=settings.edge == "accept",
-        enlarge=profile.enlarge if grows else None,
-        **profile.of_scene(),
+        present=None if profile.all_present else profile.present[domain.cells],
     )
     return scene, choice
 
 
-def _foreseen(profile: Profile, program: Program, material: Material) -> float:
-    """About the approach right after a jump at the start, from every so-many-eth cell; zero if there is none. [m]"""
-    segment, glassy = program.segments[0], float(material.contact_compliance(0.0))
-    value = segment.end or 0.0
-    if segment.duration > 0 or value <= 0 or glassy <= 0:
-        return 0.0
-    if segment.control == "approach":
-        return value
-    stride = math.ceil(max(profile.height.shape) / _FORESEEN_ON)
-    gap = profile.gap[::stride, ::stride]
-    dx, dy = (stride * side for side in profile.spacing)
-    operator = Grid((gap.shape[0], gap.shape[1]), (dx, dy), kernel=profile.kernel)
-    load = value * glassy / operator.cell_area
-    return solve_contact(operator, gap, load=load, tolerance=1e-2).approach
+def domain_of(profile: Profile, body: Body, program: Program, settings: Settings, growths: int) -> Domain:
+    """Return the part of a surface that is solved on, after it has been outgrown a number of times."""
+    whole = whole_domain(profile.gap, profile.spacing, profile.kernel)
+    if not may_crop(profile, body, settings):
+        return whole
+    program = program.on_area(profile.nominal_area)
+    compliance = float(complete(body.material).contact_compliance(program.duration))
+    approach, _ = estimated(profile.height, profile.kernel, compliance, program)
+    return choose_domain(profile.gap, profile.spacing, profile.kernel, approach * GROWTH**growths)
+
+
+def may_crop(profile: Profile, body: Body, settings: Settings) -> bool:
+    """Return whether a part of the surface may stand for all of it."""
+    free = settings.boundary == "free" and settings.edge == "error"
+    return free and body.separates and profile.all_present and not profile.kernel.raises_surface
 
 
 def _check_approach(program: Program, full: float, boundary: Boundary) -> None:
@@ -363,13 +369,12 @@ def _check_layers(
 
     Their elastic contact is tried at the largest load or approach, with the first and with the last compliance.
     """
-    segments, surface = program.segments, profile.of_scene()
+    segments, gap, present = program.segments, profile.gap, None if profile.all_present else profile.present
     parts = _TRIED if program.duration > 0 else _TRIED[:1]  # jumps pass no smaller loads
-    gap, present = surface["gap"], surface["present"]
     kernels: list[tuple[Any, float]] = [(body.kernel, float(choice.material.contact_compliance(program.duration)))]
-    if isinstance(choice.memory, WaveMemory):
-        series = choice.memory.series
-        kernels = [(series.kernel(), 1.0), (series.kernel(series.crept(program.duration)), 1.0)]
+    if isinstance(choice.memory, LayerMemory):
+        waves = choice.memory.waves
+        kernels = [(waves.kernel(), 1.0), (waves.kernel(waves.crept(program.duration)), 1.0)]
     for kernel, compliance in kernels:
         contrast = kernel.contrast(*operator.wave_numbers)
         if contrast < _STIFF_LAYERS:
@@ -392,12 +397,11 @@ def _check_layers(
                     ) from error
 
 
-def memory_options(program: Program, settings: Settings, acts_on: ActsOn = "displacement") -> dict[str, Any]:
-    """What :func:`~roughvisc.mechanics.hereditary.choice.choose_memory` is to be asked for, whatever the material."""
+def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
+    """What :func:`~roughvisc.mechanics.memory_choice.choose_memory` is to be asked for, whatever the material."""
     return {
         "duration": program.duration,
         "tolerance": settings.tolerance,
-        "acts_on": acts_on,
         "shortest": shortest_age(program, kept_times(program, settings.times), settings.tolerance),
     }
 
@@ -431,7 +435,7 @@ def shortest_age(program: Program, kept: Sequence[float] | None, tolerance: floa
     if not spans:
         return 0.0
     if kept is None:
-        return SMALLEST_STEP * min(spans)
+        return SHORTEST_PAIR * min(spans)
     times = np.array(sorted(kept))
     after = [times[times > corner][:1] - corner for corner in program.corners]
-    return float(min([*spans, *np.concatenate(after)])) * max(SERIES_SHARE * tolerance, SMALLEST_STEP)
+    return float(min([*spans, *np.concatenate(after)])) * max(SERIES_SHARE * tolerance, SHORTEST_PAIR)

@@ -15,7 +15,7 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.sliding.steady import Sliding, SteadyState, steady_state
-from roughvisc.mechanics.stepping.tangential import slope
+from roughvisc.mechanics.tangential import slope
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.variables.grid_errors import GRID_ERROR
 

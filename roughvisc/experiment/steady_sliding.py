@@ -30,8 +30,8 @@ from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, Slidi
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Boundary
+from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.sliding.steady import SteadyState
-from roughvisc.mechanics.stepping.program import Direction
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings

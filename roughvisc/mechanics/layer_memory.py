@@ -55,6 +55,10 @@ class LayerMemory(Memory):
         """Symbol of each exponential [m/Pa], and last of the fluidity [m/(Pa s)]."""
         return [self.grid.symbol_of(self.waves.kernel(one, 0.0)) for one in np.eye(self.times.size)]
 
+    def remaining(self, time: float) -> float:
+        """Return one: each wave fades in its own way."""
+        return 1.0
+
     def start(self, shape: tuple[int, int]) -> History:
         """Return the memory of an undisturbed body."""
         nothing = self.grid.spectrum(np.zeros(shape))[None]

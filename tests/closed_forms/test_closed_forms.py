@@ -12,7 +12,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
 from roughvisc.mechanics.closed_forms import growing_contact
 from roughvisc.mechanics.materials import models as materials
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 
 ELASTIC = {
     "sphere": cf.hertz(2e-3, 3e6, 0.05),

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from strategies import boundaries, examples, of_whole_runs, surfaces
 
 import roughvisc as rv
-from roughvisc.mechanics import closed_forms
+from roughvisc.mechanics import closed_forms, stepping
 from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.stepping import step as attempt
 from roughvisc.topography.grid import nominal_area
 
 SHAPE, SIZE, APEX = (35, 32), (1.6, 1.5), (0.81, 0.735)
@@ -45,7 +44,7 @@ def pulled(request):
     """
     names = ("contact_area", "contact_area_error")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(attempt, "_SOLVED", 1e-4)
+        patched.setattr(stepping, "SOLVER_SHARE", 1e-4)
         runs = {
             step: pressed(MATERIALS[request.param], PULLED, times=TIMES, numerics=rv.Numerics(time_step=step))
             for step in (0.1, 0.025, 1 / 80)
@@ -72,7 +71,7 @@ def test_interval__is_narrow_and_shrinks_with_the_steps(pulled):
 
 
 def test_elastic__leaves_no_cell_in_doubt_on_account_of_the_steps(monkeypatch):
-    monkeypatch.setattr(attempt, "_SOLVED", 1e-4)  # nor on account of the solver
+    monkeypatch.setattr(stepping, "SOLVER_SHARE", 1e-4)  # nor on account of the solver
     ds = pressed(rv.elastic(1.0), rv.Program().load(0.03, over=1.0).load(0.003, over=1.0), times=TIMES)
     assert (ds.contact_area_error == 0).all()
 
@@ -82,7 +81,7 @@ def test_interval__holds_what_the_contact_solver_leaves_in_doubt():
     loads = {"boundary": "periodic", "times": [1.0], "fields": (), "progress": False}
     found, true = (
         rv.simulate(scan, rv.elastic(1.0), rv.Program().load(0.06, over=1.0), tolerance=tolerance, **loads)
-        for tolerance in (2e-2, 1e-6)
+        for tolerance in (5e-2, 1e-6)
     )
     assert float(found.contact_area[-1]) != float(true.contact_area[-1]), "it is put to the test"
     assert abs(found.contact_area[-1] - true.contact_area[-1]) <= found.contact_area_error[-1]

@@ -12,9 +12,9 @@ from support import refused
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import Paraboloid, lee_radok_step
-from roughvisc.mechanics.hereditary.choice import choose_memory
 from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.mechanics.materials.series import series
+from roughvisc.mechanics.memory_choice import choose_memory
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.profile import Profile
 
 UNIT = rv.elastic(0.25)
 
@@ -31,12 +30,11 @@ def test_scan_pressed_as_a_punch__has_its_whole_area():
     assert float(ds.contact_area[0]) == pytest.approx(30.0)
 
 
-def test_ball_on_a_window__is_corrected_as_on_the_whole_grid(monkeypatch):
+def test_ball_on_a_part_of_the_surface__is_corrected_as_on_the_whole(monkeypatch):
     ball, program = rv.sphere(1.0, 12.0, (121, 120)), rv.Program().load(1.0, over=0)
-    monkeypatch.setattr("roughvisc.experiment.profile._WORTH_FOLLOWING", 10**9)
+    monkeypatch.setattr("roughvisc.experiment.domain.WORTH_CROPPING", 10**9)
     whole = rv.simulate(ball, UNIT, program, progress=False)
     monkeypatch.undo()
-    assert Profile(ball, follow=True).window.shape != (121, 120)
     followed = rv.simulate(ball, UNIT, program, progress=False)
     assert float(followed.contact_area[0]) == float(whole.contact_area[0])
     assert float(whole.contact_area[0]) == pytest.approx(np.pi * 0.75 ** (2 / 3), rel=0.03)

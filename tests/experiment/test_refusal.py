@@ -67,7 +67,7 @@ def study(tmp_path):
 def test_run__refuses_what_cannot_fit(study, limited, tmp_path, monkeypatch, invoke):
     path = study(ROUGH)
     limited(40e6)
-    monkeypatch.setattr(Profile, "_lay_out", lambda *_: pytest.fail("an array was made"))
+    monkeypatch.setattr(Profile, "__init__", lambda *_: pytest.fail("an array was made"))
     with pytest.raises(TooLargeError, match=r"study\.toml: 600 x 512 cells need about \d+ MB") as found:
         rv.run(path, tmp_path / "out", progress=False)
     assert "40 MB are free in this machine: what would fit: 300 x 256 cells, 2 times as long, need" in str(found.value)

@@ -38,9 +38,9 @@ from roughvisc.mechanics.layer import layer as layer_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
 from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.sheet import Base, Sheet
 from roughvisc.mechanics.sheet import sheet as sheet_of
-from roughvisc.mechanics.stepping.program import Program
 from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.solve import solve

@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, hereditary_integral
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]

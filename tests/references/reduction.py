@@ -29,7 +29,7 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.closed_forms.indenters import Indenter
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
-from roughvisc.mechanics.stepping.program import Program, Segment
+from roughvisc.mechanics.program import Program, Segment
 from roughvisc.units import quantities
 
 Array = NDArray[np.float64]

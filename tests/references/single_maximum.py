@@ -15,7 +15,7 @@ from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, 
 from roughvisc.mechanics.closed_forms.indenters import Indenter, places
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]

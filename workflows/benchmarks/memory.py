@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import memory_options
-from roughvisc.mechanics.stepping.wave_memory import choose_body_memory
+from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage.store import open_result
@@ -53,7 +53,7 @@ def one(side, material, boundary):
             contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.solving(), case.program().on_area(nominal_area(case.height()))
-    memory = choose_body_memory(case.body(), **memory_options(program, settings)).memory
+    memory = choose_memory(case.body(), **memory_options(program, settings)).memory
     stated = PROCESS + march_bytes(settings, side**2, memory, contact=contact, rows=rows)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",

@@ -13,7 +13,7 @@ from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, pla
 from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]

@@ -49,7 +49,7 @@ PATIENCE = 30
 #: The relative duality gap may be this many times the tolerance if the estimated error of the pressure is small enough.
 GAP_SLACK = 1.5
 #: Factor of the estimated error, so that it is hardly ever too small; and with the second level of the preconditioner.
-CAUTION, CAUTION_WITH_BLOCKS = 1.25, 2.4
+CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
 #: Cells from which steps are convolved in single precision, if the error at the start is so many times the tolerance:
 #: some four steps pay for the convolution in double precision that follows them.
 SINGLE_FROM, FAR = 96**2, 30.0
@@ -212,7 +212,7 @@ def solve_contact(
         elif iteration:
             error = requested_size * math.sqrt(duality / requested_gap) / max(total, 1e-300)
         is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding)
-        if is_solved and is_blind and 2 * contact.size > gap.size:
+        if is_solved and is_blind and 4 * contact.size > gap.size:
             error += load_error(grid, separation.reshape(gap.shape), contact, level, present, total)
             is_solved = error <= tolerance
         if is_solved and not is_single:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from roughvisc.experiment.protocol import Experiment
     from roughvisc.mechanics.body import Body
     from roughvisc.mechanics.materials.creep import Material
-    from roughvisc.mechanics.stepping.program import Program
+    from roughvisc.mechanics.program import Program
     from roughvisc.settings import Settings
 
 

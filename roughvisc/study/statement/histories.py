@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import PUSHING, UNITS, Control, Program
+from roughvisc.mechanics.program import PUSHING, UNITS, Control, Program
 from roughvisc.tables import Wanted, read_table
 from roughvisc.units import bounded_quantity, is_quantity, stated_quantity
 

@@ -380,6 +380,13 @@ class CheckpointWriter:
         if due or (self._steps is not None and self._pending >= self._steps):
             self.save()
 
+    def restart(self) -> None:
+        """Forget all rows: the run begins anew."""
+        for path in self._paths:
+            path.unlink(missing_ok=True)
+        self.rows.keep_first(0)
+        self.latest, self._pending = Checkpoint(), 0
+
     def save(self) -> None:
         """Write a checkpoint, if anything has been computed since the last one."""
         if not self._pending:

@@ -134,22 +134,21 @@ _LISTED = 20
 
 
 def _grid(row: xr.Dataset) -> str:
-    """Cells of a case, and those that they grow to."""
-    first, final = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "final_"))
-    grown = f", growing with the contact to about {final[0]} x {final[1]}" if final not in ((0, 0), first) else ""
-    return f"{first[0]} x {first[1]} cells{grown}"
+    """Cells of a case, and of the part that is solved on."""
+    whole, part = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "solved_"))
+    solved = f", solved on {part[0]} x {part[1]} of them" if part not in ((0, 0), whole) else ""
+    return f"{whole[0]} x {whole[1]} cells{solved}"
 
 
 def _contact(costs: xr.Dataset) -> str:
     """Return how much comes into contact, and the grids of this estimate."""
-    whole = "final grid" if (costs["final_cells_x"] > costs["cells_x"]).any() else "area"
     known = costs.isel(case=np.flatnonzero(np.isfinite(costs["contact_fraction"].values)))
     if not known.sizes["case"]:
         return ""
     found = 100 * known["contact_fraction"].values
     parts = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
-    grids = _range_of(known, lambda row: f"{int(row['pressed_cells_x'])} x {int(row['pressed_cells_y'])}")
-    return f"about {parts} % of the {whole}, estimated on {'grids' if ',' in grids else 'a grid'} of {grids} cells"
+    grids = _range_of(known, lambda row: f"{int(row['coarse_cells_x'])} x {int(row['coarse_cells_y'])}")
+    return f"about {parts} % of the area, estimated on {'grids' if ',' in grids else 'a grid'} of {grids} cells"
 
 
 def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
@@ -175,7 +174,6 @@ def _alike(costs: xr.Dataset, name: str) -> str:
     text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
     if name == "boundary":
         text += ", FFTs padded to twice the grid" if costs["padded"].any() else ", FFTs not padded"
-        text += ", the grid may grow" if costs["grows"].any() else ""
     return text
 
 

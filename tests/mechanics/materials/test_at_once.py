@@ -41,10 +41,9 @@ def test_table__jumps_by_what_is_there_at_once(first):
     times = [0.0, 1e-4, 1.0, 10.0]
     found, ds = sunk(table, rv.Program().load(2.0, over=0).hold(10.0), times, tolerance=1e-2)
     assert 0 < ds.attrs["series_error"] <= 1e-3
-    assert found == pytest.approx(2.0 * table.contact_compliance(times), rel=2e-3, abs=0)
+    assert found == pytest.approx(2.0 * table.contact_compliance(times), rel=5e-3, abs=0)
 
 
-@pytest.mark.skip(reason="steps shrink without end: mended by steps in pairs")
 def test_table_with_little_at_once__can_jump():
     """13 % of the compliance at once is an instantaneous compliance, however fast the rest comes."""
     t = np.append(0.0, ROWS)

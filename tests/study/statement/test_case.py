@@ -13,7 +13,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 from roughvisc.study.statement.case import Case, read_cases, read_study, vary
 
 BALL = """

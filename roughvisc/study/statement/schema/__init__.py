@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, Wit
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.protocol import Experiment
-from roughvisc.mechanics.stepping.program import Program
+from roughvisc.mechanics.program import Program
 from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection
 from roughvisc.study.statement.schema.experiments import FrictionSection

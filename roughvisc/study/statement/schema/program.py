@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.stepping.program import INSTEAD, PUSHING, UNITS, Control, Program
+from roughvisc.mechanics.program import INSTEAD, PUSHING, UNITS, Control, Program
 from roughvisc.study.statement.histories import NOISE, THIN, part_or_value, read_history
 from roughvisc.study.statement.schema.section import (
     FilePath,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.stepping.program import Slide
+from roughvisc.mechanics.program import Slide
 
 Array = NDArray[np.float64]
 

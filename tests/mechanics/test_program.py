@@ -5,7 +5,7 @@ import math
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.stepping.program import Segment, Slide
+from roughvisc.mechanics.program import Segment, Slide
 
 PRESSED = rv.Program().load(1.0, over=1.0)
 

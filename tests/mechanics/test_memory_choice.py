@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.hereditary.choice import SERIES_SHARE, choose_memory
-from roughvisc.mechanics.hereditary.exponentials import Modes
+from roughvisc.mechanics.memory_choice import SERIES_SHARE, choose_memory
 
 ROWS = np.geomspace(1e-3, 10.0, 40)
 NOISY = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
@@ -24,8 +23,7 @@ NOISY = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
 )
 def test_series__is_its_own_memory(material, note):
     choice = choose_memory(material, 10.0, 1e-3)
-    assert isinstance(choice.memory, Modes)
-    assert choice.memory.material is material
+    assert choice.memory.series is material
     assert (choice.series_error, choice.note) == (0.0, note)
 
 
@@ -33,10 +31,9 @@ def test_series__is_its_own_memory(material, note):
 def test_power_law__has_a_certified_series(exponent):
     material = rv.power_law(0.1, 1.0, exponent)
     choice = choose_memory(material, 10.0, 1e-3)
-    assert isinstance(choice.memory, Modes)
     assert choice.series_error <= SERIES_SHARE * 1e-3
     t = np.geomspace(1e-5, 10.0, 777)
-    off = choice.memory.material.contact_compliance(t) / material.contact_compliance(t) - 1
+    off = choice.memory.series.contact_compliance(t) / material.contact_compliance(t) - 1
     assert np.abs(off).max() <= 1.02 * choice.series_error
 
 
@@ -45,7 +42,7 @@ def test_power_law__has_a_certified_series(exponent):
 def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glassy):
     material = rv.power_law(glassy, 1.0, exponent)
     choice = choose_memory(material, 1e4, 1e-3, shortest=1e-7)
-    series = choice.memory.material
+    series = choice.memory.series
     assert series.glassy == glassy
     t = np.geomspace(1e-7, 1e4, 977)
     off = series.contact_compliance(t) / material.contact_compliance(t) - 1
@@ -76,11 +73,6 @@ def test_table_shorter_than_the_program__is_refused():
     material = rv.creep_table(tuple(ROWS), tuple(0.5 + ROWS**0.4))
     with pytest.raises(rv.InputError, match="the table ends at 10 s"):
         choose_memory(material, 11.0, 1e-3)
-
-
-def fluid(relaxation):
-    """Maxwell fluid with a compliance of one plus the age over the relaxation time, but for a factor."""
-    return rv.Prony(1.0, 1 / relaxation)
 
 
 @pytest.mark.parametrize(
@@ -117,20 +109,3 @@ def test_table_far_from_any_passive_material__is_warned_of():
     assert choice.warning(1.0) == ""
     noisy = choose_memory(rv.creep_table(ROWS, ROWS**0.4 * NOISY, noise=0.1), 10.0, 1e-3)
     assert noisy.warning(1e-3) == ""
-
-
-@pytest.mark.parametrize(
-    ("material", "duration", "rings"),
-    [
-        # of a fluid (1 + h/t) / (1 + h/2t), which is 1.45 at h = 1.636 t
-        (fluid(1.0), 1.60, False),
-        (fluid(1.0), 1.67, True),
-        # of what creeps tenfold a millionth of the program after the load, and no more later
-        (rv.Prony(1.0, 0.0, (10.0,), (1e-6,)), 1.0, True),
-        (rv.Prony(1.0, 0.0, (0.2,), (1e-6,)), 1.0, False),
-        (fluid(1.0), 0.0, False),
-    ],
-)
-def test_two_step_rule__is_there_where_a_linear_step_may_ring(material, duration, rings):
-    memory = choose_memory(material, duration, 1e-3).memory
-    assert set(memory.rules) == {"linear", "euler", "right"} | ({"bdf2"} if rings else set())

@@ -9,8 +9,7 @@ from support import direct, refused
 import roughvisc as rv
 from roughvisc.mechanics import arrays
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.bodies.window import FarFieldDisplacement, Window
-from roughvisc.mechanics.body import HALF_SPACE, Body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid, transform_library
 from roughvisc.mechanics.sliding.steady import Sliding
 
@@ -192,16 +191,6 @@ def test_half_space__is_the_same_by_both(boundary, kind, shape, monkeypatch):
         assert a.dtype == b.dtype
         precision = 1e-14 if a.dtype == np.float64 else 1e-5
         np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
-
-
-def test_far_field__is_the_same_by_both(monkeypatch):
-    pressure = np.random.default_rng(0).random((13, 9))
-    window, found = Window((40, 51), (0, 0), pressure.shape), []
-    for engine in ("scipy", "ducc0"):
-        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
-        far_field = FarFieldDisplacement(window, (1.0, 0.7), HALF_SPACE)
-        found.append(np.concatenate([rows.copy() for _, rows in far_field.rows(pressure)]))
-    np.testing.assert_allclose(found[0], found[1], rtol=1e-13)
 
 
 def test_sliding__is_the_same_by_both_and_goes_by_the_one_that_is_stated(monkeypatch):

@@ -1,55 +1,15 @@
-"""The elastic press by which a plan estimates the contact, and the pressure of a first study."""
-
-import math
+"""The pressure of a first study."""
 
 import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.study.cost import first_pressure as first_module
-from roughvisc.study.cost.first_pressure import first_pressure
-from roughvisc.study.cost.press import Push, press
+from roughvisc.study import first_pressure as first_module
+from roughvisc.study.first_pressure import first_pressure
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.inspection import inspect_scan
-
-RADIUS, SIZE = 1e-2, 1e-3
-
-
-@pytest.mark.parametrize("shape", [(96, 80), (97, 81)], ids=["even", "odd"])
-@pytest.mark.parametrize("given", ["load", "approach"])
-def test_press__hertz(shape, given):
-    """Hertz: approach ``a^2 / R``, load times compliance ``4 a^3 / 3 R``."""
-    radius = 2.6e-4
-    push = Push(load=4 * radius**3 / (3 * RADIUS)) if given == "load" else Push(approach=radius**2 / RADIUS)
-    found = press(rv.sphere(RADIUS, SIZE, shape), push, "free", HALF_SPACE)
-    assert found.shape == shape
-    assert found.fraction == pytest.approx(math.pi * radius**2 / SIZE**2, rel=0.02)
-    assert found.approach == pytest.approx(radius**2 / RADIUS, rel=0.01)
-    for width, count in zip(found.width, shape, strict=True):
-        assert width == pytest.approx(2 * radius, abs=1.5 * SIZE / count)
-    assert not found.at_border
-
-
-@pytest.mark.parametrize("shape", [(24, 30), (25, 31)], ids=["even", "odd"])
-def test_press__sees_the_border(shape):
-    ball = rv.sphere(RADIUS, SIZE, shape)
-    inside, beyond = (
-        press(ball, Push(approach=(0.5 * part * SIZE) ** 2 / RADIUS), "free", HALF_SPACE) for part in (0.85, 1.05)
-    )
-    assert (inside.at_border, beyond.at_border) == (False, True)
-
-
-def test_press__nothing_and_everything():
-    wave = rv.wavy(1e-6, 1e-4, 1e-3, (40, 40), waves=2)
-    assert press(wave, Push(load=0.0), "periodic", HALF_SPACE).fraction == 0
-    assert press(wave, Push(approach=0.0), "periodic", HALF_SPACE).fraction == 0
-    mean_gap = float(wave.max() - wave.mean())
-    for part in (1.01, 4.0):
-        assert press(wave, Push(approach=part * mean_gap), "periodic", HALF_SPACE).fraction == 1
-    assert press(wave, Push(approach=0.99 * mean_gap), "periodic", HALF_SPACE).fraction < 1
 
 
 def touching(surface, pressure, compliance):

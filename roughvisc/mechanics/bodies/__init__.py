@@ -1,1 +1,0 @@
-"""From pressure to displacement of an elastic body, by fast Fourier transforms."""

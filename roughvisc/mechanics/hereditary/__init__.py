@@ -1,1 +1,0 @@
-"""The hereditary integral: what a material remembers, in exponentials."""

@@ -1,0 +1,162 @@
+"""Memory of a body for a program: the exponential series of its material, and how far that is from the material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.series import series
+from roughvisc.mechanics.memory import Memory
+
+#: Largest error of a series that replaces a material, as a part of the tolerance.
+SERIES_SHARE = 0.1
+#: Part of it for the series of the materials of a layered body; the rest is for the series of its waves.
+MATERIALS_SHARE = 0.3
+#: Default shortest time of a series, as a part of the length of the program.
+SHORTEST_AGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A memory, and its distance from the material.
+
+    Attributes
+    ----------
+    memory : Memory
+        Memory of the time steps.
+    series_error : float
+        Largest relative error of the compliance at time zero and from the shortest age on; zero if the memory is exact.
+    note : str
+        The model in words.
+    misfit : float
+        Largest relative deviation of the series from the rows of a table, zero if it is within their noise.
+    """
+
+    memory: Memory
+    series_error: float
+    note: str
+    misfit: float = 0.0
+
+    @property
+    def material(self) -> Prony:
+        """The Prony series that the solver uses."""
+        return self.memory.series
+
+    def warning(self, tolerance: float) -> str:
+        """Return a warning if the series is farther from the material than the tolerance, else ''."""
+        off = max(self.series_error, self.misfit)
+        if off <= tolerance:
+            return ""
+        return (
+            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
+            f"{tolerance:g} (memory): no passive material comes nearer to it."
+        )
+
+
+def choose_memory(
+    body: Body | Material,
+    duration: float,
+    tolerance: float,
+    shortest: float | None = None,
+    grid: Any = None,
+    keeps_pressure: bool = False,
+) -> Choice:
+    """Return the memory of a body for a program.
+
+    Parameters
+    ----------
+    body : Body or Material
+        A body, or a material, which stands for a half-space of it.
+    duration : float
+        Length of the program. [s]
+    tolerance : float
+        Relative error that the whole computation may have.
+    shortest : float, optional
+        Shortest time at which the compliance matters, apart from zero. Default: a millionth of the program's length.
+        [s]
+    grid : Grid, optional
+        Cells; needed for a layered body only.
+    keeps_pressure : bool
+        Whether the pressure that causes the displacement is kept too.
+
+    Returns
+    -------
+    Choice
+        A series within a tenth of the tolerance if the material is passive.
+
+    Raises
+    ------
+    InputError
+        If the material is not known over the whole program, or no memory of the body is known.
+    """
+    shortest = SHORTEST_AGE * duration if shortest is None else shortest
+    if isinstance(body, Body) and not body.separates:
+        return _of_layers(body, duration, tolerance, shortest, grid)
+    material = complete(body.material if isinstance(body, Body) else body)
+    if isinstance(material, Prony):
+        memory = Memory(material, duration, keeps_pressure)
+        return Choice(memory, 0.0, _joined(in_words(material), material.note))
+    if duration == 0:
+        found = at_once(material)
+        note = "instantaneous compliance" if found.glassy else "no instantaneous compliance"
+        return Choice(Memory(found, duration, keeps_pressure), 0.0, note)
+    found, error = series(material, shortest, duration, SERIES_SHARE * tolerance)
+    within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
+    active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
+    note = _joined(in_words(found) + within * bool(error), material.note, active)
+    return Choice(Memory(found, duration, keeps_pressure), error, note, material.misfit)
+
+
+def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, grid: Any) -> Choice:
+    """Return the memory of a layered body: exponentials that all waves share."""
+    from roughvisc.mechanics.layer import LayeredBody, Layers, layer_series
+    from roughvisc.mechanics.layer_memory import LayerMemory
+
+    if not isinstance(body, LayeredBody):
+        raise InputError(
+            f"material is a {type(body).__name__} in which space and time do not separate, and no memory is known for "
+            "it: expected the body that layer() makes, or a Body whose kernel is constant in time"
+        )
+    share = SERIES_SHARE * tolerance
+    given = [complete(one) for one in body.materials]
+    found = [
+        series(one, shortest, duration, MATERIALS_SHARE * share) if duration > 0 else (at_once(one), 0.0)
+        for one in given
+    ]
+    of_materials = max(error for _, error in found)
+    layers = Layers(body.thicknesses, tuple(one for one, _ in found))
+    waves = layer_series(layers, shortest, duration, share - of_materials)
+    error, count = waves.error + of_materials, len(waves.times)
+    note = "the instantaneous compliance of each wave"
+    if len(waves.compliances):
+        note = (
+            f"{count} exponential{'' if count == 1 else 's'}{' and a fluidity' if waves.flows else ''} that all waves "
+            f"share, each with compliances of its own, within {error:.1e} of them from {shortest:.1g} s on"
+        )
+    misfit = max(one.misfit if isinstance(one, Creep) else 0.0 for one in given)
+    return Choice(LayerMemory(waves, duration, grid), error, _joined(note, *(one.note for one in given)), misfit)
+
+
+def at_once(material: Prony | Creep) -> Prony:
+    """Return the elastic material of a program of jumps, which needs the instantaneous compliance only."""
+    glassy = float(material.contact_compliance(0.0)) * 2 / (1 - material.poisson)
+    return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson)
+
+
+def in_words(found: Prony) -> str:
+    """Return the terms of a series in words."""
+    if not found.times and not found.fluidity:
+        return "no memory: elastic"
+    count = len(found.times)
+    exponentials = f"{count} exponential{'' if count == 1 else 's'}"
+    if not count:
+        return "a fluidity"
+    return f"{exponentials} and a fluidity" if found.fluidity else exponentials
+
+
+def _joined(*notes: str) -> str:
+    return "; ".join(filter(None, notes))

@@ -1,0 +1,999 @@
+"""Time stepping: contact under a program of load or approach, on a viscoelastic body, with a stated error.
+
+The atom is a pair of steps. A coarse solution takes the pair as one step. The difference between both solutions is the
+stated error at the end of the pair, and the change of this difference over the pair controls the length of the next
+one. No other estimate is needed.
+
+An error is weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`). A kept time
+ends a pair or lies in its middle.
+
+If little of the compliance of a step is instantaneous, the step is *soft*: the pressure jumps in each cell that enters
+the contact, and the pressure of an implicit step belongs to the step and not to its end. The displaced surface then
+controls the length, and a short additional step gives the pressure of a kept row.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.memory import History, Memory, Rule
+from roughvisc.mechanics.program import Control, Program, Segment, Slide, instant
+from roughvisc.mechanics.tangential import tangential_force
+
+Array = Any  # an array of NumPy or CuPy
+#: Pressure [Pa], and its displacement per unit compliance if known [m Pa].
+Guess = tuple[Array, Array | None]
+
+#: First pair after an event, in parts of the segment: contact changes fast after a corner.
+FIRST_PAIR = 0.005
+#: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
+#: and of the approach. The difference is three times the error at second order and the error at first order. Measured
+#: on workflows/benchmarks/accuracy.py.
+STATED, STATED_APPROACH = 0.6, 0.6
+#: The same for bodies that have hardly any instantaneous compliance, whose steps begin at first order.
+STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
+#: Part of the tolerance that a pair may add, and the least part that it may always add.
+SHARE, LEAST_SHARE = 0.6, 0.2
+#: Part of the tolerance that is planned with.
+PLANNED = 0.9
+#: Part of the tolerance that the contact solver may leave.
+SOLVER_SHARE = 0.2
+#: What relaxation leaves of an error counts at least this part: other errors do not fade.
+LEAST_REMAINING = 0.02
+#: The same where cells leave the contact.
+RECEDING = 0.5
+#: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
+ORDER = 1.5
+#: A pair is rejected if it adds this many times what it may.
+REJECTED = 2.0
+#: A shorter pair that adds more than this part of what the longer one adds is accepted: a cell that enters makes the
+#: pressure jump, however short the pair is.
+REDUCED = 0.93
+#: Shortest pair, in parts of the segment, or of its time to the first kept one.
+SHORTEST_PAIR = 1e-6
+#: Change of the length from one pair to the next: smallest, largest, and largest if it adds next to nothing.
+SHRINK, GROW, GROW_FAST = 0.3, 2.3, 5.0
+#: Next to nothing, in parts of what it may add.
+NEARLY_NOTHING = 0.02
+#: Steps of a pair with an event between them: the first in parts of the length asked for, and the ratio of both.
+SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
+#: Pairs of a period of a cycle.
+PAIRS_OF_A_CYCLE = 8
+#: A step is soft if less than this part of its compliance is instantaneous.
+SOFT = 0.1
+#: Length of the step that gives the pressure at the end of a soft step, in steps.
+END_STEP = 1e-3
+#: Part of the solver's tolerance in a soft step whose end is shown, since that step magnifies the residual.
+MAGNIFIED = 3e-3
+#: Part of the usual tolerance of the contact solver in a slide: a slow slide changes the pressure little in a step, and
+#: its friction is a small part of it.
+SLIDING_SHARE = 0.3
+#: Part of the pressure of a cell that has just entered the contact that is uncertain, if it is due to creep.
+ENTERED = 0.3
+#: Part of the tolerance that cells that have just entered may leave uncertain at a kept time in the middle of a pair.
+UNCERTAIN = 0.5
+#: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
+ENTERING = 2.5
+#: Rounding of displacements, relative to what the mean pressure could cause.
+ROUNDING = 1e-11
+#: Times at which an open contact closes are found to this part of the way to the next event.
+CLOSING = 1e-9
+#: Surfaces that are apart for less than this part of the way touch at once.
+AT_ONCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is prescribed.
+
+    Attributes
+    ----------
+    grid : Grid
+        Cells, boundary and body.
+    gap : array, shape (nx, ny)
+        Gap of the undeformed surfaces at zero approach; any finite number at absent cells. [m]
+    memory : Memory
+        Material.
+    program : Program
+        Load or approach against time, and slides.
+    kept : tuple of float or None
+        Times of the kept rows, ascending; None: of every step. [s]
+    tolerance : float
+        Of the pressure at kept times, relative, L1 norm, and of approach and force.
+    time_step : float or None
+        Fixed step; None: the tolerance controls the steps. [s]
+    present : array of bool or None
+        Cells with material; None: all.
+    """
+
+    grid: Grid
+    gap: Array
+    memory: Memory
+    program: Program
+    kept: tuple[float, ...] | None = None
+    tolerance: float = 1e-3
+    time_step: float | None = None
+    present: Array | None = None
+
+    def lowest(self, values: Array) -> float:
+        """Return the least value over the present cells."""
+        return float(values.min() if self.present is None else values[self.present].min())
+
+    @cached_property
+    def corners(self) -> list[float]:
+        """Start of the program and end of each segment. [s]"""
+        return self.program.corners
+
+    @cached_property
+    def compliance(self) -> Any:
+        """Contact compliance after a time [s], of which few are asked for again and again. [1/Pa]"""
+        return lru_cache(maxsize=64)(self.memory.compliance)
+
+    @cached_property
+    def can_jump(self) -> bool:
+        """Whether the body has an instantaneous compliance."""
+        return self.compliance(0.0) > 0
+
+    @cached_property
+    def hardly_jumps(self) -> bool:
+        """Whether hardly any of the compliance after all of the program is instantaneous."""
+        return self.is_soft(self.program.duration)
+
+    @property
+    def stated(self) -> tuple[float, float]:
+        """Part of the difference between both solutions that is stated, of pressure and force, and of the approach."""
+        return (STATED_SOFT, STATED_APPROACH_SOFT) if self.hardly_jumps else (STATED, STATED_APPROACH)
+
+    @cached_property
+    def motions(self) -> tuple[Slide, ...]:
+        """Slide of each segment that friction refers to: its own, the last one, or the first; empty if none slides."""
+        slides = [segment.slide for segment in self.program.segments]
+        last = next((slide for slide in slides if slide is not None), None)
+        return () if last is None else tuple(last := slide or last for slide in slides)
+
+    def is_soft(self, step: float) -> bool:
+        """Return whether hardly any compliance of a step is instantaneous. [s]"""
+        return self.compliance(0.0) < SOFT * self.compliance(step)
+
+    def keeps(self, time: float) -> bool:
+        """Return whether a time is kept. [s]"""
+        return self.kept is None or time in self._kept
+
+    def next_kept(self, time: float) -> float:
+        """Return the first kept time after a time; infinite if there is none. [s]"""
+        if self.kept is None:
+            return math.inf
+        at = bisect_right(self.kept, time)
+        return self.kept[at] if at < len(self.kept) else math.inf
+
+    @cached_property
+    def _kept(self) -> frozenset[float]:
+        return frozenset(self.kept or ())
+
+
+@dataclass(frozen=True)
+class Point:
+    """A solution at an instant.
+
+    Attributes
+    ----------
+    time : float
+        [s]
+    pressure : array, shape (nx, ny)
+        [Pa]
+    force, approach : float
+        [N, m]
+    history : History
+        Memory of the body.
+    before : tuple or None
+        Time, pressure and displacement per unit compliance of the last point, from which the next step extrapolates.
+    start : float
+        Force [N] or approach [m] at the start of the segment, of which the program does not state the value.
+    is_late : bool
+        Whether what was prescribed has jumped and the body cannot follow at once.
+    solver_error, solver_error_approach : float
+        Errors of the contact solver: of the pressure, relative, L1 norm, and of the approach. [-, m]
+    """
+
+    time: float
+    pressure: Array
+    force: float
+    approach: float
+    history: History
+    before: tuple[float, Array, Array] | None = None
+    start: float = 0.0
+    is_late: bool = False
+    solver_error: float = 0.0
+    solver_error_approach: float = 0.0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the surfaces are apart."""
+        return self.force == 0 and not self.is_late
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Stated error of the time steps, by the difference between the fine and the coarse solution.
+
+    Attributes
+    ----------
+    pressure : float
+        Of the pressure, its absolute values summed. [N]
+    force, approach : float
+        [N, m]
+    inside, outside : float
+        Area in contact that may be none, and area out of contact that may be in it. [m2]
+    friction : float
+        Of the friction force of a slide. [N]
+    """
+
+    pressure: float = 0.0
+    force: float = 0.0
+    approach: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+    friction: float = 0.0
+
+    def or_larger(self, other: Difference) -> Difference:
+        """Return the larger of both, part by part."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Difference(*(max(one, two) for one, two in pairs))
+
+
+@dataclass(frozen=True)
+class State:
+    """All that a march needs to continue.
+
+    Attributes
+    ----------
+    fine : Point
+        Solution by the shorter steps.
+    twice : Point or None
+        Solution by steps twice as long, at the same instant; None as long as both are the same.
+    segment : int
+        Index of the segment of the program.
+    length : float
+        Length of the next pair; zero after an event. [s]
+    difference : Difference
+        Between both solutions.
+    largest_force, largest_approach : float
+        So far. [N, m]
+    work : float
+        Work of the normal force since the start. [J]
+    distance : float
+        Length of the path of the slides so far. [m]
+    iterations, convolutions : int
+        Spent so far, rejected pairs included.
+    """
+
+    fine: Point
+    twice: Point | None = None
+    segment: int = 0
+    length: float = 0.0
+    difference: Difference = field(default_factory=Difference)
+    largest_force: float = 0.0
+    largest_approach: float = 0.0
+    work: float = 0.0
+    distance: float = 0.0
+    iterations: int = 0
+    convolutions: int = 0
+
+    @property
+    def coarse(self) -> Point:
+        """Solution by the longer steps."""
+        return self.twice or self.fine
+
+
+class Step(NamedTuple):
+    """An accepted step.
+
+    Attributes
+    ----------
+    point : Point
+        The fine solution, its pressure that of the end of the step.
+    difference : Difference
+        Error of the time steps.
+    segment : int
+        Index of the segment that the step belongs to.
+    work : float
+        Work of the normal force since the start. [J]
+    state : State or None
+        From which a march continues after this step; None in the middle of a pair.
+    distance : float
+        Length of the path of the slides so far. [m]
+    iterations, convolutions : int
+        Spent so far.
+    """
+
+    point: Point
+    difference: Difference
+    segment: int
+    work: float
+    state: State | None
+    distance: float = 0.0
+    iterations: int = 0
+    convolutions: int = 0
+
+
+class Solved(NamedTuple):
+    """A step that is not yet accepted, and its cost."""
+
+    point: Point
+    iterations: int = 0
+    convolutions: int = 0
+
+
+def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
+    """Press a surface through a program, step by step.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    state : State, optional
+        Where to continue, of an earlier step of the same scene. Default: at rest.
+
+    Yields
+    ------
+    Step
+        Each accepted step, in order. Of a jump only the state after it, unless the body cannot follow at once: then
+        only the state before it.
+
+    Raises
+    ------
+    InputError
+        If an approach jumps and the body has no instantaneous compliance.
+    ConvergenceError
+        If a contact is not solved.
+    """
+    segments = scene.program.segments
+    if state is None:
+        state = at_rest(scene)
+        if segments and segments[0].duration > 0:
+            yield accepted(state, state.fine, 0)
+    while state.segment < len(segments):
+        segment = segments[state.segment]
+        if segment.duration == 0:
+            is_start = state.fine.time == 0
+            state = jump(scene, state, segment)
+            if (scene.can_jump or is_start) and not jumps_next(scene, state):
+                yield accepted(state, state.fine, state.segment - 1)
+            continue
+        advance = pair_of_steps if segment.slide is None else pair_of_cells
+        steps = advance(scene, state, segment)
+        state = steps[-1].state  # type: ignore[assignment]
+        if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
+            steps = steps[:-1]
+        yield from steps
+
+
+def accepted(state: State, point: Point, segment: int) -> Step:
+    """Return the step that has led to a state, with its point as a row shows it."""
+    return Step(
+        point, state.difference, segment, state.work, state, state.distance, state.iterations, state.convolutions
+    )
+
+
+def inside_pair(state: State, point: Point, apart: Difference, work: float) -> Step:
+    """Return the first step of a pair that began at a state, with the work done in it. [J]
+
+    Its cost is counted with the second one.
+    """
+    total = state.work + work
+    return Step(point, apart, state.segment, total, None, state.distance, state.iterations, state.convolutions)
+
+
+def at_rest(scene: Scene) -> State:
+    """Return the state before the program begins."""
+    nothing = np.zeros(scene.gap.shape)
+    given = bool(scene.program.segments) and scene.program.segments[0].control == "approach"
+    approach = 0.0 if given else scene.lowest(scene.gap)
+    point = Point(0.0, nothing, 0.0, approach, scene.memory.start(scene.gap.shape))
+    return State(point)
+
+
+def jumps_next(scene: Scene, state: State) -> bool:
+    """Return whether the segment that a state has entered is a jump."""
+    segments = scene.program.segments
+    return state.segment < len(segments) and segments[state.segment].duration == 0
+
+
+# ---------------------------------------------------------------------------------------------------------- segments
+
+
+def jump(scene: Scene, state: State, segment: Segment) -> State:
+    """Return the state after a jump; the next step takes it if there is no instantaneous compliance."""
+    fine, coarse = state.fine, state.coarse
+    value = segment.value(0.0, fine.start)
+    if not scene.can_jump:
+        if value == (fine.force if segment.control == "load" else fine.approach):
+            return entered(scene, state)
+        if segment.control == "approach":
+            raise InputError(
+                f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
+                "compliance: expected a ramp (over > 0), or a material that can jump"
+            )
+        after = entered(scene, state)
+        following = scene.program.segments[after.segment : after.segment + 1]
+        held = bool(following) and following[0].control == "load"
+        fine, coarse = (
+            replace(one, is_late=True, start=value if held else one.start) for one in (after.fine, after.coarse)
+        )
+        return replace(after, fine=fine, twice=None if after.twice is None else coarse)
+    new = take_step(scene, fine, fine.time, segment.control, value)
+    other = new
+    if coarse is not fine:
+        other = take_step(scene, coarse, fine.time, segment.control, value, moved(scene, new.point, coarse, fine))
+    stored = [at_once_stored(scene, one) for one in (new.point, fine)]
+    return entered(scene, after_solves(scene, state, new, other, [new, other], stored[0] - stored[1]))
+
+
+def at_once_stored(scene: Scene, point: Point) -> float:
+    """Return the energy stored in the instantaneous compliance: its change is the work of a jump. [J]"""
+    return 0.5 * float((point.pressure * scene.memory.at_once(point.history)).sum()) * scene.grid.cell_area
+
+
+def entered(scene: Scene, state: State) -> State:
+    """Return the state at the start of the next segment."""
+    segments, index = scene.program.segments, state.segment + 1
+    joined = segments[index - 1 : index + 1]
+    controls = {segment.control for segment in joined}
+    # a corner of the approach is a jump of the load if the body cannot follow at once
+    jumps = "approach" in controls and not scene.can_jump
+    given = segments[index].control if index < len(segments) else "load"
+
+    def enter(point: Point) -> Point:
+        start = point.force if given == "load" else point.approach
+        late = jumps and point.force > 0
+        return replace(point, start=start, before=None, is_late=late, history=scene.memory.restart(point.history))
+
+    # a corner bends the histories and does not break them: the pairs may stay as long
+    smooth = len(controls) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
+    smooth = smooth and state.fine.force > 0 and not jumps
+    twice = state.twice and enter(state.twice)
+    return replace(state, fine=enter(state.fine), twice=twice, segment=index, length=state.length if smooth else 0.0)
+
+
+def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
+    """Return the next accepted steps of a segment: a pair, or one step; the last one has the state after them."""
+    fine, coarse, began = state.fine, state.coarse, scene.corners[state.segment]
+    end = scene.corners[state.segment + 1]
+    event = min(scene.next_kept(fine.time), end)
+
+    def prescribed(time: float, point: Point) -> float:
+        return segment.value(time - began, point.start)
+
+    if fine.is_open:
+        event = closing_time(scene, fine, segment, began, event)
+        if event > fine.time:
+            return [single_step(scene, state, segment, event, prescribed)]
+        event = min(scene.next_kept(fine.time), end)
+    if scene.memory.is_elastic:
+        longest = (end - began) / 20 if scene.kept is None else math.inf
+        parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
+        return [
+            single_step(
+                scene, state, segment, fine.time + (event - fine.time) / parts if parts > 1 else event, prescribed
+            )
+        ]
+
+    length, next_event = pair_length(scene, state, segment), min(scene.next_kept(event), end)
+    shortest = SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
+    refused = refused_end = math.inf
+    control = segment.control
+    while True:
+        middle, last = pair_ends(fine.time, length, event, next_event)
+        taken, shares = (
+            last - fine.time,
+            [solver_share(scene, fine.time, middle), solver_share(scene, middle, last)],
+        )
+        first = take_step(scene, fine, middle, control, prescribed(middle, fine), share=shares[0])
+        second = take_step(scene, first.point, last, control, prescribed(last, fine), share=shares[1])
+        guess = moved(scene, second.point, coarse, fine)
+        once = take_step(scene, coarse, last, control, prescribed(last, coarse), guess, shares[1])
+        shown = [
+            end_value(scene, here, one, control, prescribed)
+            for here, one in ((fine, first), (first.point, second), (coarse, once))
+        ]
+        solved = [first, second, once, *shown]
+        apart = error_at(scene, fine, second.point, once.point, shown[1].point, shown[2].point)
+        if scene.motions and scene.keeps(last):
+            slide = scene.motions[state.segment]
+            apart = replace(apart, friction=friction_apart(scene, shown[1].point, shown[2].point, slide))
+        if scene.time_step is not None:
+            break
+        force, approach = largest_values(scene, state, first.point, second.point)
+        in_middle = middle == event and scene.keeps(event)
+        if in_middle and entering(scene, fine, shown[0].point) > UNCERTAIN * scene.tolerance * force:
+            next_event, state = event, with_cost(state, solved)  # the pair ends here, so that its error is known
+            del first, second, once, guess, shown, solved  # their memory is free while the pair is tried again
+            continue
+        share = added(scene, state, first.point, second.point, once.point, segment)
+        factor = PLANNED * max(share, 1e-300) ** (-1 / ORDER)
+        lands = scene.keeps(last) or middle == event
+        parts = apart.pressure / force / scene.stated[0], apart.approach / approach / scene.stated[1]
+        at_end = max(parts) if lands else 0.0
+        # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
+        opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
+        if opens and second.point.approach >= fine.approach and taken > shortest:
+            state, length = with_cost(state, solved), 0.2 * taken
+            del first, second, once, guess, shown, solved
+            continue
+        too_long = share > REJECTED and share < REDUCED * refused
+        if not too_long and scene.tolerance < at_end < 0.9 * refused_end:
+            too_long, refused_end, factor = True, at_end, 0.5
+        if not too_long or taken <= shortest:
+            easy = share < NEARLY_NOTHING and not scene.memory.is_stiff(GROW_FAST * taken)
+            was_cut, asked = taken < 0.9 * length, length
+            length = taken * min(max(factor, SHRINK), GROW_FAST if easy else GROW)
+            if was_cut and factor >= 1 and not scene.memory.is_stiff(asked):  # an event has cut the pair
+                length = max(length, min(asked, factor * taken))
+            break
+        refused = share
+        state, length = with_cost(state, solved), taken * max(factor, 0.2)
+        del first, second, once, guess, shown, solved
+
+    work, whole = work_of_pair(scene, fine, first.point, second.point)
+    after = after_solves(scene, state, second, once, solved, whole, length)
+    between = state.difference.or_larger(apart)
+    between = replace(between, pressure=between.pressure + entering(scene, fine, shown[0].point))
+    after = replace(after, difference=apart)
+    if last == end:
+        after = entered(scene, after)
+    return [
+        inside_pair(state, shown[0].point, between, work),
+        accepted(after, shown[1].point, state.segment),
+    ]
+
+
+def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
+    """Return the next steps of a slide, over one cell each, in the frame of the profile.
+
+    The body moves backwards under the profile, by whole cells and without interpolation; then the step is an elastic
+    contact problem. The coarse solution moves by two cells at once. The error falls with the cells alone.
+    """
+    slide, grid = segment.slide, scene.grid
+    assert slide is not None
+    began, end = scene.corners[state.segment : state.segment + 2]
+    cells = slide.cells(grid.spacing)
+    taken = round((state.fine.time - began) / (end - began) * cells)
+    count = 1 if scene.memory.is_elastic else min(2, cells - taken)
+    times = [instant(began, end, taken + number, cells) for number in range(1, count + 1)]
+
+    def over(point: Point, number: int, time: float, guess: Guess, share: float) -> Solved:
+        history = scene.memory.roll(point.history, slide.sense * number, slide.axis)
+        pressure = np.roll(point.pressure, -slide.sense * number, slide.axis)
+        body = replace(point, history=history, pressure=pressure, before=None)
+        return take_step(scene, body, time, segment.control, segment.value(time - began, point.start), guess, share)
+
+    solved, point = [], state.fine
+    for time in times:
+        solved.append(over(point, 1, time, (point.pressure, scene.memory.unit(point.history)), SLIDING_SHARE))
+        point = solved[-1].point
+    once = solved[-1]
+    if not (scene.memory.is_elastic and state.coarse is state.fine) and not (count == 1 and state.coarse is state.fine):
+        guess = moved(scene, point, state.coarse, state.fine)
+        once = over(state.coarse, count, times[-1], guess, SLIDING_SHARE)
+    works = [trapezoid(scene, *pair) for pair in pairwise([state.fine, *(one.point for one in solved)])]
+    after = after_solves(scene, state, solved[-1], once, [*solved, once], sum(works))
+    apart = error_at(scene, state.fine, point, once.point, point, once.point)
+    apart = replace(apart, friction=friction_apart(scene, point, once.point, slide))
+    if count == 1:  # the coarse solution takes the same step
+        apart = apart.or_larger(state.difference)
+    if cells == 1 and not scene.memory.is_elastic:  # no solution with longer steps is known
+        apart = replace(apart, friction=abs(friction_force(scene, point, slide)))
+    side = grid.spacing[slide.axis]
+    after = replace(after, difference=apart, distance=state.distance + count * side)
+    if times[-1] == end:
+        after = entered(scene, after)
+    between = state.difference.or_larger(apart)
+    first = inside_pair(state, solved[0].point, between, works[0])._replace(distance=state.distance + side)
+    return [*[first][: count - 1], accepted(after, point, state.segment)]
+
+
+def friction_force(scene: Scene, point: Point, slide: Slide) -> float:
+    """Return the friction force of a point. [N]"""
+    return tangential_force(scene.grid, point.pressure, scene.memory.present(point.history)[0], slide)
+
+
+def friction_apart(scene: Scene, fine: Point, coarse: Point, slide: Slide) -> float:
+    """Return the difference of the friction force between both solutions. [N]"""
+    return abs(friction_force(scene, fine, slide) - friction_force(scene, coarse, slide))
+
+
+def added(scene: Scene, state: State, first: Point, second: Point, once: Point, segment: Segment) -> float:
+    """Return what a pair adds to the error at the next kept time, over what it may add."""
+    fine, coarse, memory, taken = state.fine, state.coarse, scene.memory, second.time - state.fine.time
+    force, approach = largest_values(scene, state, first, second)
+    following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
+    # errors are relative to the largest values, those of the next kept time included
+    began, end = scene.corners[state.segment : state.segment + 2]
+    now, then = (segment.value(time - began, second.start) for time in (second.time, min(following, end)))
+    ahead = max(then / now, 1.0) if now > 0 else 1.0
+    force, approach = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
+    soft = scene.is_soft(taken)
+    receding = bool(((fine.pressure > 0) & (second.pressure == 0)).any())
+
+    after, before = second.pressure - once.pressure, fine.pressure - coarse.pressure
+    decays = {1.0} if soft else {1.0, memory.remaining(taken)}
+    change = min(float(abs(after - part * before).sum()) for part in decays) * scene.grid.cell_area / force
+    if soft:
+        remains = scene.compliance(taken) / scene.compliance(following - second.time + taken)
+        remains = 1.0 if receding else remains
+    else:
+        remains = max(memory.remaining(following - second.time), RECEDING if receding else LEAST_REMAINING)
+    stated = scene.stated
+    fades = 1.0 if soft or receding else remains
+
+    def over_budget(change: float, carried: float) -> float:
+        budget = max(PLANNED * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
+        return change / min(SHARE * scene.tolerance, budget)
+
+    # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
+    carried = 0.0 if soft else state.difference.pressure / stated[0] / force * memory.remaining(following - fine.time)
+    share = over_budget(change * remains, carried)
+    if segment.control == "load":
+        change = abs((second.approach - once.approach) - (fine.approach - coarse.approach)) / approach
+        share = max(share, over_budget(change * fades, state.difference.approach / stated[1] / approach))
+    if segment.control == "approach" or second.force == 0 or soft:
+        surfaces = [memory.present(point.history)[0] for point in (second, once, fine, coarse)]
+        surface = (surfaces[0] - surfaces[1]) - (surfaces[2] - surfaces[3])
+        share = max(share, over_budget(float(abs(surface).max()) / approach * fades, 0.0))
+    return share
+
+
+def end_value(scene: Scene, here: Point, solved: Solved, control: Control, prescribed: Any) -> Solved:
+    """Return the end of a step with the pressure of its instant, if that is kept and the step is soft.
+
+    A short step, in which the load stays or the approach changes as before, gives this pressure.
+    """
+    point, step = solved.point, solved.point.time - here.time
+    if not (scene.keeps(point.time) and point.force > 0 and scene.is_soft(step)):
+        return solved
+    ahead = END_STEP * step
+    value = point.force
+    if control == "approach":
+        value = 2 * point.approach - prescribed(point.time - ahead, point)
+    alone = replace(point, before=None, history=scene.memory.restart(point.history))
+    found = take_step(scene, alone, point.time + ahead, control, value, rule="constant")
+    shown = replace(found.point, time=point.time, approach=point.approach, before=point.before)
+    return Solved(shown, found.iterations, found.convolutions)
+
+
+def largest_values(scene: Scene, state: State, first: Point, second: Point) -> tuple[float, float]:
+    """Return the largest force [N] and approach [m] so far, to which errors are relative.
+
+    Rounding cannot tell a smaller approach from none: all that a flat surface has under periodic boundaries.
+    """
+    force = max(state.largest_force, first.force, second.force)
+    rounding = ROUNDING * scene.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
+    approach = max(state.largest_approach, abs(first.approach), abs(second.approach))
+    return max(force, 1e-300), max(approach, rounding / scene.grid.cell_area, 1e-300)
+
+
+def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:
+    """Return the error of a row at the end of a pair.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    before : Point
+        Start of the pair.
+    fine, coarse : Point
+        Both solutions.
+    shown, other : Point
+        The same with the pressures of that instant.
+    """
+    apart = difference(scene, shown, other)
+    if not scene.keeps(fine.time) or fine is coarse:
+        return apart
+    gap, near = (scene.gap + scene.memory.present(one.history)[0] - one.approach for one in (fine, coarse))
+    pressure, coarse_pressure = shown.pressure, other.pressure
+    inside = (pressure > 0) & (pressure <= abs(pressure - coarse_pressure))
+    outside = (pressure == 0) & ((coarse_pressure > 0) | (gap <= abs(gap - near)))
+    if scene.present is not None:
+        outside &= scene.present
+    cell, cells = scene.grid.cell_area, int((pressure > 0).sum())
+    jumps = 0.0
+    if cells and scene.is_soft(fine.time - before.time):
+        jumps = entering(scene, before, shown) + ENTERING * float(outside.sum()) * fine.force / cells
+    return replace(
+        apart, pressure=apart.pressure + jumps, inside=cell * float(inside.sum()), outside=cell * float(outside.sum())
+    )
+
+
+def entering(scene: Scene, before: Point, after: Point) -> float:
+    """Return the force that a step leaves uncertain in the middle of a pair, in cells that have entered. [N]"""
+    compliance = scene.compliance(after.time - before.time)
+    creeping = 1 - scene.compliance(0.0) / compliance if compliance > 0 else 0.0
+    entered = float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
+    return ENTERED * creeping * entered
+
+
+def single_step(scene: Scene, state: State, segment: Segment, time: float, prescribed: Any) -> Step:
+    """Return one step that both solutions take: without contact, or without memory."""
+    fine, coarse = state.fine, state.coarse
+    new = take_step(scene, fine, time, segment.control, prescribed(time, fine), rule=exact_rule(fine))
+    other = new
+    if coarse is not fine:
+        value, rule = prescribed(time, coarse), exact_rule(coarse)
+        other = take_step(scene, coarse, time, segment.control, value, moved(scene, new.point, coarse, fine), rule=rule)
+    work = trapezoid(scene, fine, new.point)
+    if scene.memory.is_elastic:  # all of it is stored
+        work = at_once_stored(scene, new.point) - at_once_stored(scene, fine)
+    after = after_solves(scene, state, new, other, [new, other], work)
+    if fine.is_open and new.point.force == 0:
+        clean, other_clean = (
+            one and replace(one, before=None, history=scene.memory.restart(one.history))
+            for one in (after.fine, after.twice)
+        )
+        after = replace(after, fine=clean, twice=other_clean)
+    if time == scene.corners[state.segment + 1]:
+        after = entered(scene, after)
+    return accepted(after, new.point, state.segment)
+
+
+def exact_rule(here: Point) -> Rule | None:
+    """Return the rule that is exact for surfaces that stay apart; None if they are in contact."""
+    return "linear" if here.is_open else None
+
+
+def after_solves(
+    scene: Scene, state: State, new: Solved, other: Solved, solved: list[Solved], work: float, length: float = 0.0
+) -> State:
+    """Return the state after accepted steps."""
+    fine, coarse = new.point, other.point
+    middle = solved[0].point
+    return replace(
+        with_cost(state, solved),
+        fine=fine,
+        twice=None if coarse is fine else coarse,
+        length=length,
+        difference=difference(scene, fine, coarse),
+        largest_force=max(state.largest_force, middle.force, fine.force),
+        largest_approach=max(state.largest_approach, abs(middle.approach), abs(fine.approach)),
+        work=state.work + work,
+    )
+
+
+def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
+    """Return the stated error by the difference between both solutions."""
+    if fine is coarse:
+        return Difference()
+    stated, of_approach = scene.stated
+    pressure = float(abs(fine.pressure - coarse.pressure).sum()) * scene.grid.cell_area
+    approach = abs(fine.approach - coarse.approach)
+    return Difference(stated * pressure, stated * abs(fine.force - coarse.force), of_approach * approach)
+
+
+def with_cost(state: State, solved: list[Solved]) -> State:
+    """Return the state with the cost of solves."""
+    each = {id(one): one for one in solved}.values()
+    return replace(
+        state,
+        iterations=state.iterations + sum(one.iterations for one in each),
+        convolutions=state.convolutions + sum(one.convolutions for one in each),
+    )
+
+
+def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
+    """Return the work of the normal force in the first step of a pair, and in both. [J]
+
+    Force and approach run along parabolas through the three points. A load that has jumped is held from then on.
+    """
+    forces = middle.force if start.is_late else start.force, middle.force, end.force
+    approaches = start.approach, middle.approach, end.approach
+    first, last = middle.time - start.time, end.time - start.time
+    if not 0 < first < last or min(middle.force, end.force) == 0:  # as close as rounding, or contact is lost
+        early = trapezoid(scene, start, middle)
+        return early, early + trapezoid(scene, middle, end)
+
+    def slope_and_bend(values: tuple[float, float, float]) -> tuple[float, float]:
+        early, mean = (values[1] - values[0]) / first, (values[2] - values[0]) / last
+        bend = (mean - early) / (last - first)
+        return early - bend * first, bend
+
+    force, (rise, bend), (rate, turn) = forces[0], slope_and_bend(forces), slope_and_bend(approaches)
+
+    def work(time: float) -> float:
+        return time * (
+            force * rate
+            + time * (force * turn + rise * rate / 2)
+            + time**2 * (2 * rise * turn + bend * rate) / 3
+            + time**3 * bend * turn / 2
+        )
+
+    return work(first), work(last)
+
+
+def trapezoid(scene: Scene, before: Point, after: Point) -> float:
+    """Return the work of the normal force between two points. [J]
+
+    If contact is lost between them, the force ends where the surfaces still touch.
+    """
+    if before.force == 0 == after.force:
+        return 0.0
+    begin, end = (
+        point.approach if point.force > 0 else max(point.approach, touching_level(scene, point))
+        for point in (before, after)
+    )
+    return 0.5 * (before.force + after.force) * (end - begin)
+
+
+def touching_level(scene: Scene, point: Point) -> float:
+    """Return the approach at which the surfaces would just touch. [m]"""
+    return scene.lowest(scene.gap + scene.memory.present(point.history)[0])
+
+
+def solver_share(scene: Scene, time: float, end: float) -> float:
+    """Return the part of the solver's tolerance in a step: that of the end of a soft step magnifies the residual."""
+    return MAGNIFIED if scene.keeps(end) and scene.is_soft(end - time) else 1.0
+
+
+def pair_length(scene: Scene, state: State, segment: Segment) -> float:
+    """Return the length of the pair to try first. [s]"""
+    if scene.time_step is not None:
+        return 2 * scene.time_step
+    length = state.length or FIRST_PAIR * min(segment.duration, segment.period)
+    if segment.amplitude:
+        length = min(length, segment.period / PAIRS_OF_A_CYCLE)
+    return length
+
+
+def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
+    """Return the middle and the end of the next pair, of about a length; an event is its end or its middle. [s]
+
+    The steps of a pair have similar lengths: the coarse solution would take almost the same step as a much longer one.
+    """
+    first, second = event - now, next_event - event
+    if SHORTEST_HALF * length <= first <= LONGEST_HALF * length and second >= first / MOST_UNEQUAL:
+        is_near = second <= (MOST_UNEQUAL + SHORTEST_HALF) * first  # leave no splinter of a step
+        return event, next_event if is_near else event + MOST_UNEQUAL * first
+    pairs = max(math.ceil((event - now) / length - 0.2), 1)
+    return now + (event - now) / (2 * pairs), event if pairs == 1 else now + (event - now) / pairs
+
+
+# ------------------------------------------------------------------------------------------------------------- steps
+
+
+def take_step(
+    scene: Scene,
+    here: Point,
+    time: float,
+    control: Control,
+    value: float,
+    guess: Guess | None = None,
+    share: float = 1.0,
+    rule: Rule | None = None,
+) -> Solved:
+    """Return the point a step ahead.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is prescribed.
+    here : Point
+        Where the step begins.
+    time : float
+        End of the step. [s]
+    control : {"load", "approach"}
+        What is prescribed.
+    value : float
+        Its value at the end. [N or m]
+    guess : tuple, optional
+        First guess of the pressure and its displacement per unit compliance. Default: extrapolated.
+    share : float
+        Part of the usual tolerance of the contact solver.
+    rule : {"linear", "bdf2", "constant"}, optional
+        Rule of the memory.
+
+    Raises
+    ------
+    ConvergenceError
+        If the contact is not solved.
+    """
+    memory, step, area = scene.memory, time - here.time, scene.grid.cell_area
+    prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
+    alpha, gap = prediction.compliance, scene.gap + prediction.carried[0]
+    lowest = scene.lowest(gap)
+    before = (here.time, here.pressure, memory.unit(here.history)) if step > 0 and not here.is_late else None
+    if value == 0 if control == "load" else value <= lowest:
+        nothing = np.zeros(gap.shape)
+        approach = lowest if control == "load" else value
+        history = memory.advance(here.history, prediction, nothing, nothing)
+        return Solved(Point(time, nothing, 0.0, approach, history, before, here.start))
+    pressure, unit = guess or extrapolated(scene, here, step)
+    try:
+        found = solve_contact(
+            prediction.grid or scene.grid,
+            gap,
+            load=value * alpha / area if control == "load" else None,
+            approach=value if control == "approach" else None,
+            tolerance=max(SOLVER_SHARE * scene.tolerance * share, 1e-10),
+            start=alpha * pressure,
+            start_displacement=None if unit is None else alpha * unit,
+            present=scene.present,
+        )
+    except ConvergenceError as error:
+        raise ConvergenceError(
+            f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
+        ) from error
+    pressure, unit = found.pressure / alpha, found.displacement / alpha
+    point = Point(
+        time,
+        pressure,
+        value if control == "load" else found.load / alpha * area,
+        value if control == "approach" else found.approach,
+        memory.advance(here.history, prediction, unit, pressure),
+        before,
+        here.start,
+        False,
+        found.error,
+        found.approach_error,
+    )
+    return Solved(point, found.iterations, found.convolutions)
+
+
+def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
+    """Return the pressure that the last two points extrapolate to, and its unit displacement if known."""
+    now, unit = here.pressure, scene.memory.unit(here.history)
+    if here.before is None or step == 0:
+        return now, unit
+    time, pressure, former = here.before
+    ratio = step / (here.time - time)
+    ahead = now + ratio * (now - pressure)
+    return ahead, None if unit is None or ahead.min() < 0 else unit + ratio * (unit - former)
+
+
+def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
+    """Return a first guess of the coarse solution: the fine one, apart by as much as before the pair."""
+    units = [scene.memory.unit(point.history) for point in (second, coarse, fine)]
+    if coarse is fine or units[0] is None:
+        return second.pressure, units[0]
+    return second.pressure + (coarse.pressure - fine.pressure), units[0] + (units[1] - units[2])
+
+
+def closing_time(scene: Scene, here: Point, segment: Segment, began: float, event: float) -> float:
+    """Return the time up to which the surfaces, apart now, stay apart; the present time if they touch at once. [s]"""
+    now = here.time
+    if segment.control == "load":
+        return event if segment.is_nothing(here.start) else now
+    if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to the undeformed one
+        return event
+
+    def prescribed(time: float) -> float:
+        return segment.value(time - began, here.start)
+
+    def touching(time: float) -> float:
+        return scene.lowest(scene.gap + scene.memory.after_rest(here.history, time - now))
+
+    turns = [began + time for time in segment.turns(now - began, event - began)]
+    first = now
+    for last in (*turns, event):  # the approach is monotone between, and the surface only rises
+        pending = [(first, last)]
+        while pending:
+            left, right = pending.pop()
+            level = touching(right)
+            if max(prescribed(left), prescribed(right)) <= level:
+                continue
+            if right - left <= CLOSING * (event - now):
+                if prescribed(right) > level:
+                    return left if left - now > AT_ONCE * (event - now) else now
+                continue
+            middle = 0.5 * (left + right)
+            pending += [(middle, right), (left, middle)]
+        first = last
+    return event

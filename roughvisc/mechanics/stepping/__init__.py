@@ -1,1 +1,0 @@
-"""The march through time: loading program, state, steps and their errors."""

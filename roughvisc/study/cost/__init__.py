@@ -1,1 +1,0 @@
-"""Predicted steps, time and memory of a case, before it runs."""

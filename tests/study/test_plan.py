@@ -1,0 +1,295 @@
+"""The cost that a plan expects, compared with the cost of the run."""
+
+import math
+import pathlib
+import tracemalloc
+
+import numpy as np
+import psutil
+import pytest
+from support import BALL, refused
+
+import roughvisc as rv
+from roughvisc.errors import EdgeContactError
+from roughvisc.experiment.resources import PROCESS
+from roughvisc.problem import Problem
+from roughvisc.study import plan as plan_module
+from roughvisc.study.statement.case import read_cases, vary
+
+ROUGH = """
+title = "Rough"
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [90, 108]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.5 mm"
+shortcut = "50 um"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.5 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "0.02 N"
+over = "10 ms"
+[[program]]
+hold = "0.5 s"
+[solve]
+boundary = "periodic"
+tolerance = 2e-3
+[keep]
+fields = ["pressure"]
+times = "all"
+"""
+SPHERE = """
+[surface]
+generate = "sphere"
+radius = "10 mm"
+size = "0.3 mm"
+shape = [25, 24]
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "0.4 N"
+over = 0
+[[program]]
+hold = "0.95 s"
+[solve]
+tolerance = 1e-2
+[keep]
+times = 4
+fields = ["pressure"]
+"""
+CURVE = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\npressure = "20 kPa"\nspeeds = ["5 mm/s", "0.2 m/s"]\n'
+CURVE += '[keep]\nfields = ["pressure"]\n'
+RAMP = {"load": 0.02, "over": 0.01}
+CYCLE = {"program": [RAMP, {"cycle": {"mean": 0.02, "amplitude": 0.01, "period": 0.1, "cycles": 3}}]}
+SLIDE = {"program": [RAMP, {"slide": 2e-4, "over": 0.1, "direction": "x"}], "keep.times": 5}
+CASES = {
+    "load": (ROUGH, {}),
+    "slide": (ROUGH, SLIDE),
+    "curve": (CURVE, {}),
+    "growing": (SPHERE, {}),
+    "part": (SPHERE, {"surface.size": 2e-3, "surface.shape": [201, 187], "program.0.load": 5e-3}),
+    "free": (ROUGH, {"solve.boundary": "free", "solve.edge": "accept"}),
+    "approach": (ROUGH, {"program": [{"approach": 3e-6, "over": 0.1}, {"hold": 0.2}]}),
+    "unloaded": (ROUGH, {"program": [RAMP, {"hold": 0.5}, {"load": 0.004, "over": 0.1}]}),
+    "elastic": (ROUGH, {"material": {"model": "elastic", "shear_modulus": 1e6}}),
+}
+QUICK = ("load", "slide", "curve", "growing", "part")
+
+
+@pytest.fixture
+def study(tmp_path):
+    def write(text):
+        path = tmp_path / "study.toml"
+        path.write_text(text)
+        return read_cases(path)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.thorough) for name in CASES]
+)
+def test_plan__is_as_near_to_the_run_as_it_says(study, name):
+    text, changes = CASES[name]
+    case = vary(study(text)[0], changes)
+    planned, ds = rv.plan([case]).isel(case=0), rv.run(case, progress=False)
+    assert str(planned.refusal.values) == ""
+    assert 0.5 < float(planned.convolutions) / int(ds.convolutions.sum()) < 2
+    assert 0.8 < float(planned.rows) / ds.force.size < 1.25
+    assert 1 / 1.2 < pathlib.Path(ds.encoding["source"]).stat().st_size / float(planned.disk) < 1.2
+    assert 1 / 1.2 < float(planned.contact_fraction) / float(ds.contact_fraction.max()) < 1.2
+    assert float(planned.nominal_pressure) == pytest.approx(float(ds.nominal_pressure.max()), rel=0.1)
+    assert (int(planned.cells_x), int(planned.cells_y)) == ds.height.shape
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"surface.shape": [240, 225]},
+        pytest.param(
+            {"surface.shape": [240, 225], "material": {"model": "elastic", "shear_modulus": 1e6}},
+            marks=pytest.mark.thorough,
+        ),
+        pytest.param(
+            {
+                "surface.shape": [240, 225],
+                "material": {
+                    "model": "prony",
+                    "glassy": 3e-7,
+                    "compliances": [1e-7, 2e-7, 1e-7],
+                    "times": [0.01, 0.05, 1],
+                },
+            },
+            marks=pytest.mark.thorough,
+        ),
+        pytest.param(
+            {"surface.shape": [200, 190], "solve.boundary": "free", "solve.edge": "accept"}, marks=pytest.mark.thorough
+        ),
+    ],
+    ids=["zener", "elastic", "three", "free"],
+)
+def test_memory__is_that_of_the_arrays_of_the_run(study, changes):
+    case = vary(study(ROUGH)[0], {"solve.tolerance": 2e-2, "keep.times": 3, "keep.fields": []} | changes)
+    planned = float(rv.plan([case]).memory[0]) - PROCESS
+    rv.run(vary(case, {"surface.shape": [16, 15], "surface.shortcut": 2e-4}), progress=False)  # imports what it needs
+    tracemalloc.start()
+    try:
+        rv.run(case, progress=False)
+        taken = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert 1 / 1.3 < planned / taken < 1.3
+
+
+def test_plan__counts_the_same_on_a_busy_machine(study, monkeypatch):
+    case = study(ROUGH)[0]
+    first = rv.plan([case])
+    clock = iter(range(10**9))
+    monkeypatch.setattr("time.thread_time", lambda: 100.0 * next(clock))  # every look at the clock costs 100 s
+    second = rv.plan([case])
+    for name in ("steps", "convolutions", "rows"):
+        assert first[name].equals(second[name]), name
+
+
+@pytest.mark.parametrize("changes", [{}, CYCLE], ids=["hold", "cycle"])
+def test_coarse_run__is_carried_on_to_the_end(study, monkeypatch, changes):
+    case = vary(study(ROUGH)[0], {"keep.times": 6} | changes)
+    whole = rv.plan([case])
+    monkeypatch.setattr(plan_module, "_MOST_CONVOLUTIONS", int(whole.convolutions[0]) // 3)
+    cut = rv.plan([case])
+    for name, most in (("steps", 2.0), ("convolutions", 2.0), ("contact_fraction", 1.2)):
+        assert 1 / most < float(cut[name][0] / whole[name][0]) < most, name
+    assert float(cut.rows[0]) == 6
+
+
+def test_corrected__is_the_contact_of_persson():
+    """``erf(sqrt(2) p / (E* h'))`` for both slopes."""
+    for pressure in (1e-3, 0.1, 0.6):
+        found, coarse = (math.erf(math.sqrt(2) * pressure / slope) for slope in (1.0, 0.6))
+        assert plan_module.corrected(coarse, 1.0, 0.6) == pytest.approx(found, rel=1e-9)
+    assert plan_module.corrected(1.0, 1.0, 0.6) == 1
+    assert plan_module.corrected(0.3, 0.0, 0.0) == 0.3
+
+
+@pytest.mark.parametrize("step", [{"load": 5e-3}, {"approach": 2e-6}], ids=["load", "approach"])
+def test_elastic_contact__is_that_of_hertz(study, step):
+    """``pi a^2`` with ``a^3 = 3 R F C / 4``, or ``a^2 = R d``, where a load has crept for the whole hold."""
+    (case,) = study(SPHERE)
+    program = vary(case, {"program": [step | {"over": 1e-3}, {"hold": 50.0}]}).program()
+    size, radius, compliance = 1e-3, 1e-2, float(case.material().contact_compliance(50.0))
+    ball = rv.sphere(radius, size, (64, 57))
+    found = plan_module.elastic_contact(Problem(ball, case.body(), case.solving()), program)
+    square = radius * step["approach"] if "approach" in step else (0.75 * radius * step["load"] * compliance) ** (2 / 3)
+    assert found == pytest.approx(math.pi * square / size**2, rel=0.08)
+
+
+def test_free_contact__is_solved_on_a_part_of_the_surface(study):
+    (case,) = study(SPHERE)
+    case = vary(case, {"surface.size": 2e-3, "surface.shape": [201, 187], "program.0.load": 1e-3})
+    planned = rv.plan([case, vary(case, {"solve.edge": "accept"})])
+    assert planned.cells_x.values.tolist() == [201, 201]
+    assert int(planned.solved_cells_x[0]) < 100
+    assert int(planned.solved_cells_x[1]) == 201
+    assert float(planned.contact_fraction[0]) == pytest.approx(float(planned.contact_fraction[1]), rel=0.15)
+    assert planned.memory[0] < planned.memory[1]
+
+
+@pytest.mark.thorough
+def test_plan__names_what_is_modelled(study):
+    base = study(ROUGH)[0]
+    cases = [
+        base,
+        vary(base, {"material": {"model": "elastic", "shear_modulus": 1e6}}),
+        vary(base, {"material": {"model": "power_law", "glassy": 2e-7, "coefficient": 1e-6, "exponent": 0.3}}),
+        vary(base, {"solve.boundary": "free", "solve.edge": "accept", "keep.fields": ["gap"]}),
+    ]
+    planned = rv.plan(cases)
+    assert list(planned.boundary.values) == ["periodic", "periodic", "periodic", "free"]
+    assert list(planned.padded.values) == [False, False, False, True]
+    assert list(planned.exponentials.values[:2]) == [1, 0]
+    assert int(planned.exponentials[2]) > 3
+    assert planned.attrs["refusal"] == ""
+
+
+def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
+    for name in ("_BUDGET", "_SHARE"):
+        monkeypatch.setattr(plan_module, name, 0.0)
+    cases = study(ROUGH + '[sweep]\n"program.0.load" = ["10 mN", "20 mN"]\n')
+    planned = rv.plan(cases)
+    assert list(planned.marched.values) == [True, False]
+    assert float(planned.steps[0]) == float(planned.steps[1])
+    assert list(np.isfinite(planned.contact_fraction.values)) == [True, False]
+    steps = f"{float(planned.steps[0]):.0f}"
+    status, out, _ = invoke("plan", tmp_path / "study.toml")
+    assert status == 0
+    rows = [line.split() for line in out.splitlines() if line.split()[:1] in (["10"], ["20"])]
+    assert [row[1] for row in rows] == [steps, f"~{steps}"]
+    assert planned._repr_html_().count(f">~{steps}<") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"], "nothing is written"
+
+
+def test_full_contact__is_foreseen(study):
+    (case,) = study(ROUGH)
+    light, heavy = (rv.plan([vary(case, {"program.0.load": load})]).isel(case=0) for load in (0.02, 2.0))
+    assert (str(light.warning.values) != "", str(heavy.warning.values) != "") == (False, True)
+    assert float(heavy.contact_fraction) > 0.95
+    assert float(heavy.nominal_pressure) == pytest.approx(2e6)
+
+
+def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
+    surface = (
+        '[surface]\ngenerate = "self_affine"\nsize = "1 mm"\nshape = [40, 36]\nhurst = 0.8\nrms_slope = 0.1\nseed = 1\n'
+    )
+    (rough,) = study(BALL[: BALL.index("[surface]")] + surface + BALL[BALL.index("[material]") :])
+    costs = rv.plan([rough, vary(rough, {"solve.edge": "accept"})])
+    assert list(costs.border_warning.values != "") == [True, False]
+    with pytest.raises(EdgeContactError):
+        rv.run(rough, progress=False)
+
+
+def test_late_times__are_named(study):
+    planned = rv.plan(study(BALL.replace('"200 ms"', '"200 ms", "3 s"')))
+    assert str(planned.late_times[0].values).startswith("3 s left out")
+    assert int(planned.rows[0]) == 3
+
+
+def test_plan__refuses_with_a_reason(study, monkeypatch):
+    (case,) = study(BALL)
+    beyond = vary(case, {"solve.boundary": "periodic", "program": [{"approach": "1 mm", "over": 1}]})
+    planned = rv.plan([case, beyond])
+    assert list(planned.refusal.values != "") == [False, True]
+    assert np.isnan(planned.wall_time[1])
+    with refused("cases", []):
+        rv.plan([])
+
+    class Little:
+        available = 3e8
+
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: Little)
+    assert "--workers 1" in rv.plan([case, vary(case, {"program.0.load": 4e-3})], workers=2).attrs["refusal"]
+    Little.available = 1e6
+    assert "memory" in rv.plan([case]).attrs["refusal"]
+
+    class Full:
+        free = 10
+
+    monkeypatch.setattr(plan_module.shutil, "disk_usage", lambda path: Full)
+    assert "disk" in rv.plan([case]).attrs["refusal"]
+
+
+def test_missing_points__are_refused(study, tmp_path):
+    height = rv.self_affine((40e-6, 30e-6), (40, 30), hurst=0.8, rms_height=1e-7, seed=2)
+    height.values[3, 4] = np.nan
+    height.rename("height").to_netcdf(tmp_path / "scan.nc")
+    surface = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
+    planned = rv.plan(study(ROUGH.replace(surface, 'file = "scan.nc"\n')))
+    assert "missing" in str(planned.refusal[0].item())
