@@ -20,8 +20,8 @@ import numpy as np
 import scipy
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.arrays import threads_of
 from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
+from roughvisc.mechanics.threads import threads_of
 
 try:
     import ducc0

@@ -136,7 +136,7 @@ class Memory:
         carried = np.zeros_like(history.fields)
         for i, mode in enumerate(modes):
             np.multiply(history.modes[i], own[i], out=mode)
-            if earlier[i]:
+            if earlier[i] and history.earlier is not None:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
                 mode += before[i] * history.fields

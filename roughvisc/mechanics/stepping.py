@@ -373,7 +373,8 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             continue
         advance = pair_of_steps if segment.slide is None else pair_of_cells
         steps = advance(scene, state, segment)
-        state = steps[-1].state  # type: ignore[assignment]
+        assert steps[-1].state is not None, "the last step of a pair has the state"
+        state = steps[-1].state
         if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
             steps = steps[:-1]
         yield from steps
@@ -523,8 +524,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         share = added(scene, state, first.point, second.point, once.point, segment)
         factor = PLANNED * max(share, 1e-300) ** (-1 / ORDER)
         lands = scene.keeps(last) or middle == event
-        parts = apart.pressure / force / scene.stated[0], apart.approach / approach / scene.stated[1]
-        at_end = max(parts) if lands else 0.0
+        relative = apart.pressure / force / scene.stated[0], apart.approach / approach / scene.stated[1]
+        at_end = max(relative) if lands else 0.0
         # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
         opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
         if opens and second.point.approach >= fine.approach and taken > shortest:
@@ -736,14 +737,16 @@ def single_step(scene: Scene, state: State, segment: Segment, time: float, presc
         work = at_once_stored(scene, new.point) - at_once_stored(scene, fine)
     after = after_solves(scene, state, new, other, [new, other], work)
     if fine.is_open and new.point.force == 0:
-        clean, other_clean = (
-            one and replace(one, before=None, history=scene.memory.restart(one.history))
-            for one in (after.fine, after.twice)
-        )
-        after = replace(after, fine=clean, twice=other_clean)
+        twice = after.twice and without_past(scene, after.twice)
+        after = replace(after, fine=without_past(scene, after.fine), twice=twice)
     if time == scene.corners[state.segment + 1]:
         after = entered(scene, after)
     return accepted(after, new.point, state.segment)
+
+
+def without_past(scene: Scene, point: Point) -> Point:
+    """Return a point from which nothing is extrapolated."""
+    return replace(point, before=None, history=scene.memory.restart(point.history))
 
 
 def exact_rule(here: Point) -> Rule | None:
@@ -960,10 +963,10 @@ def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
 
 def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
     """Return a first guess of the coarse solution: the fine one, apart by as much as before the pair."""
-    units = [scene.memory.unit(point.history) for point in (second, coarse, fine)]
-    if coarse is fine or units[0] is None:
-        return second.pressure, units[0]
-    return second.pressure + (coarse.pressure - fine.pressure), units[0] + (units[1] - units[2])
+    unit, of_coarse, of_fine = (scene.memory.unit(point.history) for point in (second, coarse, fine))
+    if coarse is fine or unit is None or of_coarse is None:
+        return second.pressure, unit
+    return second.pressure + (coarse.pressure - fine.pressure), unit + (of_coarse - of_fine)
 
 
 def closing_time(scene: Scene, here: Point, segment: Segment, began: float, event: float) -> float:

@@ -7,8 +7,8 @@ from strategies import examples, seeds, shapes
 from support import direct, refused
 
 import roughvisc as rv
-from roughvisc.mechanics import arrays
 from roughvisc.mechanics import grid as grids
+from roughvisc.mechanics import threads
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid, transform_library
 from roughvisc.mechanics.sliding.steady import Sliding
@@ -95,7 +95,7 @@ def test_inverse__inverts_what_is_far_from_the_border(boundary):
 @pytest.fixture
 def in_small_blocks(monkeypatch):
     """Blocks and threads as on a large grid."""
-    monkeypatch.setattr(arrays, "_THREADED", 1)
+    monkeypatch.setattr(threads, "THREADED_FROM", 1)
     for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
 
@@ -107,9 +107,9 @@ def test_fields__do_not_depend_on_blocks_and_threads(boundary, kind, request):
     whole = Grid((65, 70), (1.0, 1.0), boundary)
     fields = [(whole.displacement(pressure), whole.inverse(pressure.astype(np.float32)))]
     request.getfixturevalue("in_small_blocks")
-    for threads in (1, 2, 3):
-        grid = Grid((65, 70), (1.0, 1.0), boundary, workers=threads)
-        assert grid.threads == threads
+    for count in (1, 2, 3):
+        grid = Grid((65, 70), (1.0, 1.0), boundary, workers=count)
+        assert grid.threads == count
         fields.append((grid.displacement(pressure), grid.inverse(pressure.astype(np.float32))))
     for others in fields[1:]:
         for field, other in zip(fields[0], others, strict=True):

@@ -36,10 +36,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.arrays import threads_of
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import transforms
 from roughvisc.mechanics.sliding.gmres import gmres
+from roughvisc.mechanics.threads import threads_of
 
 Array = NDArray[np.float64]
 

@@ -1,39 +1,17 @@
-"""Work on a grid by blocks: what NumPy does at once, whatever the blocks and the threads."""
+"""Threads: the same bits on any number of them."""
 
 import numpy as np
 import pytest
 
-from roughvisc.mechanics import arrays
 from roughvisc.mechanics import grid as grids
+from roughvisc.mechanics import threads as threading
 from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.grid import Grid
-
-THREADS = pytest.mark.parametrize("threads", [1, 2, 3])
-
-
-@pytest.fixture(autouse=True)
-def in_small_parts(monkeypatch):
-    monkeypatch.setattr(arrays, "_BLOCK", 13)
-
-
-@THREADS
-@pytest.mark.parametrize("error", [KeyError, IndexError])
-def test_error_in_a_part__ends_all(threads, error):
-    done = []
-
-    def work(part):
-        if part == 5:
-            raise error("of the part")
-        done.append(part)
-
-    with pytest.raises(error, match="of the part"):
-        arrays.parallel_map(work, range(1000), threads)
-    assert len(done) < 1000 - 1
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
 def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
-    monkeypatch.setattr(arrays, "_THREADED", 1)
+    monkeypatch.setattr(threading, "THREADED_FROM", 1)
     for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
     monkeypatch.setattr(solver, "BLOCKS_FROM", 1)
