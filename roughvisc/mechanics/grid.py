@@ -41,6 +41,15 @@ BLOCKS_FROM = 1024**2
 COARSE = 8
 
 
+def namespace(array: Array) -> Any:
+    """Return the module whose functions work on an array: NumPy, or CuPy for an array on a device."""
+    if isinstance(array, np.ndarray):
+        return np
+    import cupy
+
+    return cupy
+
+
 class Grid:
     """Rectangular cells of a body's surface. Two threads may not use one grid at the same time.
 
@@ -150,7 +159,7 @@ class Grid:
         """Block of each cell on the coarse grid, as flat indices."""
         xp = self.xp
         rows, columns = (xp.arange(n) * m // n for n, m in zip(self.shape, self.coarse.shape, strict=True))
-        return (rows[:, None] * self.coarse.shape[1] + columns).astype(xp.int32).reshape(-1)
+        return (rows[:, None] * self.coarse.shape[1] + columns).astype(np.int32).reshape(-1)
 
     def symbol_of(self, kernel: Kernel) -> np.ndarray:
         """Return the transform of a kernel of either sign at non-negative wave numbers. [m]"""
@@ -411,10 +420,17 @@ def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
 def transforms(threads: int = 1, xp: Any = np) -> Transforms:
     """Return the transforms of arrays of NumPy, or of CuPy."""
     if xp is not np:
-        from cupyx.scipy import fft
-
-        return Transforms(fft)
+        return Transforms(fft_of(xp))
     return DuccTransforms(threads) if has_ducc0() else Transforms(scipy.fft, workers=threads)
+
+
+def fft_of(xp: Any) -> Any:
+    """Return ``scipy.fft``, or the module of CuPy with the same functions."""
+    if xp is np:
+        return scipy.fft
+    from cupyx.scipy import fft
+
+    return fft
 
 
 def has_ducc0() -> bool:

@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import LayerSeries
 from roughvisc.mechanics.memory import History, Memory, Prediction, Rule
@@ -48,29 +49,34 @@ class LayerMemory(Memory):
     @cached_property
     def instantaneous(self) -> Array:
         """Symbol of the instantaneous response. [m/Pa]"""
-        return self.grid.symbol_of(self.waves.kernel())
+        return self._symbol_of(self.waves.kernel())
 
     @cached_property
     def symbols(self) -> list[Array]:
         """Symbol of each exponential [m/Pa], and last of the fluidity [m/(Pa s)]."""
-        return [self.grid.symbol_of(self.waves.kernel(one, 0.0)) for one in np.eye(self.times.size)]
+        return [self._symbol_of(self.waves.kernel(one, 0.0)) for one in np.eye(self.times.size)]
+
+    def _symbol_of(self, kernel: Kernel) -> Array:
+        """Return the transform of a kernel on the device of the grid."""
+        return self.grid.xp.asarray(self.grid.symbol_of(kernel))
 
     def remaining(self, time: float) -> float:
         """Return one: each wave fades in its own way."""
         return 1.0
 
-    def start(self, shape: tuple[int, int]) -> History:
-        """Return the memory of an undisturbed body."""
-        nothing = self.grid.spectrum(np.zeros(shape))[None]
-        return History(nothing, np.zeros((self.times.size, *nothing.shape), nothing.dtype))
+    def start(self, nothing: Array) -> History:
+        """Return the memory of an undisturbed body, under a pressure of zeros, shape (nx, ny)."""
+        fields = self.grid.spectrum(nothing)[None]
+        return History(fields, self.grid.xp.zeros((self.times.size, *fields.shape), fields.dtype))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
         own, earlier, before, new = self.recursion(step, history.step, rule or self.rule(history, step))
-        modes = np.empty_like(history.modes)
-        carried, symbol = np.zeros_like(history.fields[0]), self.instantaneous.copy()
+        xp = self.grid.xp
+        modes = xp.empty_like(history.modes)
+        carried, symbol = xp.zeros_like(history.fields[0]), self.instantaneous.copy()
         for i, mode in enumerate(modes):
-            np.multiply(history.modes[i], own[i], out=mode)
+            xp.multiply(history.modes[i], own[i], out=mode)
             if earlier[i] and history.earlier is not None:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
@@ -108,7 +114,7 @@ class LayerMemory(Memory):
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
         own = self.recursion(time, 0.0, "linear")[0]
-        total = np.zeros_like(history.fields[0])
+        total = self.grid.xp.zeros_like(history.fields[0])
         for part, mode, symbol in zip(own, history.modes, self.symbols, strict=True):
             total += part * self._response(mode[0], symbol)
         return self.grid.field_of(total)

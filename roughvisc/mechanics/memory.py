@@ -25,6 +25,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from roughvisc.mechanics.grid import namespace
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 
 Array = Any  # an array of NumPy or CuPy
@@ -124,18 +125,19 @@ class Memory:
         """Return whether the body creeps so far within a step that ``v`` cannot be linear in it."""
         return step > 0 and self.compliance(step) > STIFF * self.glassy
 
-    def start(self, shape: tuple[int, int]) -> History:
-        """Return the memory of an undisturbed body."""
-        return History(np.zeros((self.fields, *shape)), np.zeros((self.times.size, self.fields, *shape)))
+    def start(self, nothing: Array) -> History:
+        """Return the memory of an undisturbed body, under a pressure of zeros, shape (nx, ny)."""
+        xp, shape = namespace(nothing), nothing.shape
+        return History(xp.zeros((self.fields, *shape)), xp.zeros((self.times.size, self.fields, *shape)))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step. [s]"""
         rule = rule or self.rule(history, step)
         own, earlier, before, new = self.recursion(step, history.step, rule)
-        modes = np.empty_like(history.modes)
-        carried = np.zeros_like(history.fields)
+        xp = namespace(history.modes)
+        modes, carried = xp.empty_like(history.modes), xp.zeros_like(history.fields)
         for i, mode in enumerate(modes):
-            np.multiply(history.modes[i], own[i], out=mode)
+            xp.multiply(history.modes[i], own[i], out=mode)
             if earlier[i] and history.earlier is not None:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
@@ -156,7 +158,7 @@ class Memory:
         pressure : array, shape (nx, ny)
             Pressure at the end. [Pa]
         """
-        fields = unit[None] if self.fields == 1 else np.stack([unit, pressure])
+        fields = unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
         if prediction.step == 0:
             return History(fields, history.modes)
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
@@ -181,7 +183,7 @@ class Memory:
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
         own = self.recursion(time, 0.0, "linear")[0]
-        total = np.zeros_like(history.fields[0])
+        total = namespace(history.fields).zeros_like(history.fields[0])
         for compliance, mode in zip(self.compliances * own, history.modes, strict=True):
             total += compliance * mode[0]
         return total
@@ -194,7 +196,7 @@ class Memory:
         """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
 
         def rolled(fields: Array) -> Array:
-            return np.roll(fields, -cells, axis - 2)
+            return namespace(fields).roll(fields, -cells, axis - 2)
 
         earlier = None if history.earlier is None else rolled(history.earlier)
         return History(rolled(history.fields), rolled(history.modes), earlier, history.step)

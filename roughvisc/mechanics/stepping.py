@@ -22,8 +22,6 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
@@ -398,10 +396,10 @@ def inside_pair(state: State, point: Point, apart: Difference, work: float) -> S
 
 def at_rest(scene: Scene) -> State:
     """Return the state before the program begins."""
-    nothing = np.zeros(scene.gap.shape)
+    nothing = scene.grid.xp.zeros(scene.gap.shape)
     given = bool(scene.program.segments) and scene.program.segments[0].control == "approach"
     approach = 0.0 if given else scene.lowest(scene.gap)
-    point = Point(0.0, nothing, 0.0, approach, scene.memory.start(scene.gap.shape))
+    point = Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing))
     return State(point)
 
 
@@ -575,7 +573,7 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     def over(point: Point, number: int, time: float, guess: Guess, share: float) -> Solved:
         history = scene.memory.roll(point.history, slide.sense * number, slide.axis)
-        pressure = np.roll(point.pressure, -slide.sense * number, slide.axis)
+        pressure = grid.xp.roll(point.pressure, -slide.sense * number, slide.axis)
         body = replace(point, history=history, pressure=pressure, before=None)
         return take_step(scene, body, time, segment.control, segment.value(time - began, point.start), guess, share)
 
@@ -914,7 +912,7 @@ def take_step(
     lowest = scene.lowest(gap)
     before = (here.time, here.pressure, memory.unit(here.history)) if step > 0 and not here.is_late else None
     if value == 0 if control == "load" else value <= lowest:
-        nothing = np.zeros(gap.shape)
+        nothing = scene.grid.xp.zeros(gap.shape)
         approach = lowest if control == "load" else value
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Solved(Point(time, nothing, 0.0, approach, history, before, here.start))

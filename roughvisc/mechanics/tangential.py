@@ -10,15 +10,14 @@ of the profile does.
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy import fft
+import scipy
 
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.grid import Grid, fft_of, namespace
 from roughvisc.mechanics.program import Slide
 
-Array = NDArray[np.float64]
+Array = Any  # an array of NumPy or CuPy
 
 
 def slope(field: Array, side: float, axis: int) -> Array:
@@ -26,7 +25,7 @@ def slope(field: Array, side: float, axis: int) -> Array:
 
     Parameters
     ----------
-    field : ndarray, shape (nx, ny)
+    field : array, shape (nx, ny)
         Of any unit.
     side : float
         Of a cell along the axis. [m]
@@ -35,15 +34,16 @@ def slope(field: Array, side: float, axis: int) -> Array:
 
     Returns
     -------
-    ndarray, shape (nx, ny)
+    array, shape (nx, ny)
         The shortest wave of an even number of cells has none. [unit of the field / m]
     """
-    count = field.shape[axis]
-    waves = 2 * math.pi * fft.rfftfreq(count, side)
+    xp, count = namespace(field), field.shape[axis]
+    fft, waves = fft_of(xp), 2 * math.pi * scipy.fft.rfftfreq(count, side)
     if count % 2 == 0:
         waves[-1] = 0.0
     waves = waves[:, None] if axis == 0 else waves
-    return np.asarray(fft.irfft(fft.rfft(field, axis=axis) * (1j * waves), n=count, axis=axis, overwrite_x=True))
+    spectrum = fft.rfft(field, axis=axis) * xp.asarray(1j * waves)
+    return fft.irfft(spectrum, n=count, axis=axis, overwrite_x=True)
 
 
 def tangential_force(operator: Grid, pressure: Array, displacement: Array, slide: Slide) -> float:
@@ -53,7 +53,7 @@ def tangential_force(operator: Grid, pressure: Array, displacement: Array, slide
     ----------
     operator : Grid
         The body, periodic.
-    pressure, displacement : ndarray, shape (nx, ny)
+    pressure, displacement : array, shape (nx, ny)
         [Pa], [m]
     slide : Slide
         The motion.
@@ -74,4 +74,4 @@ def force_across(operator: Grid, pressure: Array, displacement: Array, slide: Sl
 def _force_along(operator: Grid, pressure: Array, displacement: Array, axis: int) -> float:
     """Component along an axis of the force that holds the profile. [N]"""
     inclined = slope(displacement, operator.spacing[axis], axis)
-    return -float(np.sum(pressure * inclined)) * operator.cell_area
+    return -float((pressure * inclined).sum()) * operator.cell_area

@@ -29,7 +29,7 @@ def memory_of(pair, boundary="periodic", thickness=1e-4):
 
 def marched(memory, steps, fields, grid, rule=None):
     """Displacement after each step, by the prediction before it and from the memory after it."""
-    history, found = memory.start(SHAPE), []
+    history, found = memory.start(np.zeros(SHAPE)), []
     for step, pressure in zip(steps, fields, strict=True):
         prediction = memory.predict(history, step, rule)
         kernel = prediction.grid or grid
@@ -49,7 +49,7 @@ def test_equal_materials__have_the_memory_of_a_half_space(boundary, material, ru
     half_space, fields = Memory(material, DURATION), pressures(len(STEPS))
 
     def displaced(memory):
-        history, found = memory.start(SHAPE), []
+        history, found = memory.start(np.zeros(SHAPE)), []
         for number, (step, pressure) in enumerate(zip(STEPS, fields, strict=True)):
             used = "constant" if rule == "bdf2" and (number < 2 or not memory.may_ring) else rule
             prediction = memory.predict(history, step, used)
@@ -112,7 +112,7 @@ def test_restart__forgets_the_last_step_alone():
 
 def test_kernel_of_a_step__is_positive():
     memory = memory_of(PAIRS["rubber on polymer"], "free")
-    kernel = memory.predict(memory.start(SHAPE), DURATION).grid
+    kernel = memory.predict(memory.start(np.zeros(SHAPE)), DURATION).grid
     matrix = np.array([kernel.displacement(one.reshape(SHAPE)).ravel() for one in np.eye(SHAPE[0] * SHAPE[1])])
     np.testing.assert_allclose(matrix, matrix.T, atol=1e-12 * matrix.max())
     assert linalg.eigvalsh(matrix).min() > 0
@@ -122,4 +122,4 @@ def test_elastic_layers__have_no_history():
     memory = memory_of((rv.elastic(1e6), rv.elastic(1e8, 0.3)))
     assert memory.is_elastic
     assert not memory.may_ring
-    assert memory.start(SHAPE).modes.shape[0] == 0
+    assert memory.start(np.zeros(SHAPE)).modes.shape[0] == 0

@@ -31,12 +31,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.grid import Grid, namespace
 
-Array = NDArray[Any]
+Array = Any  # an array of NumPy or CuPy, as the grid has them
 
 #: A step is at most this many times its trial: the periodic kernel does not resist a uniform pressure.
 LONGEST_STEP = 30.0
@@ -68,9 +67,9 @@ class ContactState(NamedTuple):
 
     Attributes
     ----------
-    pressure : ndarray, shape (nx, ny)
+    pressure : array, shape (nx, ny)
         Pressure over the contact modulus, zero outside the contact. [-]
-    displacement : ndarray, shape (nx, ny)
+    displacement : array, shape (nx, ny)
         Displacement under this pressure. [m]
     approach : float
         Rigid-body approach ``omega``: the gap is ``g + displacement - omega``. [m]
@@ -116,17 +115,17 @@ def solve_contact(
     ----------
     grid : Grid
         Cells, boundary and body.
-    gap : ndarray, shape (nx, ny)
+    gap : array, shape (nx, ny)
         Gap without pressure at zero approach; ignored at absent cells. [m]
     load, approach : float
         Sum of the pressure over the cells [-], or rigid-body approach [m]; exactly one.
     tolerance : float
         Largest estimated relative error of the pressure, L1 norm. At least 1e-11 or so, because of rounding.
-    start : ndarray, shape (nx, ny), optional
+    start : array, shape (nx, ny), optional
         First guess of the pressure; negative values count as zero. [-]
-    start_displacement : ndarray, shape (nx, ny), optional
+    start_displacement : array, shape (nx, ny), optional
         Displacement under `start`, if known to 1e-6 or so; saves a convolution. [m]
-    present : ndarray of bool, shape (nx, ny), optional
+    present : array of bool, shape (nx, ny), optional
         Cells with material. Default: all.
     max_iterations : int
         Limit of the iterations.
@@ -140,7 +139,7 @@ def solve_contact(
     """
     if (load is None) == (approach is None):
         raise ValueError("expected either load or approach")
-    under_load, before = load is not None, grid.convolutions
+    xp, under_load, before = grid.xp, load is not None, grid.convolutions
     present = None if present is None or present.all() else present.reshape(-1)
     start = start if start is not None and (start > 0).any() else None
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
@@ -160,9 +159,9 @@ def solve_contact(
 
     # First guess: the given one, else uniform, or the overlap of the surfaces.
     if start is not None:
-        pressure = np.maximum(start.reshape(-1), 0) / unit
+        pressure = xp.maximum(start.reshape(-1), 0) / unit
     else:
-        pressure = np.ones(gap.size) if under_load else np.maximum(level - given, 0) / grid.stiffest
+        pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.stiffest
     if present is not None:
         pressure[~present] = 0
     scale = 1 / float(pressure.sum()) if under_load else 1.0
@@ -176,8 +175,8 @@ def solve_contact(
     def without_mean(vector: Array) -> Array:
         return vector - vector.mean() if under_load else vector
 
-    on_grid, on_grid32 = Scatter(gap.shape, np.float64), Scatter(gap.shape, np.float32)
-    contact = np.flatnonzero(pressure)
+    on_grid, on_grid32 = (Scatter(xp.zeros(gap.shape, number)) for number in (np.float64, np.float32))
+    contact = xp.flatnonzero(pressure)
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
     requested_size, requested_gap = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
     length, error, best, stalled, is_single = 1.0, math.inf, math.inf, 0, False
@@ -185,7 +184,7 @@ def solve_contact(
         # No gap is left under a given approach: the energy falls if all cells carry less.
         if is_blind and contact.size == gap.size:
             pressure -= pressure.min()
-            contact, previous = np.flatnonzero(pressure), None
+            contact, previous = xp.flatnonzero(pressure), None
 
         # Approach of the present contact, equation (7) of the paper, and the cells that may change, (13) and (14).
         level = float(separation[contact].mean()) if under_load else level
@@ -193,18 +192,18 @@ def solve_contact(
         if present is not None:
             free &= present
         free[contact] = True
-        cells = np.flatnonzero(free)
+        cells = xp.flatnonzero(free)
         held, at = pressure[cells], separation[cells]
         residual = without_mean(at - level)
-        size = float(np.abs(residual).max(initial=0.0))
-        total, lowest, highest = float(held.sum()), float(at.min(initial=level)), float(np.abs(at).max(initial=0.0))
+        size, total = largest(abs(residual)), float(held.sum())
+        lowest, highest = -largest(-at, -level), largest(abs(at))
         weighted = inner(held, at)
         energy = max(weighted - inner(held, given[cells]), 0.0)
         if under_load:
             duality = max(weighted - lowest * total, 0.0)
         else:
             duality = abs(weighted - level * total) + total * (level - lowest)
-        rounding = ROUNDING * total * (highest + grid.self_influence * float(held.max(initial=0.0)))
+        rounding = ROUNDING * total * (highest + grid.self_influence * largest(held))
 
         # The last requested change of pressure estimates the error, reduced as the duality gap has fallen since.
         if size == 0:
@@ -231,7 +230,7 @@ def solve_contact(
             direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
         direction = without_mean(direction)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
-        requested_size, requested_gap = caution * float(np.abs(direction).sum()), max(duality, 1e-300)
+        requested_size, requested_gap = caution * float(abs(direction).sum()), max(duality, 1e-300)
         if iteration == 0:
             is_single = gap.size >= SINGLE_FROM and requested_size > FAR * tolerance * total
 
@@ -247,7 +246,7 @@ def solve_contact(
         # Trial: cut at zero pressure, equation (12), and scaled to the load, (15).
         slope = 0.0
         while stalled < PATIENCE and length >= SHORTEST_STEP:
-            trial = np.maximum(held - length * direction, 0)
+            trial = xp.maximum(held - length * direction, 0)
             carried = float(trial.sum()) if under_load else 1.0
             if carried > 0:
                 trial /= carried
@@ -258,7 +257,7 @@ def solve_contact(
             length, previous = length / 4, None
         if not slope < 0:
             moved = held - residual / grid.stiffest
-            trial = onto_simplex(moved, 1.0) if under_load else np.maximum(moved, 0)
+            trial = onto_simplex(moved, 1.0) if under_load else xp.maximum(moved, 0)
             change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
             slope = inner(change, residual)
             if not slope < 0 and is_single:
@@ -273,9 +272,9 @@ def solve_contact(
 
         # Least energy along the trial, equation (11): one convolution.
         if is_single:
-            largest = float(np.abs(change).max())
-            response = grid.displacement(on_grid32(change / largest, cells)).reshape(-1)
-            response *= largest
+            most = largest(abs(change))
+            response = grid.displacement(on_grid32(change / most, cells)).reshape(-1)
+            response *= most
         elif is_extrapolated:  # replaces the displacement of the first guess, so that its rounding does not pile up
             response = grid.displacement(on_grid(trial, cells)).reshape(-1) - (separation - given)
         else:
@@ -284,7 +283,7 @@ def solve_contact(
         minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
         fraction, was_cut = admissible_fraction(held, trial, change, minimum)
         if fraction != 1:
-            trial = np.maximum(held + fraction * change, 0)
+            trial = xp.maximum(held + fraction * change, 0)
         pressure[cells] = trial
         contact = cells[trial > 0]
         previous = (cells, change, response, curvature) if curvature > 0 else None
@@ -313,20 +312,20 @@ def solve_contact(
 def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     """Return the pressure of the same problem on half as many cells a side, on the cells of the grid. [-]"""
     shape = (gap.shape[0] // 2, gap.shape[1] // 2)
-    coarse, sides = grid.on(shape), list(zip(gap.shape, shape, strict=True))
-    rows, columns = (-(-np.arange(m) * n // m) for n, m in sides)  # of an odd number, one is left out
-    few = np.mean([gap[np.ix_(rows + i, columns + j)] for i in (0, 1) for j in (0, 1)], axis=0)
+    xp, coarse, sides = grid.xp, grid.on(shape), list(zip(gap.shape, shape, strict=True))
+    rows, columns = (-(-xp.arange(m) * n // m) for n, m in sides)  # of an odd number, one is left out
+    few = xp.stack([gap[xp.ix_(rows + i, columns + j)] for i in (0, 1) for j in (0, 1)]).mean(axis=0)
     found = solve_contact(coarse, few, load=load * few.size / gap.size, tolerance=COARSE_TOLERANCE)
     grid.convolutions += found.convolutions
-    rows, columns = (np.arange(n) * m // n for n, m in sides)
-    return found.pressure[np.ix_(rows, columns)]
+    rows, columns = (xp.arange(n) * m // n for n, m in sides)
+    return found.pressure[xp.ix_(rows, columns)]
 
 
 class Scatter:
     """A field of zeros that takes the values of some cells."""
 
-    def __init__(self, shape: tuple[int, ...], number: Any) -> None:
-        self.field = np.zeros(shape, number)
+    def __init__(self, zeros: Array) -> None:
+        self.field = zeros
         self.cells: Array | slice = slice(0, 0)
 
     def __call__(self, values: Array, cells: Array) -> Array:
@@ -348,17 +347,22 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
     if minimum <= 1:
         return minimum, False
     shrinking = change < 0
-    steepest = float((-change[shrinking] / held[shrinking]).max(initial=0.0))
+    steepest = largest(-change[shrinking] / held[shrinking])
     limit = 1 / steepest if steepest > 0 else math.inf
     return min(minimum, limit), minimum > limit
 
 
 def onto_simplex(values: Array, total: float) -> Array:
     """Return the nearest non-negative vector of given sum."""
-    shifted = values - values.max()  # a small sum is lost beside large values otherwise
-    ordered = np.sort(shifted)[::-1]
-    excess = (np.cumsum(ordered) - total) / np.arange(1, ordered.size + 1)
-    return np.asarray(np.maximum(shifted - excess[int((ordered > excess).sum()) - 1], 0))
+    xp, shifted = namespace(values), values - values.max()  # a small sum is lost beside large values otherwise
+    ordered = xp.sort(shifted)[::-1]
+    excess = (xp.cumsum(ordered) - total) / xp.arange(1, ordered.size + 1)
+    return xp.maximum(shifted - excess[int((ordered > excess).sum()) - 1], 0)
+
+
+def largest(values: Array, least: float = 0.0) -> float:
+    """Return the largest value, but at least a given one; a vector may be empty."""
+    return max(float(values.max()), least) if values.size else least
 
 
 def inner(one: Array, other: Array) -> float:
@@ -384,18 +388,18 @@ def opening_pressure(
 
     Zero if no cell is open. Absent cells are as open as the widest gap.
     """
-    opening = np.maximum(separation - level, 0)
+    opening = grid.xp.maximum(separation - level, 0)
     opening.reshape(-1)[contact] = 0
     if present is not None:
         absent = ~present.reshape(opening.shape)
         opening[absent] = 0
-        opening[absent] = opening.max() or 1.0
+        opening[absent] = float(opening.max()) or 1.0
     mean = float(opening.mean())
     if not mean > 0:
         return opening, opening
     opening /= mean
-    largest = float(opening.max())
-    return opening, grid.inverse(((opening - 1) / largest).astype(np.float32)).astype(float) * largest
+    widest = float(opening.max())
+    return opening, grid.inverse(((opening - 1) / widest).astype(np.float32)).astype(float) * widest
 
 
 def load_error(
@@ -410,10 +414,10 @@ def load_error(
     opening, pressure = opening_pressure(grid, separation, contact, level, present)
     if not opening.any():
         return math.inf
-    closed = np.minimum(separation - level, 0)
+    closed = grid.xp.minimum(separation - level, 0)
     if present is not None:
         closed[~present.reshape(closed.shape)] = 0
-    off = float(np.maximum(separation.reshape(-1)[contact] - level, 0).sum()) - float(closed.sum())
+    off = float(grid.xp.maximum(separation.reshape(-1)[contact] - level, 0).sum()) - float(closed.sum())
     return inner(opening, pressure) * off / separation.size / total
 
 
@@ -434,7 +438,7 @@ def level_under_load(
             return full
         flat = opens.reshape(-1)
         outside = (float(flat.sum()) - float(flat[contact].sum())) / (flat.size - contact.size)
-        weight = np.maximum(outside - flat[contact], 0)
+        weight = grid.xp.maximum(outside - flat[contact], 0)
     excess = separation.reshape(-1)[contact] - level
     return min(level + inner(weight, excess) / float(weight.sum()), full)
 
@@ -466,9 +470,9 @@ class LongWaves(NamedTuple):
     ----------
     blocks : Grid
         The blocks.
-    block : ndarray of int
+    block : array of int
         Block of each free cell.
-    free : ndarray
+    free : array
         Number of free cells of each block.
     part : float
         Area of a cell over that of a block.
@@ -491,20 +495,21 @@ class LongWaves(NamedTuple):
         """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
         if min(grid.shape) < BLOCKS_FROM or cells.size > SPARSE * grid.size:
             return None
-        blocks = grid.coarse
+        xp, blocks = grid.xp, grid.coarse
         block = grid.block_of_cell.take(cells)
-        free = np.bincount(block, minlength=blocks.size).astype(float)
+        free = xp.bincount(block, minlength=blocks.size).astype(float)
         whole = float(free[free > 0.98 * grid.size / blocks.size].sum())
         if (1 - whole / max(cells.size, 1)) * min(blocks.shape) < SPOTS:
             return None
         found = cls(blocks, block, free, grid.cell_area / blocks.cell_area, 0.0)
-        loads = np.bincount(block, held, blocks.size)
-        smooth, spread = inner(loads, found.displacement(loads)), float((loads * loads / np.maximum(free, 1)).sum())
+        loads = xp.bincount(block, held, blocks.size)
+        smooth, spread = inner(loads, found.displacement(loads)), float((loads * loads / xp.maximum(free, 1)).sum())
         return found._replace(local=LOCAL_SHARE * (energy - smooth) / spread) if energy > smooth else None
 
     def means(self, values: Array) -> Array:
         """Return the mean over the free cells of each block; zero if there are none."""
-        return np.asarray(np.bincount(self.block, values, self.free.size) / np.maximum(self.free, 1))
+        xp = self.blocks.xp
+        return xp.bincount(self.block, values, self.free.size) / xp.maximum(self.free, 1)
 
     def displacement(self, loads: Array) -> Array:
         """Return the displacement of the blocks under their loads. [m]"""
@@ -512,10 +517,10 @@ class LongWaves(NamedTuple):
 
     def pressure(self, residual: Array) -> Array:
         """Return the pressure of each block that displaces it by the mean residual: conjugate gradients."""
-        free, local = self.free, self.local
-        diagonal = np.where(free > 0, free * local + free * free * self.blocks.self_influence * self.part, 1)
-        left: Array = np.bincount(self.block, residual, free.size)
-        found, eased = np.zeros_like(left), left / diagonal
+        xp, free, local = self.blocks.xp, self.free, self.local
+        diagonal = xp.where(free > 0, free * local + free * free * self.blocks.self_influence * self.part, 1)
+        left = xp.bincount(self.block, residual, free.size)
+        found, eased = xp.zeros_like(left), left / diagonal
         search, squared = eased, inner(left, eased)
         enough = BLOCK_TOLERANCE**2 * squared
         for _ in range(BLOCK_ITERATIONS):
