@@ -1,8 +1,8 @@
 """A stand-in for CuPy and its device: NumPy's arrays behind a class that refuses whatever CuPy refuses.
 
-Plain arrays do not mix with arrays of the device, in no operation. Only :meth:`DeviceArray.get` copies an array to the
-host, and only :func:`asarray` copies one to the device; a single value becomes a number by ``float``, ``int`` or
-``bool``. What CuPy lacks is refused too: other methods of ufuncs than the call, and ``initial`` and ``where``.
+Plain arrays do not mix with arrays of the device, in no operation. Only :meth:`DeviceArray.get` and ``tolist`` copy an
+array to the host, and only :func:`asarray` copies one to the device; a single value becomes a number by ``float``,
+``int`` or ``bool``. What CuPy lacks is refused too: other methods of ufuncs than the call, ``initial`` and ``where``.
 """
 
 import sys
@@ -92,14 +92,14 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
     )
 
 
-for name in ("all", "any", "astype", "copy", "max", "mean", "min", "reshape", "sum", "take"):
+for name in ("all", "any", "astype", "copy", "max", "mean", "min", "reshape", "sum", "take", "tolist"):
     setattr(DeviceArray, name, on_device(getattr(np.ndarray, name)))
 
 #: Functions of the device.
 NAMES = [
-    *("abs", "arange", "ascontiguousarray", "bincount", "concatenate", "cumsum", "empty", "empty_like", "exp"),
-    *("flatnonzero", "ix_", "maximum", "minimum", "multiply", "ones", "pad", "roll", "sort", "sqrt", "stack", "take"),
-    *("where", "zeros", "zeros_like"),
+    *("abs", "arange", "ascontiguousarray", "bincount", "concatenate", "cumsum", "einsum", "empty", "empty_like"),
+    *("exp", "flatnonzero", "full", "ix_", "maximum", "minimum", "multiply", "ones", "ones_like", "pad", "ptp"),
+    *("roll", "sort", "sqrt", "stack", "take", "where", "zeros", "zeros_like"),
 ]
 globals().update({name: on_device(getattr(np, name)) for name in NAMES})
 fft = SimpleNamespace(

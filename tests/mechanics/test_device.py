@@ -1,4 +1,4 @@
-"""Contact and time steps on arrays of a device, by a stand-in for CuPy: the results of NumPy's arrays, to rounding."""
+"""Contact, time steps and steady sliding on a stand-in for CuPy's arrays: the results of NumPy's, to rounding."""
 
 from dataclasses import replace
 
@@ -8,11 +8,13 @@ import pytest
 import support
 
 import roughvisc as rv
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.layer import Layers, layer_series
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
+from roughvisc.mechanics.sliding.steady import Sliding, steady_state
 from roughvisc.mechanics.stepping import Scene, march
 from roughvisc.mechanics.tangential import force_across, tangential_force
 
@@ -186,6 +188,31 @@ def test_creeping_layer__is_the_same_on_a_device(xp, boundary, program):
     scene = replace(scene, memory=LayerMemory(waves, program.duration, scene.grid))
     other = on_device(scene, xp)
     assert_same_march(scene, replace(other, memory=LayerMemory(waves, program.duration, other.grid)))
+
+
+# ------------------------------------------------------------------------------------------------------ steady sliding
+
+
+@pytest.mark.parametrize("load", [0.5, 5.0, 500.0], ids=["sparse", "partial", "full"])
+def test_steady_sliding__is_the_same_on_a_device(xp, load):
+    gap = support.rough_gap(SHAPE, slope=0.1)
+    body = Body(ZENER, HALF_SPACE)
+    of_host, of_device = Sliding(body, SHAPE, SPACING, 3.0), Sliding(body, SHAPE, SPACING, 3.0, xp)
+    found = steady_state(of_host, gap, load, tolerance=1e-5)
+    other = steady_state(of_device, xp.asarray(gap), load, tolerance=1e-5)
+    assert found.converged
+    assert found.vectors > 3
+    assert (other.converged, other.iterations, other.vectors) == (True, found.iterations, found.vectors)
+    assert_equal(other.pressure, found.pressure)
+    assert_equal(other.displacement, found.displacement)
+    assert other.power_force == pytest.approx(found.power_force, rel=1e-12)
+    assert of_device.force_across(other.pressure) == pytest.approx(of_host.force_across(found.pressure), rel=1e-9)
+
+
+def test_steady_sliding_of_a_flat_surface__is_the_same_on_a_device(xp):
+    sliding = Sliding(Body(ZENER, HALF_SPACE), SHAPE, SPACING, 3.0, xp)
+    found = steady_state(sliding, xp.zeros(SHAPE), 2.0)
+    np.testing.assert_allclose(found.pressure.get(), 2.0 / sliding.cell_area / 414, rtol=1e-12)
 
 
 # ------------------------------------------------------------------------------------------------------- the stand-in

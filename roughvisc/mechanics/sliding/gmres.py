@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from roughvisc.mechanics.grid import namespace
+
+Array = Any  # an array of NumPy or CuPy
 
 # Vectors before a restart, and in total.
 _RESTART, _MOST_VECTORS = 60, 300
@@ -32,38 +34,39 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
     ----------
     operator : callable
         Takes and returns an array of the shape of the right-hand side.
-    right : ndarray
+    right : array
         Right-hand side.
     enough : float
         Norm of the residual at which the iteration ends.
 
     Returns
     -------
-    ndarray
+    array
         The solution, or the last iterate after 300 vectors.
     int
         Number of vectors.
     """
-    solution, residual, count = np.zeros_like(right), right, 0
+    xp = namespace(right)
+    solution, residual, count = xp.zeros_like(right), right, 0
     while True:
-        norm = float(np.sqrt(np.sum(residual**2)))
+        norm = math.sqrt(float((residual**2).sum()))
         if norm <= enough or count >= _MOST_VECTORS:
             return solution, count
-        basis = np.empty((_RESTART + 1, right.size))
-        basis[0] = residual.ravel() / norm
+        basis = xp.empty((_RESTART + 1, right.size))
+        basis[0] = residual.reshape(-1) / norm
         triangle, left = np.zeros((_RESTART + 1, _RESTART)), np.zeros(_RESTART + 1)
         left[0] = norm
         rotations: list[tuple[float, float]] = []
         for k in range(_RESTART):
-            vector = operator(basis[k].reshape(right.shape)).ravel()
+            vector = operator(basis[k].reshape(right.shape)).reshape(-1)
             count += 1
             length = math.inf
             while True:  # Gram-Schmidt, twice if little is left
-                along = np.einsum("ki,i->k", basis[: k + 1], vector)
-                vector -= np.einsum("ki,k->i", basis[: k + 1], along)
-                triangle[: k + 1, k] += along
-                before, length = length, float(np.sqrt(np.einsum("i,i->", vector, vector)))
-                if before < math.inf or length > _REPEATED * float(np.sqrt(np.sum(along**2))):
+                along = xp.einsum("ki,i->k", basis[: k + 1], vector)
+                vector -= xp.einsum("ki,k->i", basis[: k + 1], along)
+                triangle[: k + 1, k] += along.tolist()  # on the host, like all of the small system
+                before, length = length, math.sqrt(float(xp.einsum("i,i->", vector, vector)))
+                if before < math.inf or length > _REPEATED * math.sqrt(float((along**2).sum())):
                     break
             for i, (cosine, sine) in enumerate(rotations):
                 a, b = triangle[i, k], triangle[i + 1, k]
@@ -75,8 +78,8 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
             if abs(left[k + 1]) <= enough or count >= _MOST_VECTORS:
                 break
             basis[k + 1] = vector / length
-        weights = np.linalg.solve(triangle[: k + 1, : k + 1], left[: k + 1])
-        solution += np.einsum("ki,k->i", basis[: k + 1], weights).reshape(right.shape)
+        weights = xp.asarray(np.linalg.solve(triangle[: k + 1, : k + 1], left[: k + 1]))
+        solution += xp.einsum("ki,k->i", basis[: k + 1], weights).reshape(right.shape)
         if abs(left[k + 1]) <= enough or count >= _MOST_VECTORS:
             return solution, count
         residual = right - operator(solution)

@@ -32,16 +32,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.grid import transforms
+from roughvisc.mechanics.contact.solver import largest
+from roughvisc.mechanics.grid import namespace, transforms
 from roughvisc.mechanics.sliding.gmres import gmres
 from roughvisc.mechanics.threads import threads_of
 
-Array = NDArray[np.float64]
+Array = Any  # an array of NumPy or CuPy
 
 # Stated error over the change by Newton's step. Measured on line contacts against dense solutions, with loss tangents
 # up to 27: the true error is 0.8 to 2.8 times that change.
@@ -63,9 +63,9 @@ class SteadyState:
 
     Attributes
     ----------
-    pressure : ndarray, shape (nx, ny)
+    pressure : array, shape (nx, ny)
         Not negative, and exactly zero out of contact. It carries the load. [Pa]
-    displacement : ndarray, shape (nx, ny)
+    displacement : array, shape (nx, ny)
         On a half-space with zero mean. [m]
     approach : float
         [m]
@@ -105,6 +105,8 @@ class Sliding:
         Number of cells in one period, and cell sides. [m]
     speed : float
         Speed of the profile along +x. [m/s]
+    xp : module
+        NumPy, or CuPy for fields on a device.
 
     Raises
     ------
@@ -119,6 +121,7 @@ class Sliding:
         shape: tuple[int, int],
         spacing: tuple[float, float],
         speed: float,
+        xp: Any = np,
     ) -> None:
         if not 0 < speed < math.inf:
             raise InputError(key="speed", found=speed, expected="a positive number [m/s]")
@@ -130,7 +133,7 @@ class Sliding:
             odd[nx // 2] = 0
         if ny % 2 == 0:
             odd_across[:, -1] = 0
-        self._derivative, self._derivative_across = 1j * odd, 1j * odd_across
+        self._derivative, self._derivative_across = xp.asarray(1j * odd), xp.asarray(1j * odd_across)
         response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
         acting, complex_compliance = response > 0, np.broadcast_to(complex_compliance, response.shape)
         endless = acting & ~np.isfinite(complex_compliance)
@@ -143,23 +146,23 @@ class Sliding:
                 expected="a solid, or a profile that does not change across the motion",
             )
         # The sine of the shortest wave of an even grid vanishes at the cell centres.
-        skew = np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response
-        #: Displacement over pressure of each wave. [m/Pa]
-        self.response = np.where(acting, complex_compliance.real, 0.0) * response + 1j * skew
-        self._skew = np.asarray(1j * skew, dtype=np.complex128)
-        softest = np.abs(self.response).max()
-        acts = self.response != 0
+        skew = 1j * (np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response)
+        displaced = np.where(acting, complex_compliance.real, 0.0) * response + skew
+        softest, acts = np.abs(displaced).max(), displaced != 0
         # Pressure over displacement of each wave; waves without displacement count as the softest. [Pa/m]
-        stiffness = np.divide(1.0, self.response, where=acts, out=np.full(acts.shape, 1 / softest, complex))
+        stiffness = np.divide(1.0, displaced, where=acts, out=np.full(acts.shape, 1 / softest, complex))
         stiffest = float(np.abs(stiffness).max())
-        self._stiffness = (stiffness / stiffest).astype(np.complex64), stiffest
+        #: Displacement over pressure of each wave. [m/Pa]
+        self.response = xp.asarray(displaced)
+        self._skew = xp.asarray(skew)
+        self._stiffness = xp.asarray((stiffness / stiffest).astype(np.complex64)), stiffest
         #: Cells of one period.
         self.shape = shape
-        self._transforms = transforms(threads_of(nx * ny))
+        self._transforms = transforms(threads_of(nx * ny), xp)
         #: Number of convolutions so far, with the preconditioner's.
         self.convolutions = 0
         self.cell_area = dx * dy
-        one = np.zeros(shape)
+        one = xp.zeros(shape)
         one[0, 0] = 1.0
         #: Displacement of a cell under unit pressure on that cell alone. [m/Pa]
         self.self_influence = float(self.displacement(one)[0, 0])
@@ -171,16 +174,16 @@ class Sliding:
     def full_contact(self, displacement: Array) -> Array:
         """Return the pressure of a displacement in full contact, in single precision for a preconditioner. [Pa]"""
         symbol, unit = self._stiffness
-        largest = float(np.abs(displacement).max()) or 1.0  # single precision underflows
-        found = self._convolved((displacement / largest).astype(np.float32), symbol)
-        return np.multiply(largest * unit, found, dtype=np.float64)
+        most = largest(abs(displacement)) or 1.0  # single precision underflows
+        found = self._convolved((displacement / most).astype(np.float32), symbol)
+        return found.astype(float) * (most * unit)
 
     def force_along(self, pressure: Array) -> float:
         r"""Return the force that drives the profile, towards +x, :math:`-\int p\, \partial_x u\, \mathrm dA`. [N]
 
         Parameters
         ----------
-        pressure : ndarray, shape (nx, ny)
+        pressure : array, shape (nx, ny)
             Of a steady state. [Pa]
 
         Notes
@@ -195,7 +198,7 @@ class Sliding:
 
         Parameters
         ----------
-        pressure : ndarray, shape (nx, ny)
+        pressure : array, shape (nx, ny)
             Of a steady state. [Pa]
 
         Notes
@@ -205,12 +208,12 @@ class Sliding:
         """
         return self._force(pressure, self._derivative_across)
 
-    def _force(self, pressure: Array, derivative: NDArray[Any]) -> float:
+    def _force(self, pressure: Array, derivative: Array) -> float:
         """Sum of the pressure over the slope of the displacement out of phase. [N]"""
         slope = self._convolved(pressure, self._skew * derivative)
         return -float((pressure * slope).sum()) * self.cell_area
 
-    def _convolved(self, field: NDArray[Any], symbol: NDArray[Any]) -> NDArray[Any]:
+    def _convolved(self, field: Array, symbol: Array) -> Array:
         """Convolution in the precision of field and symbol."""
         self.convolutions += 1
         waves = self._transforms.waves(field)
@@ -227,7 +230,7 @@ def steady_state(
     ----------
     sliding : Sliding
         The body and the motion.
-    gap : ndarray, shape (nx, ny)
+    gap : array, shape (nx, ny)
         Undeformed gap: the profile's highest point less its height. [m]
     load : float
         Positive. [N]
@@ -240,17 +243,17 @@ def steady_state(
     -------
     SteadyState
     """
-    total = load / sliding.cell_area
-    pressure = np.full(gap.shape, total / gap.size)
+    xp, total = namespace(gap), load / sliding.cell_area
+    pressure = xp.full(gap.shape, total / gap.size)
     opening = gap + sliding.displacement(pressure)
-    if np.ptp(gap) == 0:
-        return _state(sliding, gap, pressure, np.zeros_like(gap), True, 0, 0)
-    approach = float(opening.min()) - _START * float(np.ptp(opening))
+    if xp.ptp(gap) == 0:
+        return _state(sliding, gap, pressure, xp.zeros_like(gap), True, 0, 0)
+    approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
     vectors = 0
     for iteration in range(max_iterations + 1):
-        products = float(np.sum(pressure * separation))
-        energy = sliding.self_influence * float(np.sum(pressure**2))
+        products = float((pressure * separation).sum())
+        energy = sliding.self_influence * float((pressure**2).sum())
         enough = _FORCING * min(math.sqrt(products), products / math.sqrt(energy))
         diagonal = separation / pressure
         system = _NewtonSystem(sliding, diagonal)
@@ -260,7 +263,7 @@ def steady_state(
         step, approach_step, count = system.solve(right, enough)
         vectors += count
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
-        found = np.where(contact, pressure, 0.0)
+        found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
         correction = pressure + step - found
         converged = _is_accurate(sliding, found, correction, tolerance)
@@ -273,7 +276,7 @@ def steady_state(
             break
         widening = -separation - diagonal * step
         length = min(_longest(pressure, step), _longest(separation, widening))
-        reached = float(np.sum((pressure + length * step) * (separation + length * widening)))
+        reached = float(((pressure + length * step) * (separation + length * widening)).sum())
         centring = (reached / products) ** 3 * products / gap.size
 
         # Corrector: the second-order term that the predictor leaves out, and a step towards equal products.
@@ -298,17 +301,18 @@ class _NewtonSystem:
     ----------
     sliding : Sliding
         The operator ``K``.
-    diagonal : ndarray, shape (nx, ny)
+    diagonal : array, shape (nx, ny)
         ``D``. [m/Pa]
     """
 
     def __init__(self, sliding: Sliding, diagonal: Array) -> None:
         self._sliding, self._diagonal = sliding, diagonal
         both = sliding.self_influence + diagonal
-        self._scale = 1 / np.sqrt(both)
+        xp = namespace(diagonal)
+        self._scale = 1 / xp.sqrt(both)
         self._inside = sliding.self_influence / both
         self._outside = (1 - self._inside**2) / both
-        punch = self._inverse(np.ones_like(both))
+        punch = self._inverse(xp.ones_like(both))
         #: Pressure that the preconditioner gives for a uniform displacement, scaled to a sum of 1.
         self._punch = punch / float(punch.sum())
 
@@ -319,15 +323,15 @@ class _NewtonSystem:
 
         Parameters
         ----------
-        right : ndarray, shape (nx, ny)
+        right : array, shape (nx, ny)
             [m]
         enough, relative : float
             Residual at which GMRES stops: scaled, and relative to the right-hand side.
-        start : ndarray, shape (nx, ny), optional
+        start : array, shape (nx, ny), optional
             First guess of the step of the pressure. [Pa]
         """
         scaled = self._scaled(right)
-        enough = min(enough, relative * float(np.sqrt(np.sum(scaled**2))))
+        enough = min(enough, relative * math.sqrt(float((scaled**2).sum())))
         if start is not None:
             right = right - self._product(start)
             scaled = self._scaled(right)
@@ -356,7 +360,7 @@ class _NewtonSystem:
     def _precondition(self, scaled: Array) -> Array:
         """Step of the pressure without a change of the load. [Pa]"""
         step = self._inverse(scaled / self._scale)
-        step -= float(np.add.reduce(step, axis=None)) * self._punch
+        step -= float(step.sum()) * self._punch
         return step
 
     def _inverse(self, field: Array) -> Array:
@@ -368,18 +372,18 @@ class _NewtonSystem:
 
     def _rigid_part(self, field: Array) -> float:
         """Rigid part of a displacement. [m]"""
-        return float(np.add.reduce(field * self._punch, axis=None))
+        return float((field * self._punch).sum())
 
 
 def _longest(values: Array, step: Array) -> float:
     """Return the largest fraction of a step, at most 1, after which positive values are not negative."""
-    shrinking = np.flatnonzero(step < 0)
-    return min(1.0, -float(np.maximum.reduce(values.take(shrinking) / step.take(shrinking), initial=-math.inf)))
+    shrinking = namespace(step).flatnonzero(step < 0)
+    return min(1.0, -largest(values.take(shrinking) / step.take(shrinking), -math.inf))
 
 
 def _residual(pressure: Array, correction: Array) -> float:
     """Return the estimated error of a pressure from its correction by Newton's step (note 3)."""
-    return _CAUTION * float(np.abs(correction).sum() / pressure.sum())
+    return _CAUTION * float(abs(correction).sum() / pressure.sum())
 
 
 def _friction_residual(sliding: Sliding, pressure: Array, correction: Array) -> float:
@@ -400,7 +404,7 @@ def _state(
     return SteadyState(
         pressure=pressure,
         displacement=displacement,
-        approach=float(np.sum(pressure * (gap + displacement)) / pressure.sum()),
+        approach=float((pressure * (gap + displacement)).sum() / pressure.sum()),
         power_force=sliding.force_along(pressure),
         residual=_residual(pressure, correction),
         friction_residual=_friction_residual(sliding, pressure, correction),
