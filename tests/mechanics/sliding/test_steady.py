@@ -239,7 +239,7 @@ def test_units__do_not_matter():
 def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch):
     """Handing a small transform over takes ten times as long as the transform."""
     used = set()
-    monkeypatch.setattr(steady, "transforms", lambda threads: used.add(threads) or transforms(threads))
+    monkeypatch.setattr(steady, "transforms", lambda threads, xp: used.add(threads) or transforms(threads, xp))
     with fft.set_workers(2):
         sliding = Sliding(Body(rubber(), HALF_SPACE), shape, (1e-3, 1e-3), 1.0)
         pressure = np.zeros(shape)
