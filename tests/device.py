@@ -1,4 +1,4 @@
-"""A stand-in for CuPy and its device: NumPy's arrays behind a class that refuses whatever CuPy refuses.
+"""A stand-in for CuPy and its device: NumPy's arrays behind a class that refuses what CuPy refuses.
 
 Plain arrays do not mix with arrays of the device, in no operation. Only :meth:`DeviceArray.get` and ``tolist`` copy an
 array to the host, and only :func:`asarray` copies one to the device; a single value becomes a number by ``float``,
@@ -17,7 +17,7 @@ LACKING = {"initial", "where"}
 
 
 def to_host(value):
-    """Return an argument with the arrays behind those of the device; plain arrays are refused."""
+    """Return an argument with NumPy's arrays in place of the device's; plain arrays are refused."""
     if isinstance(value, DeviceArray):
         return value.behind
     if isinstance(value, np.ndarray):

@@ -30,7 +30,7 @@ APPROACHES = rv.Program().approach(1.5, over=0.2).approach(-1.0, over=0.2).appro
 
 @pytest.fixture(autouse=True)
 def xp(monkeypatch):
-    """The device in CuPy's place; NumPy's arrays are transformed by SciPy, as those of the stand-in are."""
+    """The device in CuPy's place. SciPy transforms plain arrays too, as the stand-in does."""
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     return device.install(monkeypatch)
 
@@ -42,7 +42,7 @@ def absent_cells():
 
 
 def assert_equal(one, other):
-    """The array of the device is that of the host."""
+    """Compare an array of the device with one of the host."""
     np.testing.assert_allclose(one.get(), other, rtol=0, atol=1e-12 * np.abs(other).max(initial=1e-300))
 
 
