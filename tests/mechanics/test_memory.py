@@ -1,5 +1,7 @@
 """Memory of a body: closed forms of the recursion, its order, and what relaxation leaves of an error."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -82,7 +84,7 @@ def test_error__relaxes_faster_than_it_creeps():
     many = Memory(SERIES["prony"], 10.0)
     left = [many.remaining(time) for time in (0.0, 1e-3, 0.1, 10.0)]
     assert left[0] == pytest.approx(1.0)
-    assert all(after < before for before, after in zip(left, left[1:], strict=False))
+    assert all(after < before for before, after in pairwise(left))
 
 
 def test_both_fields__are_the_same_recursion():
