@@ -38,7 +38,7 @@ FIRST_PAIR = 0.005
 #: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
 #: on workflows/benchmarks/accuracy.py.
-STATED, STATED_APPROACH = 0.6, 0.6
+STATED, STATED_APPROACH = 0.7, 0.7
 #: The same for bodies that have hardly any instantaneous compliance, whose steps begin at first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
 #: Part of the tolerance that a pair may add, and the least part that it may always add.
@@ -80,7 +80,7 @@ SLIDING_SHARE = 0.3
 #: Part of the pressure of a cell that has just entered the contact that is uncertain, if it is due to creep.
 ENTERED = 0.3
 #: Part of the tolerance that cells that have just entered may leave uncertain at a kept time in the middle of a pair.
-UNCERTAIN = 0.5
+UNCERTAIN = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
 #: Rounding of displacements, relative to what the mean pressure could cause.
