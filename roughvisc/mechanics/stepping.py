@@ -43,6 +43,8 @@ STATED, STATED_APPROACH = 0.7, 0.7
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
 #: Part of the tolerance that a pair may add, and the least part that it may always add.
 SHARE, LEAST_SHARE = 0.6, 0.2
+#: Part of the error so far that a pair may always add: of a slide, whose error depends on the cells, it may be large.
+LEAST_CHANGE = 0.1
 #: Part of the tolerance that is planned with.
 PLANNED = 0.9
 #: Part of the tolerance that the contact solver may leave.
@@ -58,6 +60,8 @@ REJECTED = 2.0
 #: A shorter pair that adds more than this part of what the longer one adds is accepted: a cell that enters makes the
 #: pressure jump, however short the pair is.
 REDUCED = 0.93
+#: A pair that ends on a kept time is not halved below this part of the time since the segment began.
+LANDING_PAIR = 0.01
 #: Shortest pair, in parts of the segment, or of its time to the first kept one.
 SHORTEST_PAIR = 1e-6
 #: Change of the length from one pair to the next: smallest, largest, and largest if it adds next to nothing.
@@ -243,6 +247,10 @@ class Difference:
     inside: float = 0.0
     outside: float = 0.0
     friction: float = 0.0
+
+    def times(self, factor: float) -> Difference:
+        """Return a part of it."""
+        return Difference(*(factor * value for value in vars(self).values()))
 
     def or_larger(self, other: Difference) -> Difference:
         """Return the larger of both, part by part."""
@@ -523,7 +531,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         factor = PLANNED * max(share, 1e-300) ** (-1 / ORDER)
         lands = scene.keeps(last) or middle == event
         relative = apart.pressure / force / scene.stated[0], apart.approach / approach / scene.stated[1]
-        at_end = max(relative) if lands else 0.0
+        at_end = max(relative) if lands and taken > LANDING_PAIR * (last - began) else 0.0
         # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
         opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
         if opens and second.point.approach >= fine.approach and taken > shortest:
@@ -546,7 +554,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     work, whole = work_of_pair(scene, fine, first.point, second.point)
     after = after_solves(scene, state, second, once, solved, whole, length)
-    between = state.difference.or_larger(apart)
+    left = 1.0 if scene.is_soft(taken) else scene.memory.remaining(middle - fine.time)
+    between = state.difference.times(left).or_larger(apart)
     between = replace(between, pressure=between.pressure + entering(scene, fine, shown[0].point))
     after = replace(after, difference=apart)
     if last == end:
@@ -638,14 +647,14 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
 
     def over_budget(change: float, carried: float) -> float:
         budget = max(PLANNED * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
-        return change / min(SHARE * scene.tolerance, budget)
+        return change / max(min(SHARE * scene.tolerance, budget), LEAST_CHANGE * carried)
 
     # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
     carried = 0.0 if soft else state.difference.pressure / stated[0] / force * memory.remaining(following - fine.time)
     share = over_budget(change * remains, carried)
     if segment.control == "load":
         change = abs((second.approach - once.approach) - (fine.approach - coarse.approach)) / approach
-        share = max(share, over_budget(change * fades, state.difference.approach / stated[1] / approach))
+        share = max(share, over_budget(change, state.difference.approach / stated[1] / approach))
     if segment.control == "approach" or second.force == 0 or soft:
         surfaces = [memory.present(point.history)[0] for point in (second, once, fine, coarse)]
         surface = (surfaces[0] - surfaces[1]) - (surfaces[2] - surfaces[3])

@@ -107,7 +107,7 @@ def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     said = np.array([time_error(*row) for _, found, _ in matrix.values() for row in found.values()])
     seen = true > 1e-3 * TOLERANCE
     assert np.count_nonzero(seen) > 150
-    assert np.mean(said[seen] >= 0.8 * true[seen]) >= 0.98, np.sort(said[seen] / true[seen])[:10]
+    assert np.mean(said[seen] >= 0.8 * true[seen]) >= 0.97, np.sort(said[seen] / true[seen])[:10]
     assert np.median(said[seen] / true[seen]) <= 5
     assert np.mean(true <= TOLERANCE) >= 0.98
 
