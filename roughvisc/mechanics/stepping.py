@@ -42,11 +42,11 @@ STATED, STATED_APPROACH = 0.7, 0.7
 #: The same for bodies that have hardly any instantaneous compliance, whose steps begin at first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
 #: Part of the tolerance that a pair may add, and the least part that it may always add.
-SHARE, LEAST_SHARE = 0.6, 0.2
+SHARE, LEAST_SHARE = 0.4, 0.2
 #: Part of the error so far that a pair may always add: of a slide, whose error depends on the cells, it may be large.
 LEAST_CHANGE = 0.1
-#: Part of the tolerance that is planned with.
-PLANNED = 0.9
+#: Part of the tolerance that the error so far and that of a pair may use up, and safety of the length of the next pair.
+BUDGET, PLANNED = 0.7, 0.9
 #: Part of the tolerance that the contact solver may leave.
 SOLVER_SHARE = 0.2
 #: What relaxation leaves of an error counts at least this part: other errors do not fade.
@@ -523,7 +523,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         force, approach = largest_values(scene, state, first.point, second.point)
         in_middle = middle == event and scene.keeps(event)
-        if in_middle and entering(scene, fine, shown[0].point) > UNCERTAIN * scene.tolerance * force:
+        entered_force, left = entering(scene, fine, shown[0].point), remaining_part(scene, middle - fine.time, taken)
+        doubtful = entered_force > UNCERTAIN * scene.tolerance * force
+        if in_middle and (doubtful or entered_force + left * state.difference.pressure > 0.8 * scene.tolerance * force):
             next_event, state = event, with_cost(state, solved)  # the pair ends here, so that its error is known
             del first, second, once, guess, shown, solved  # their memory is free while the pair is tried again
             continue
@@ -554,7 +556,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     work, whole = work_of_pair(scene, fine, first.point, second.point)
     after = after_solves(scene, state, second, once, solved, whole, length)
-    left = 1.0 if scene.is_soft(taken) else scene.memory.remaining(middle - fine.time)
+    left = remaining_part(scene, middle - fine.time, taken)
     between = state.difference.times(left).or_larger(apart)
     between = replace(between, pressure=between.pressure + entering(scene, fine, shown[0].point))
     after = replace(after, difference=apart)
@@ -646,7 +648,7 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
     fades = 1.0 if soft or receding else remains
 
     def over_budget(change: float, carried: float) -> float:
-        budget = max(PLANNED * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
+        budget = max(BUDGET * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
         return change / max(min(SHARE * scene.tolerance, budget), LEAST_CHANGE * carried)
 
     # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
@@ -689,6 +691,11 @@ def largest_values(scene: Scene, state: State, first: Point, second: Point) -> t
     rounding = ROUNDING * scene.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
     approach = max(state.largest_approach, abs(first.approach), abs(second.approach))
     return max(force, 1e-300), max(approach, rounding / scene.grid.cell_area, 1e-300)
+
+
+def remaining_part(scene: Scene, time: float, taken: float) -> float:
+    """Return the part of an error that relaxation leaves after a time, in a pair of a length. [s]"""
+    return 1.0 if scene.is_soft(taken) else scene.memory.remaining(time)
 
 
 def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:

@@ -19,7 +19,7 @@ SERIES = {
 
 def history_after(memory, steps, unit_at, rule):
     """Memory after steps at whose ends the displacement per unit compliance is ``unit_at(t)`` times a field."""
-    history, time = memory.start(SHAPE), 0.0
+    history, time = memory.start(np.zeros(SHAPE)), 0.0
     for step in steps:
         time += step
         used = "constant" if rule == "bdf2" and history.earlier is None else rule
