@@ -51,6 +51,7 @@ def test_domain__holds_every_cell_that_an_approach_can_touch():
     assert choose_domain(gap, (1.0, 1.2), HALF_SPACE, 10.0).is_whole
 
 
+@pytest.mark.thorough
 def test_part_of_a_scan__gives_the_fields_of_all_of_it(monkeypatch, solved_on):
     found = pressed(bump())
     assert min(np.prod(shape) for shape in solved_on[1:]) < 0.5 * 121 * 104

@@ -103,6 +103,7 @@ def far_apart(ratio, creeps):
     return rv.zener(2 * top, top, 0.1 * top, 0.4), rv.zener(2e6, 1e6, 5e5, 0.5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ratio", [1e-5, 1e-3, 1e3])
 @pytest.mark.parametrize(
     ("creeps", "boundary"),

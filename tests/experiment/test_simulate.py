@@ -231,7 +231,9 @@ FOLLOWED = {
 }
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.thorough) if n == "soft" else n for n in FOLLOWED])
+@pytest.mark.parametrize(
+    "name", [n if n == "stress relaxation" else pytest.param(n, marks=pytest.mark.thorough) for n in FOLLOWED]
+)
 def test_part_of_the_surface__changes_nothing_but_cost(name, solved_on, monkeypatch):
     material, program = FOLLOWED[name]
     settings = {"boundary": "free", "tolerance": 3e-3, "times": 6, "fields": FIELDS}
