@@ -35,6 +35,7 @@ def test_ting__triangle_of_load_on_a_sphere(cells):
         assert error < 6e-3 * float(ds.force.max())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("profile", ["sphere", pytest.param("cone", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("material", [ZENER, rv.maxwell(1.0, 2.0)], ids=["zener", "maxwell"])
 def test_unloading_and_reloading__follow_the_element_reduction(profile, material):

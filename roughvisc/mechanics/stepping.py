@@ -777,7 +777,7 @@ def after_solves(
     return replace(
         with_cost(state, solved),
         fine=fine,
-        twice=None if coarse is fine else coarse,
+        twice=None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
         length=length,
         difference=difference(scene, fine, coarse),
         largest_force=max(state.largest_force, middle.force, fine.force),

@@ -102,6 +102,7 @@ def test_edited_study__gives_a_case_or_names_the_file(text, tmp_path):
         assert case.material().contact_compliance(1.0) > 0
 
 
+@pytest.mark.thorough
 @HUNDRED
 @given(text=edited_texts([CREEP]))
 def test_edited_creep_table__gives_a_material_or_names_the_file(text, tmp_path):

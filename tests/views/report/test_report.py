@@ -80,6 +80,7 @@ def test_page__numbers_the_cases_as_their_table(folder, page):
     assert "3 cases, 1 failed" in page
 
 
+@pytest.mark.thorough
 def test_page__escapes_what_users_write_and_needs_no_other_file(page):
     assert "default-src 'none'" in page
     assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
@@ -101,6 +102,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
         report([ds])
 
 
+@pytest.mark.thorough
 def test_page__has_figures_of_every_case_and_of_the_sweep(page):
     titles = re.findall(r"<figcaption>(.*?)</figcaption>", page)
     assert [titles.count(one) for one in ("Maps", "History", "Section")] == [3, 3, 3]
