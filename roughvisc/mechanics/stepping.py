@@ -38,7 +38,7 @@ FIRST_PAIR = 0.005
 #: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
 #: on workflows/benchmarks/accuracy.py.
-STATED, STATED_APPROACH = 0.7, 0.7
+STATED, STATED_APPROACH = 0.6, 0.6
 #: The same for bodies that have hardly any instantaneous compliance, whose steps begin at first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
 #: Part of the tolerance that a pair may add, and the least part that it may always add.
