@@ -293,24 +293,6 @@ class Grid:
         if len(spectrum) > first:
             spectrum[first:] *= symbol[len(spectrum) - first : 0 : -1]
 
-    def even_sum(self, field: Array, symbol: Array) -> float:
-        """Return the sum of a real transform times a symbol."""
-        first = len(symbol)
-        total = float((field[:first] * symbol).sum())
-        if len(field) > first:
-            total += float((field[first:] * symbol[len(field) - first : 0 : -1]).sum())
-        return total
-
-    @cached_property
-    def parseval(self) -> Array:
-        """Weights with which the product of two transforms, one conjugate, sums up to the area integral. [m2]"""
-        mx, my = self.points
-        if self.boundary == "mirror":
-            along_x, along_y = (np.where(np.arange(n) == 0, 0.25, 0.5) for n in (mx, my))
-        else:
-            along_x, along_y = np.ones(mx), _counts(my)
-        return self.xp.asarray(np.outer(along_x, along_y) * (self.cell_area / (mx * my)))
-
     def turn(self, cells: int, axis: int) -> Array:
         """Return the factors by which the transform of a periodic field changes if the field moves back by `cells`."""
         if self.boundary != "periodic":

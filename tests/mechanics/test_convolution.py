@@ -145,15 +145,12 @@ def test_self_influence__is_the_mean_displacement_of_a_cell_that_is_loaded_alone
 
 @BOUNDARIES
 @pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
-def test_parseval__gives_the_work_of_a_pressure_on_its_displacement(shape, boundary):
+def test_multiply__by_the_symbol_is_the_convolution(shape, boundary):
     grid = Grid(shape, (1.0, 2.0), boundary)
     pressure = np.random.default_rng(4).random(shape)
     displacement = grid.displacement(pressure)
-    spectrum = grid.spectrum(pressure)
-    response = spectrum.copy()
+    response = grid.spectrum(pressure)
     grid.multiply(response, grid.symbol_of(grid.kernel))
-    found = float(np.sum(grid.parseval * (spectrum * response.conj()).real))
-    assert found == pytest.approx(float((pressure * displacement).sum()) * grid.cell_area)
     np.testing.assert_allclose(grid.field_of(response), displacement, rtol=0, atol=1e-13 * displacement.max())
 
 
