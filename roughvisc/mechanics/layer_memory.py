@@ -89,12 +89,7 @@ class LayerMemory(Memory):
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
         """Return the memory after a step, at whose end the pressure [Pa] is given; `unit` is not used."""
-        fields = self.grid.spectrum(pressure)[None]
-        if prediction.step == 0:
-            return History(fields, history.modes)
-        for mode, weight in zip(prediction.modes, prediction.new, strict=True):
-            mode += weight * fields
-        return History(fields, prediction.modes, history.modes if self.may_ring else None, prediction.step)
+        return self.after_step(history, prediction, self.grid.spectrum(pressure)[None])
 
     def present(self, history: History) -> Array:
         """Return the displacement, shape (1, nx, ny). [m]"""

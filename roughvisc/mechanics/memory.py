@@ -158,7 +158,12 @@ class Memory:
         pressure : array, shape (nx, ny)
             Pressure at the end. [Pa]
         """
-        fields = unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
+        return self.after_step(
+            history, prediction, unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
+        )
+
+    def after_step(self, history: History, prediction: Prediction, fields: Array) -> History:
+        """Return the memory after a step with the given fields at its end."""
         if prediction.step == 0:
             return History(fields, history.modes)
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
