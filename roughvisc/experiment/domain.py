@@ -110,7 +110,7 @@ def whole_domain(gap: Array, sides: tuple[float, float], kernel: Kernel) -> Doma
 
 
 def choose_domain(gap: Array, sides: tuple[float, float], kernel: Kernel, approach: float) -> Domain:
-    """Return the part of a surface that touches up to an approach.
+    """Return the part of a surface that may touch before a given approach is reached.
 
     Parameters
     ----------

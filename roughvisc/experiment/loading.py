@@ -201,7 +201,7 @@ class LoadingRows(Rows):
 
     @property
     def height(self) -> xr.DataArray:  # type: ignore[override]
-        """Height of the surface, that of an indenter as large as it was made. [m]"""
+        """Height of the surface; an indenter that was enlarged has its enlarged grid. [m]"""
         return self.profile.height
 
     @property

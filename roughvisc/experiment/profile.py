@@ -60,7 +60,7 @@ class Profile:
         return Grid((self.gap.shape[0], self.gap.shape[1]), self.spacing, boundary, workers, kernel=self.kernel)
 
     def contact_fraction(self, area: float) -> float:
-        """Return a contact area over the area of the surface. [-]"""
+        """Return the ratio of a contact area to the area of the surface. [-]"""
         dx, dy = self.spacing
         return area / (dx * dy * self.height.size)
 

@@ -297,7 +297,7 @@ class Body:
 
     @property
     def note(self) -> str:
-        """How the materials were found, for the notes of a result; often empty."""
+        """How the materials were obtained, for the notes of a result; empty if there is nothing to say."""
         return "; ".join(one.note for one in self.materials if one.note)
 
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> Self:

@@ -57,10 +57,11 @@ RECEDING = 0.5
 ORDER = 1.5
 #: A pair is rejected if it adds this many times what it may.
 REJECTED = 2.0
-#: A shorter pair that adds more than this part of what the longer one adds is accepted: a cell that enters makes the
-#: pressure jump, however short the pair is.
+#: A rejected pair is tried again in shorter steps. If that leaves more than this part of its error, the shorter pair is
+#: accepted: a cell that enters the contact makes the pressure jump, however short the pair is.
 REDUCED = 0.93
-#: A pair that ends on a kept time is not halved below this part of the time since the segment began.
+#: Shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
+#: the segment began.
 LANDING_PAIR = 0.01
 #: Shortest pair, in parts of the segment, or of its time to the first kept one.
 SHORTEST_PAIR = 1e-6
@@ -787,7 +788,7 @@ def after_solves(
 
 
 def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
-    """Return the stated error by the difference between both solutions."""
+    """Return the stated errors of a fine solution, from its difference to the coarse one."""
     if fine is coarse:
         return Difference()
     stated, of_approach = scene.stated

@@ -801,7 +801,7 @@ def _surface_name(case: Case, stated: Mapping[str, Any]) -> str:
 
 
 def _spread(count: int) -> list[int]:
-    """Return all numbers below a count: the ends first, then ever finer between them."""
+    """Return the integers below a count: first and last, then halves, quarters and so on between them."""
     order = dict.fromkeys([0, count - 1])
     pieces = 2
     while len(order) < count:

@@ -193,8 +193,8 @@ VARIABLES: dict[str, Variable] = {
         "1",
         "error due to time steps",
         "part of stated_error, "
-        "from the difference to a companion march in steps twice as long; over the largest values of the kept rows so "
-        "far",
+        "from the difference to a coarse solution, which takes one step for every two; "
+        "over the largest values of the kept rows so far",
         every_step=True,
         in_table="largest",
     ),

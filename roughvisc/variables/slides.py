@@ -50,7 +50,7 @@ SLIDES: dict[str, Variable] = {
         _SERIES,
         "N",
         "stated error of the friction force",
-        "of steps of one cell, by a companion march in steps of two; the rest of the grid's error comes on top",
+        "of steps of one cell, by a coarse solution in steps of two; the rest of the grid's error comes on top",
         may_be_missing=True,
     ),
 }

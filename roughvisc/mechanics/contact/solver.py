@@ -270,7 +270,7 @@ def solve_contact(
                     raise ConvergenceError(unsolved(iteration, error, tolerance))
                 break
 
-        # Least energy along the trial, equation (11): one convolution.
+        # Minimize the energy along the search direction, equation (11): one convolution.
         if is_single:
             most = largest(abs(change))
             response = grid.displacement(on_grid32(change / most, cells)).reshape(-1)
@@ -448,8 +448,8 @@ def level_under_load(
 #: Cells a side from which blocks may pay, and the largest part of free cells. Measured at 512 squared: 3 to 14 % more
 #: time for 10 to 15 % fewer iterations; at 768, 0 to 18 % less time; at 1024, 6 to 30 % less.
 BLOCKS_FROM, SPARSE = 768, 0.6
-#: Blocks a side times the part of the free cells in partly free blocks, from which blocks pay. Within a spot that is
-#: wider than a block they do harm.
+#: Blocks pay if the number of blocks along a side, times the part of the free cells that lies in partly free blocks, is
+#: at least this. Within a contact spot that is wider than a block, they do harm.
 SPOTS = 45.0
 #: Part of the local compliance that is used: the fewest iterations lie between half of it and all of it.
 LOCAL_SHARE = 0.7
