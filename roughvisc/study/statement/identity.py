@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ def identity(settings: Study) -> tuple[str, str]:
     return _digest(stated)[:16], surface[0]
 
 
+@cache
 def program() -> str:
     """This program and its version, as results state their source."""
     return f"roughvisc {metadata.version('roughvisc')}"

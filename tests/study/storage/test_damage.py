@@ -168,6 +168,11 @@ def another_user(change):
         os.seteuid(0)
 
 
+def needs_no_more_code(study, invoke):
+    """Import all that a run needs: another user may not read the folder of the program."""
+    invoke("run", study, "--out", study.parent / "first", "-q", "--no-plots", "--workers", "0")
+
+
 def forbidden(path):
     path.chmod(0o000)
 
@@ -233,6 +238,8 @@ REFUSED += [linked, linked_below, linked_inside, virtual, stored_elsewhere]
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files of POSIX")
 def test_run__refuses_what_is_not_damaged_and_leaves_it(copied, change, invoke):
     study, case, path = copied
+    if change is forbidden:
+        needs_no_more_code(study, invoke)
     change(path)
     before = path.lstat()
     with another_user(change):
@@ -254,7 +261,7 @@ def test_sweep__refuses_it_before_anything_is_computed(copied, change, invoke):
     study.write_text(TWO_LOADS)
     assert case.key in [one.key for one in read_cases(study)]
     if change is forbidden:
-        invoke("run", study, "--out", study.parent / "first", "-q", "--workers", "0")  # another user imports nothing
+        needs_no_more_code(study, invoke)
     change(path)
     path.parent.chmod(0o777)
     with another_user(change):
