@@ -27,13 +27,12 @@ from roughvisc.experiment.notes import (
 )
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Outgrown, Row, Rows
-from roughvisc.experiment.resources import least_rows, march_bytes, require_memory
+from roughvisc.experiment.resources import require_loading
 from roughvisc.experiment.scene import (
     build_scene,
     check_program,
     domain_of,
     kept_times,
-    memory_options,
     slide_note,
     snap_to_cells,
 )
@@ -48,10 +47,8 @@ from roughvisc.experiment.stated import (
     time_error,
 )
 from roughvisc.labels import warnings_text
-from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory import History
-from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, State, Step, at_rest, march
 from roughvisc.problem import Problem
@@ -158,13 +155,6 @@ class Loading(Experiment):
         unit = unit_for(end, "s")
         return f"t = {unit(done):.3g} of {unit.text(end)}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
-        """Memory of the march, its contact sparse unless it is known. [byte]"""
-        options = memory_options(self.program.on_area(area), settings)
-        memory = choose_memory(body, **options).memory
-        counts = {"rows": least_rows(settings, self.program)} | counts
-        return march_bytes(settings, cells, memory, **counts)
-
 
 class LoadingRows(Rows):
     """Accepted steps of one march, in order: histories of all of them, fields of those that are kept.
@@ -186,7 +176,8 @@ class LoadingRows(Rows):
     ) -> None:
         height, body, settings = problem.height, problem.body, problem.settings
         self._problem, self._settings = problem, settings
-        require_memory(problem, program, in_memory=in_memory)
+        shape = height.sizes["x"], height.sizes["y"]
+        require_loading(shape, nominal_area(height), program, settings, body, in_memory=in_memory)
         check_program(Profile(height, settings.missing, body.kernel), body, program, settings)
         self._start = state or LoadingState(enlarged=enlargements(problem, program))
         larger = enlarged_indenter(height, self._start.enlarged)

@@ -16,7 +16,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.problem import Problem
 from roughvisc.recorder import RowStore
@@ -202,21 +201,6 @@ class Experiment(Protocol):
         """How far it has come, as one reads it."""
         return f"{done:.0f} of {end:.0f}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
-        """Memory of a solve at its peak, fields in a file, without what the process takes in any case. [byte]
-
-        Parameters
-        ----------
-        settings, body
-            Of the solve.
-        cells, area : float
-            Of the surface. [m2]
-        **counts
-            Of a solve that is known: ``rows``, largest ``contact`` fraction, and ``part`` of the cells that is solved
-            on.
-        """
-        return 8.0 * cells * _FIELDS
-
     def creep_time(self, size: float) -> float:
         """How long a place of a surface so long [m] is pressed, at most: the material creeps till then. [s]"""
         return 0.0
@@ -237,7 +221,3 @@ class Experiment(Protocol):
         For a plan, which does it on coarse grids. Default: all rows, whose number is then known.
         """
         return self, 0, 1.0
-
-
-#: Fields that a contact problem takes, with its transforms.
-_FIELDS = 24.0

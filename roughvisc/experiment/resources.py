@@ -1,41 +1,37 @@
-"""What a solve takes and what there is: cores and memory, and the refusal of what does not fit before it is made."""
+"""Cores and memory of a run: what is available, what a run needs, and the refusal of a run that does not fit."""
 
 from __future__ import annotations
 
 import math
 import multiprocessing
-import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import fft
 
 from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.scene import memory_options
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT
-from roughvisc.problem import Problem
-from roughvisc.recorder import chunks
 from roughvisc.settings import Settings
-from roughvisc.topography.grid import counts, nominal_area
+from roughvisc.topography.grid import counts
 
-_PROC_SELF, _GROUPS = Path("/proc/self"), Path("/sys/fs/cgroup")
-#: Files of a control group: its limit, what is used, and what of that is a cache of files that may go at any time.
-_FILES = {
-    "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file"),
-    "": ("memory.max", "memory.current", "inactive_file"),
-}
-#: Part of the memory there is that a case may take.
+#: Part of the available memory that a case may take.
 PART = 0.9
+#: Interpreter and libraries, measured. [byte]
+PROCESS = 190e6
+#: Number of cells from which the memory is checked: on fewer a run takes less than 100 MB.
+WORTH_ASKING = 512**2
+#: Cells of the shorter side of the smallest grid that a refusal recommends.
+_FEWEST = 64
 
 
 @dataclass(frozen=True)
@@ -54,125 +50,72 @@ class Available:
     words: str
 
     def fits(self, needed: float) -> bool:
-        """Whether so much may be taken of it. [byte]"""
+        """Return whether a case that needs so much fits. [byte]"""
         return needed <= PART * self.size
 
 
 def memory_available() -> Available:
-    """Memory that this process may yet take, and what limits it."""
-    return min([*_machine(), *_groups(), *_own(), *_worker()], key=lambda one: one.size)
-
-
-def _machine() -> Iterator[Available]:
+    """Return the memory that this process may yet take, and what limits it."""
     import psutil
+    from distributed import get_worker  # slow to import
+    from distributed.system import MEMORY_LIMIT
 
-    yield Available(float(psutil.virtual_memory().available), "free in this machine")
-
-
-def _groups() -> Iterator[Available]:
-    """What the control groups of this process leave, of version 1 and 2, up to the outermost."""
-    try:
-        lines = (_PROC_SELF / "cgroup").read_text().split()
-    except OSError:  # no Linux
-        return
-    for line in lines:
-        _, kind, path = line.split(":", 2)
-        if kind not in _FILES:
-            continue
-        root = _GROUPS / kind
-        group = root / path.lstrip("/")
-        for folder in {root, group, *(place for place in group.parents if root in place.parents)}:
-            with suppress(OSError, ValueError):  # not to be seen from inside a container, or without a limit
-                limit, used, cache = _FILES[kind]
-                counts = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())
-                taken = int((folder / used).read_text()) - int(counts.get(cache, 0))
-                yield Available(float(int((folder / limit).read_text()) - taken), "left of the container's limit")
-
-
-def _own() -> Iterator[Available]:
-    """What is left of the address space that the process may have."""
-    with suppress(ImportError):  # there is none on Windows
-        import resource
-
-        import psutil
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-        if limit != resource.RLIM_INFINITY:
-            yield Available(
-                float(limit - psutil.Process().memory_info().vms), "left of this process's limit (ulimit -v)"
-            )
-
-
-def _worker() -> Iterator[Available]:
-    worker = _dask_worker()
-    limit = getattr(getattr(worker, "memory_manager", None), "memory_limit", None)
-    if limit:
-        import psutil
-
-        taken = psutil.Process().memory_info().rss
-        yield Available(float(limit - taken), "left of the Dask worker's memory limit")
-
-
-def _dask_worker() -> Any:
-    """The worker whose task this is; None where it is none."""
-    distributed = sys.modules.get("distributed")
-    if distributed is not None:
-        with suppress(ValueError):
-            return distributed.get_worker()
-    return None
+    taken = psutil.Process().memory_info().rss
+    found = [
+        Available(float(psutil.virtual_memory().available), "free in this machine"),
+        Available(float(MEMORY_LIMIT - taken), "left of the limit of this machine or container"),
+    ]
+    with suppress(ValueError):  # raised outside a Dask worker
+        limit = get_worker().memory_manager.memory_limit
+        if limit:
+            found.append(Available(float(limit - taken), "left of the Dask worker's memory limit"))
+    return min(found, key=lambda one: one.size)
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     from dask.system import CPU_COUNT
 
     return int(CPU_COUNT)
 
 
 def threads_for(asked: int | None) -> int:
-    """Threads of a case that is computed here.
+    """Return the number of threads of a case that is computed here.
 
     Parameters
     ----------
     asked : int or None
-        None: as ``scipy.fft.set_workers`` has it; where nobody has set that, all cores for a case that is alone, in
-        the main thread of a process that no other has started, and else one.
+        None: the value of ``scipy.fft.set_workers``. If that is not set, all cores for a case in the main thread of a
+        process that no other has started, and else one.
 
     Raises
     ------
     InputError
-        If it is no positive whole number.
+        If it is not a positive whole number.
     """
     if asked is not None:
         if isinstance(asked, bool) or not isinstance(asked, int) or asked < 1:
-            raise InputError(f"threads is {asked!r}: expected a whole number of at least 1, or None")
+            raise InputError(key="threads", found=asked, expected="a whole number of at least 1, or None")
         return asked
     stated = int(fft.get_workers())
     alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
     return cores() if stated == 1 and alone else stated
 
 
-#: Interpreter and libraries, measured. [byte]
-PROCESS = 190e6
-#: Fields of the surface: heights, gaps, and the marks of present cells.
-_SURFACE = 2.1
+# ---------------------------------------------------------------------------------------------------- what a run needs
+
+#: Fields of the surface: heights, gaps, and the marks of present cells; and of one that is made or read.
+_SURFACE, _MADE = 2.1, 4.0
 #: Fields of a contact problem and of the step around it, and further ones of a contact on all cells.
 _SOLVE, _IN_CONTACT = 8.0, 12.0
-#: Operator and spectrum.
-_TRANSFORMS = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}
-#: Operator and spectrum of the whole surface, if a part of it is solved on.
-_WHOLE = 6.0
-#: Solutions at the peak, a pressure and its displacement each: of a march without memory, and of a pair with its coarse
-#: solution and first guesses. A pair of soft steps also has solutions at the ends of its steps.
-_SINGLE, _PAIR, _SOFT_ENDS = 4, 9, 2
-#: Solutions of a pair that keep exponentials, and those whose exponentials one step ago are kept too, for BDF2.
-_KEEPING, _EARLIER = 5, 2
-#: Fields of each exponential if each wave has its own compliances: a spectrum, padded in free space.
+#: Operator and spectrum, and those of the whole surface if a part of it is solved on.
+_TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
+#: Solutions at the peak, a pressure and its displacement each, and copies of each exponential: without memory; of a
+#: pair of steps with its coarse solution and first guesses; of a pair of soft steps, with the ends of its steps and
+#: the exponentials one step ago.
+_ELASTIC, _PAIR, _SOFT_PAIR = (4, 0), (9, 6), (11, 10)
+#: Fields of an exponential if each wave has its own compliances: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
-#: Fields of the state while the file is written, a frame among them.
-_STATE = 4.5
-#: Rows wait for the disk until they take more. [byte]
-_WAITING = 8e6
 #: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
 _CURVE = 27.0
 #: Contact fraction below which a contact is sparse.
@@ -181,24 +124,24 @@ SPARSE = 0.05
 
 def march_bytes(
     settings: Settings,
-    cells: float,
     memory: Memory,
+    cells: float,
     *,
     contact: float = SPARSE,
     rows: float = 1.0,
     part: float = 1.0,
     in_memory: bool = False,
 ) -> float:
-    """Return the memory of a march at its peak, without interpreter and libraries.
+    """Return the memory of a loading at its peak, without interpreter and libraries.
 
     Parameters
     ----------
     settings : Settings
         Of the solve.
-    cells : float
-        Of the surface.
     memory : Memory
         Of the body.
+    cells : float
+        Of the surface.
     contact : float
         Largest contact fraction.
     rows : float
@@ -215,108 +158,101 @@ def march_bytes(
 
     Notes
     -----
-    The larger one of the peaks while the contact is solved and while the file is written. The fields are those of
-    :mod:`roughvisc.mechanics.stepping`: two solutions with the points before them, and three trial steps. Measured by
-    ``workflows/benchmarks/memory.py``.
+    The numbers of fields are measured by ``workflows/benchmarks/memory.py``. Kept fields in memory are copied into one
+    array in the end.
     """
-    field, boundary, count = 8.0 * cells, settings.boundary, memory.times.size
-    kept = 1.0 if part == 1 else 2.0  # a part of the surface keeps the pressure that causes the displacement
-    solved = _SOLVE + _TRANSFORMS[boundary] + _IN_CONTACT * contact
-    if isinstance(memory, LayerMemory):
-        kept = _SPECTRUM[boundary]
-        solved += 0.5 * kept * (count + 1)  # symbols
-    solutions, keeping, earlier, ends = _SINGLE, 0, 0, 0
-    if not memory.is_elastic:
-        solutions, keeping, earlier = _PAIR, _KEEPING, _EARLIER if memory.may_ring else 0
-        crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
-        ends = _SOFT_ENDS if memory.glassy <= SOFT * crept else 0
-    solved += (1 + kept) * (solutions + ends) + count * kept * (1 + keeping + ends + earlier)
-    state = _STATE + 2 * kept * count * (1 + memory.may_ring)
-    surface = (_SURFACE + (_WHOLE if part < 1 else 0.0)) * field
-    frames = rows * len(settings.fields) * field
-    if in_memory:
-        return surface + frames + max(part * solved * field, frames)  # they are copied into one array in the end
-    layer = chunks((math.ceil(rows), 1, math.ceil(cells)))[0] if rows else 0  # is written at a time
-    waiting = min(max(rows - 1, 0) * len(settings.fields) * field, _WAITING)
-    return surface + max(part * solved * field + waiting, (part * state + layer) * field)
+    exponentials, layered = memory.times.size, isinstance(memory, LayerMemory)
+    # a part of the surface keeps the pressure that causes the displacement too
+    kept = _SPECTRUM[settings.boundary] if layered else 1.0 if part == 1 else 2.0
+    crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
+    solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if memory.glassy <= SOFT * crept else _PAIR
+    solved = _SOLVE + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
+    solved += solutions * (1 + kept) + copies * kept * exponentials
+    if layered:
+        solved += 0.5 * kept * (exponentials + 1)  # symbols
+    frames = rows * len(settings.fields) if in_memory else 0.0
+    surface = _SURFACE + (_WHOLE if part < 1 else 0.0)
+    return 8.0 * cells * (surface + frames + max(part * solved, frames))
+
+
+def least_rows(settings: Settings, program: Program) -> float:
+    """Return the least number of kept times."""
+    times = len(program.segments) if settings.times is None else settings.times
+    return float(times if isinstance(times, int) else len(times))
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:
-    """Memory of a curve of friction at its peak, without what the process takes in any case. [byte]"""
-    return (_CURVE + len(settings.fields)) * 8.0 * cells
+    """Return the memory of a curve of friction at its peak, without interpreter and libraries. [byte]"""
+    unfolded = 4 if settings.boundary == "mirror" else 1
+    return (_CURVE + len(settings.fields)) * 8.0 * cells * unfolded
 
 
-#: Cells from which it is asked what memory there is: on fewer a march takes less than 100 MB.
-WORTH_ASKING = 512**2
-#: No surface is pressed on fewer cells than these without need: the longest stride that is advised leaves them.
-_FEWEST = 64
-#: Fields of the grid that making or reading a surface takes.
-_MADE = 4.0
+# ------------------------------------------------------------------------------------------------------------- refusal
 
 
-def require_memory(problem: Problem, program: Program, *, in_memory: bool) -> None:
-    """Refuse a march that takes more memory than there is, even if its contact stays sparse.
-
-    Parameters
-    ----------
-    problem, program : Problem, Program
-        Of the case.
-    in_memory : bool
-        Whether the kept fields stay in memory.
+def require_loading(
+    shape: tuple[int, int], area: float, program: Program, settings: Settings, body: Body, *, in_memory: bool
+) -> None:
+    """Refuse a loading on so many cells, on a nominal area [m2], that does not fit even if its contact stays sparse.
 
     Raises
     ------
     TooLargeError
-        If it does not fit: what it needs, what there is, and what would fit.
+        Stating what it needs, what is available, and what would fit.
     """
-    height, body, settings = problem.height, problem.body, problem.settings
-    cells = height.size
-    if cells < WORTH_ASKING:
+    if math.prod(shape) < WORTH_ASKING:
         return
-    memory = choose_memory(body, **memory_options(program.on_area(nominal_area(height)), settings)).memory
-    rows = least_rows(settings, program)
+    program = program.on_area(area)
+    memory, rows = choose_memory(body, **memory_options(program, settings)).memory, least_rows(settings, program)
     free = settings.boundary == "free" and settings.edge == "error"
-    part = 0.0 if free and body.separates and not body.kernel.raises_surface else 1.0  # of an unknown domain
-
-    def needed(cells: float, settings: Settings = settings, in_memory: bool = in_memory) -> float:
-        return march_bytes(settings, cells, memory, rows=rows, part=part, in_memory=in_memory)
-
-    there = memory_available()
-    if there.fits(needed(cells)):
-        return
-    one, periodic = replace(settings, fields=settings.fields[:1]), replace(settings, boundary="periodic")
-    savings = []
-    if in_memory and there.fits(needed(cells, in_memory=False)):
-        savings.append("rv.run, which keeps the fields in a file")
-    if in_memory and len(settings.fields) > 1 and there.fits(needed(cells, one)):
-        savings.append(f"one kept field in place of {len(settings.fields)}")
-    if settings.boundary == "free" and settings.edge == "accept" and there.fits(needed(cells, periodic)):
-        savings.append("boundary = 'periodic'")
-    raise TooLargeError(too_large((height.sizes["x"], height.sizes["y"]), needed, there, savings))
-
-
-def require_memory_of_curve(shape: tuple[int, int], settings: Settings) -> None:
-    """Refuse a curve of friction on a surface of so many cells that takes more memory than there is."""
-    _require(shape, partial(curve_bytes, settings))
+    part = 0.0 if free and body.separates and not body.kernel.raises_surface else 1.0  # the domain is not known yet
+    needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
+    savings = {"rv.run, which keeps the fields in a file": partial(needed, in_memory=False)} if in_memory else {}
+    if in_memory and len(settings.fields) > 1:
+        one = replace(settings, fields=settings.fields[:1])
+        saving = partial(march_bytes, one, memory, rows=rows, part=part, in_memory=True)
+        savings[f"one kept field in place of {len(settings.fields)}"] = saving
+    require_memory(shape, needed, savings)
 
 
 def require_surface(shape: tuple[int, int]) -> None:
-    """Refuse a surface that has too many cells, or cannot be made in the memory there is. [cells]"""
+    """Refuse a surface that has too many cells, or cannot be made in the available memory. [cells]"""
     counts("shape", shape)
-    _require(shape, lambda cells: 8.0 * _MADE * cells)
+    require_memory(shape, lambda cells: 8.0 * _MADE * cells)
 
 
-def _require(shape: tuple[int, int], needed: Callable[[float], float]) -> None:
-    """Refuse what needs more memory than there is, by the number of cells. [byte]"""
+def require_memory(
+    shape: tuple[int, int], needed: Callable[[float], float], savings: Mapping[str, Callable[[float], float]] = {}
+) -> None:
+    """Refuse what needs more memory than is available.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Cells of the surface.
+    needed : callable
+        Memory by the number of cells. [byte]
+    savings : mapping
+        What may be changed, in words -> memory by the number of cells. [byte]
+
+    Raises
+    ------
+    TooLargeError
+        Stating what it needs, what is available, and what would fit.
+    """
     cells = math.prod(shape)
-    if cells >= WORTH_ASKING and not (there := memory_available()).fits(needed(cells)):
-        raise TooLargeError(too_large(shape, needed, there))
+    if cells < WORTH_ASKING:
+        return
+    there = memory_available()
+    if not there.fits(needed(cells)):
+        changes = [words for words, size in savings.items() if there.fits(size(cells))]
+        raise TooLargeError(too_large(shape, needed, there, changes))
 
 
 def too_large(
     shape: tuple[int, int], needed: Callable[[float], float], there: Available, savings: Sequence[str] = ()
 ) -> str:
-    """What is said of a case that does not fit.
+    """Return the message of a case that does not fit.
 
     Parameters
     ----------
@@ -325,9 +261,9 @@ def too_large(
     needed : callable
         Memory by the number of cells. [byte]
     there : Available
-        What there is.
+        Memory that may be taken.
     savings : sequence of str
-        What else would make it fit, beside the finest grid of whole strides.
+        Changes with which it would fit. The finest grid of whole strides is added.
     """
     advice = list(savings)
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
@@ -344,15 +280,8 @@ def too_large(
     )
 
 
-def least_rows(settings: Settings, program: Program) -> float:
-    """Kept times, at least."""
-    if settings.times is None:
-        return float(len(program.segments))
-    return float(settings.times if isinstance(settings.times, int) else len(settings.times))
-
-
 def amount(size: float) -> str:
-    """A number of bytes as one reads it.
+    """Return a number of bytes in words.
 
     Examples
     --------

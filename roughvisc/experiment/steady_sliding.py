@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any, ClassVar, get_args
 
 import numpy as np
@@ -25,7 +26,7 @@ from roughvisc.experiment.notes import (
 )
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.protocol import Experiment, Row, Rows
-from roughvisc.experiment.resources import curve_bytes, require_memory_of_curve
+from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.sliding_grid import AxisTransform, CoarserFaces, SlidingGrid, areas, on_rows
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
@@ -147,10 +148,6 @@ class SteadySliding(Experiment):
         """The number of speeds that are found."""
         return f"speed {done:.0f} of {end:.0f}"
 
-    def bytes_needed(self, settings: Settings, body: Body, cells: float, area: float, **counts: float) -> float:
-        """Memory of one speed. [byte]"""
-        return curve_bytes(settings, cells * (4 if settings.boundary == "mirror" else 1))
-
     def creep_time(self, size: float) -> float:
         """Of the longest wave, at the lowest speed. [s]"""
         return size / min(self.asked)
@@ -198,7 +195,8 @@ class SlidingRows(Rows):
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
         self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
         self._profile = Profile(problem.height, "refuse")
-        require_memory_of_curve((self._profile.gap.shape[0], self._profile.gap.shape[1]), problem.settings)
+        shape = (self._profile.gap.shape[0], self._profile.gap.shape[1])
+        require_memory(shape, partial(curve_bytes, problem.settings))
         if not self._profile.present.all():  # of a punch, which says so itself
             raise InputError("height is missing at some points: expected none, because the surface repeats")
         super().__init__(self._profile.height, (), float(len(curve.asked)), self._profile.highest)

@@ -35,6 +35,7 @@ from roughvisc.experiment.resources import (
     Available,
     amount,
     cores,
+    curve_bytes,
     march_bytes,
     memory_available,
     too_large,
@@ -657,9 +658,9 @@ def _planned(
 
     def needed(cells: float) -> float:
         if isinstance(experiment, Loading):
-            size = march_bytes(settings, cells, history, contact=float(contact.max()), rows=rows, part=setup.part)
+            size = march_bytes(settings, history, cells, contact=float(contact.max()), rows=rows, part=setup.part)
         else:
-            size = experiment.bytes_needed(settings, body, cells, setup.area)
+            size = curve_bytes(settings, cells)
         return PROCESS + size
 
     touching = float(contact.mean())

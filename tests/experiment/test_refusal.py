@@ -1,18 +1,18 @@
 """Cases that cannot fit into memory: refused before anything is taken, with what would fit."""
 
-import resource
-import subprocess
-import sys
 import threading
+from types import SimpleNamespace
 
+import psutil
 import pytest
 from scipy import fft
+from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError, TooLargeError, TransientError
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.resources import Available, cores, threads_for
+from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
 from roughvisc.mechanics import threads as threads_module
 from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
@@ -109,47 +109,18 @@ def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
 # what there is
 
 
-def test_control_groups__of_both_versions_and_all_levels_count(tmp_path, monkeypatch):
-    groups, process = tmp_path / "groups", tmp_path / "self"
-    monkeypatch.setattr(resources, "_GROUPS", groups)
-    monkeypatch.setattr(resources, "_PROC_SELF", process)
-    process.mkdir()
-
-    def group(folder, names, limit, used, cache, statistic):
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, value in zip(names, (limit, used), strict=True):
-            (folder / name).write_text(f"{value}\n")
-        (folder / "memory.stat").write_text(f"other 7\n{statistic} {cache}\n")
-
-    first = ("memory.limit_in_bytes", "memory.usage_in_bytes")
-    second = ("memory.max", "memory.current")
-    group(groups / "memory" / "job" / "task", first, 9223372036854771712, 5000, 0, "total_inactive_file")
-    group(groups / "memory" / "job", first, 9000, 5000, 1000, "total_inactive_file")
-    (process / "cgroup").write_text("4:memory:/job/task\n3:cpu:/\n")
-    assert min(one.size for one in resources._groups()) == 9000 - (5000 - 1000)
-    group(groups / "job" / "task", second, "max", 5000, 0, "inactive_file")
-    group(groups / "job", second, 8000, 5000, 500, "inactive_file")
-    (process / "cgroup").write_text("0::/job/task\n")
-    assert [one.size for one in resources._groups()] == [8000 - (5000 - 500)]
-    (process / "cgroup").unlink()
-    assert not list(resources._groups())
-
-
-def test_limit_of_the_address_space__counts():
-    limit = 8 << 30
-    script = (
-        "import resource\n"
-        f"resource.setrlimit(resource.RLIMIT_AS, ({limit}, {limit}))\n"
-        "from roughvisc.experiment.resources import _own\n"
-        "(found,) = _own()\n"
-        "print(int(found.size), found.words)\n"
-    )
-    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split(
-        " ", 1
-    )
-    assert 0 < int(said[0]) < limit
-    assert "ulimit -v" in said[1]
-    assert resource.getrlimit(resource.RLIMIT_AS)[0] != limit
+def test_memory__is_limited_by_the_container_and_the_dask_worker(monkeypatch):
+    used = psutil.Process().memory_info().rss
+    monkeypatch.setattr("distributed.system.MEMORY_LIMIT", used + 5e6)
+    container = memory_available()
+    assert container.size == pytest.approx(5e6, abs=4e6)
+    assert "container" in container.words
+    worker = SimpleNamespace(memory_manager=SimpleNamespace(memory_limit=used - 1e9))
+    monkeypatch.setattr("distributed.get_worker", lambda: worker)
+    assert memory_available().size == pytest.approx(-1e9, abs=4e6)
+    assert "worker" in memory_available().words
+    worker.memory_manager.memory_limit = None
+    assert memory_available().words == container.words
 
 
 def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatch):
@@ -162,7 +133,7 @@ def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatc
     thread.start()
     thread.join()
     assert found == [1], "beside other threads"
-    with pytest.raises(InputError, match="threads is 0: expected a whole number of at least 1"):
+    with refused("threads", 0):
         threads_for(0)
 
 

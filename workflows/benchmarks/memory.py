@@ -54,7 +54,7 @@ def one(side, material, boundary):
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.solving(), case.program().on_area(nominal_area(case.height()))
     memory = choose_memory(case.body(), **memory_options(program, settings)).memory
-    stated = PROCESS + march_bytes(settings, side**2, memory, contact=contact, rows=rows)
+    stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact, rows=rows)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",
         "contact": contact,

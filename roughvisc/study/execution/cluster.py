@@ -17,7 +17,19 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.resources import PART, PROCESS, WORTH_ASKING, cores, memory_available
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.resources import (
+    PART,
+    PROCESS,
+    WORTH_ASKING,
+    cores,
+    curve_bytes,
+    least_rows,
+    march_bytes,
+    memory_available,
+)
+from roughvisc.experiment.scene import memory_options
+from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.grid import nominal_area
 
@@ -295,7 +307,12 @@ def _sizes(cases: Sequence[Case]) -> Iterable[float]:
             yield 0.0
             continue
         settings, experiment = case.solving(), case.experiment()
-        yield PROCESS + experiment.bytes_needed(settings, case.body(), cells, area)
+        if isinstance(experiment, Loading):
+            program = experiment.program.on_area(area)
+            memory = choose_memory(case.body(), **memory_options(program, settings)).memory
+            yield PROCESS + march_bytes(settings, memory, cells, rows=least_rows(settings, program))
+        else:
+            yield PROCESS + curve_bytes(settings, cells)
 
 
 def _cells_and_area(case: Case) -> tuple[int, float]:
