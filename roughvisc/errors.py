@@ -16,7 +16,27 @@ _SHORTEST = 40
 
 
 class RoughviscError(Exception):
-    """Base of all errors raised on purpose by roughvisc."""
+    """Base of all errors raised on purpose by roughvisc.
+
+    Parameters
+    ----------
+    message : str
+        Complete message.
+    transient : bool
+        Whether the cause lies outside the case, such as a file or the memory. The case is then not recorded as failed,
+        and the same command resumes it.
+
+    Attributes
+    ----------
+    transient
+        As given.
+    """
+
+    transient = False
+
+    def __init__(self, message: str = "", *, transient: bool = False) -> None:
+        super().__init__(message)
+        self.transient = transient or self.transient
 
 
 class InputError(RoughviscError, ValueError):
@@ -32,6 +52,8 @@ class InputError(RoughviscError, ValueError):
         The invalid value.
     expected : str
         Description of valid values.
+    transient : bool
+        As for :class:`RoughviscError`.
 
     Attributes
     ----------
@@ -44,57 +66,35 @@ class InputError(RoughviscError, ValueError):
     material.shear_modulus: found '3 N': expected a modulus [Pa]
     """
 
-    def __init__(self, message: str = "", *, key: str = "", found: object = None, expected: str = "") -> None:
+    def __init__(
+        self, message: str = "", *, key: str = "", found: object = None, expected: str = "", transient: bool = False
+    ) -> None:
         if not message:
             text = repr(found)
             text = text if len(text) <= 60 else text[:57] + "..."
             message = f"{key}: found {text}: expected {expected}" if key else f"found {text}: expected {expected}"
-        super().__init__(message)
+        super().__init__(message, transient=transient)
         self.key, self.found, self.expected = key, found, expected
 
     def prefixed(self, text: str) -> Self:
         """Return this error with a file, table or key in front of its message."""
-        return type(self)(f"{text}: {self}", key=self.key, found=self.found, expected=self.expected)
+        return type(self)(
+            f"{text}: {self}", key=self.key, found=self.found, expected=self.expected, transient=self.transient
+        )
 
 
 class EdgeContactError(InputError):
-    """Contact reached the border of a free-space domain that cannot grow."""
+    """Contact at the border of a surface in free space."""
+
+
+class TooLargeError(InputError):
+    """A case needs more memory than is available: the message states how much, and what would fit."""
+
+    transient = True  # it may fit elsewhere
 
 
 class ConvergenceError(RoughviscError, RuntimeError):
     """A step did not reach its tolerance: the message names the time, the residual and what to try."""
-
-
-class TransientError(RoughviscError, RuntimeError):
-    """Something outside the case was in its way: nothing is recorded against the case, and the same command goes on."""
-
-
-class InUseError(TransientError):
-    """Another run is at work on the same thing: the message names it."""
-
-
-class FolderError(InputError, TransientError):
-    """A folder cannot be made or written to."""
-
-
-class DiskFullError(TransientError):
-    """No space is left for what a case has to write."""
-
-
-class UnusableFileError(InputError, TransientError):
-    """A file under the name of a result cannot be read, or is none that this version reads: it is left as it is."""
-
-
-class DamagedError(InputError, TransientError):
-    """A file was read, and its content is broken."""
-
-
-class TooLargeError(InputError, TransientError):
-    """A case takes more memory than there is here: the message says how much, and what would fit."""
-
-
-class ChangedError(TransientError):
-    """A file was changed after the case that names it was read."""
 
 
 def printable(text: str) -> str:

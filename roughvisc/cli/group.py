@@ -144,7 +144,8 @@ class Commands(click.Group):
         except OSError as error:  # a full disk, a file taken away
             if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
                 raise
-            raise Failure(f"{error.filename or 'input or output'}: {error.strerror or error}", 1) from error
+            place = f"{error.filename}: " if error.filename else ""
+            raise Failure(f"{place}{error.strerror or error}", 1) from error
         except MemoryError as error:
             raise Failure("not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1) from error
         except RecursionError as error:

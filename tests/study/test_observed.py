@@ -182,7 +182,6 @@ def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
 @pytest.mark.thorough
 def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     """The second begins while the first computes: it is refused, and adds its own afterwards."""
-    from roughvisc.errors import InUseError
     from roughvisc.study import observed
 
     fields = 'fields = ["pressure", "gap"]\n'
@@ -195,7 +194,7 @@ def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
         monkeypatch.setattr(observed, "asked", plain)
         try:
             rv.observe(two, tmp_path / "out")
-        except InUseError as error:
+        except BlockingIOError as error:
             refused.append(error)
         return plain(*given)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from distributed import CancelledError, Client, KilledWorker, as_completed
 
-from roughvisc.errors import DiskFullError, RoughviscError
+from roughvisc.errors import RoughviscError
 from roughvisc.study.execution.monitor import SweepLog
 from roughvisc.study.execution.task import Outcome, Report, on_worker, stop_sweep
 
@@ -118,14 +118,14 @@ class _Dispatch:
 
     def take(self, going_on: bool) -> None:
         """Record finished cases; submit those again, if the sweep goes on, that a lost worker has left behind."""
-        full: DiskFullError | None = None
+        full: OSError | None = None
         for future, result in self.finished.next_batch(block=False):
             key = self.futures.pop(future)
             outcome = _outcome(key, result, self.courses[key], self.client)
             if outcome.kind != "interrupted":
                 try:
                     self.book.ended(outcome)
-                except DiskFullError as error:  # after the others, which have ended too
+                except OSError as error:  # after the others, which have ended too
                     full = error
             elif going_on:
                 log.info("%s: resumes on another worker", key)
@@ -167,14 +167,12 @@ def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads
         cases.waiting.extend(texts)
         try:
             _go_on(cases)
-        except (KeyboardInterrupt, SystemExit, DiskFullError):  # dask-jobqueue makes a Ctrl-C a SystemExit
+        except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue makes a Ctrl-C a SystemExit
+            if isinstance(error, OSError) and client.status != "running":
+                raise RoughviscError(_LOST) from error
             book.watch.stopping()
             _stop(cases)
             raise
-        except OSError as error:
-            if client.status == "running":
-                raise
-            raise RoughviscError(_LOST) from error
     finally:
         with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be gone
             client.unsubscribe_topic(name)
@@ -214,7 +212,7 @@ def _stop(cases: _Dispatch) -> None:
 
     threading.Thread(target=tell, daemon=True).start()
     until = time.monotonic() + _PATIENCE
-    with suppress(RoughviscError):  # the scheduler is gone, and they with it; or the disk is full for another one too
+    with suppress(RoughviscError, OSError):  # the scheduler is gone, and they with it; or the disk is full again
         while time.monotonic() < until:
             cases.take(going_on=False)
             there = _workers(client)
@@ -236,7 +234,7 @@ def _outcome(key: str, result: Any, course: _CaseStatus, client: Client) -> Outc
         result = result[1]
     again = course.submissions < _SUBMISSIONS
     if isinstance(result, Outcome):
-        lingers = result.error == "InUseError" and course.is_lingering()
+        lingers = result.kind == "held" and course.is_lingering()
         return Outcome(key, "interrupted") if lingers else result
     if isinstance(result, KilledWorker):
         if course.tries < _LOSSES and again:  # it merely queued there, or had come further

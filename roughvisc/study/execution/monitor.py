@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import sys
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from roughvisc.errors import ON_SCREEN, DiskFullError, printable, shortened
+from roughvisc.errors import ON_SCREEN, printable, shortened
 from roughvisc.progress import Display, Pace, Row, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
@@ -231,9 +232,9 @@ class SweepLog:
         self.watch.ended(outcome)
         if len(self.cases) > 1 and time.monotonic() - self.saved > _SAVE_EVERY:
             self.save()
-        if outcome.error == DiskFullError.__name__:  # the others would fill the log with the same
+        if outcome.disk_full:  # the others would fill the log with the same
             finished = sum(one.entry is not None for one in self.outcomes.values())
-            raise DiskFullError(f"{outcome.message} ({finished} of {len(self.cases)} cases are finished)")
+            raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self.cases)} cases are finished)")
 
     def tell(self, message: str) -> None:
         """Say what the user should know at once, and log it."""

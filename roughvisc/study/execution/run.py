@@ -16,16 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import (
-    ConvergenceError,
-    DamagedError,
-    InputError,
-    InUseError,
-    RoughviscError,
-    TooLargeError,
-    TransientError,
-    UnusableFileError,
-)
+from roughvisc.errors import ConvergenceError, InputError, RoughviscError, TooLargeError
 from roughvisc.labels import annotate, warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.problem import Problem
@@ -36,7 +27,7 @@ from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import open_result, result_path, set_aside, write_result
+from roughvisc.study.storage.store import DamagedError, open_result, result_path, set_aside, write_result
 from roughvisc.variables import NOT_CONVERGED
 from roughvisc.variables.axes import AXES, axis_of
 
@@ -123,7 +114,7 @@ def _named(case: Case) -> Iterator[None]:
     try:
         yield
     except (InputError, ConvergenceError) as error:
-        if case.origin is None or (isinstance(error, TransientError) and not isinstance(error, TooLargeError)):
+        if case.origin is None or (error.transient and not isinstance(error, TooLargeError)):
             raise
         if isinstance(error, InputError):
             raise error.prefixed(str(case.origin)) from error
@@ -191,9 +182,9 @@ def run_case(
     ------
     InputError, ConvergenceError
         As :func:`roughvisc.run`. An unconverged result is kept and none of these.
-    InUseError
+    BlockingIOError
         If another run is at work on this case in this folder.
-    ChangedError
+    RoughviscError
         If the surface's file was changed after the study was read.
     OSError
         If the disk is full; the last checkpoint stays.
@@ -223,7 +214,7 @@ def run_case(
                     keeper.resume()
                     _finish(case, folder, progress, keeper, threads)
                 keeper.remove()
-    except InUseError:
+    except BlockingIOError:
         if is_result_of(case, path):  # the other run has just finished
             return path
         raise
@@ -249,7 +240,7 @@ def set_aside_damaged(case: Case, folder: Path) -> str:
     """
     path = result_path(folder, case.key)
     if not is_result_of(case, path):
-        with suppress(InUseError, OSError), lock_case(lock_path(folder, case.key), patience=0.0):
+        with suppress(OSError), lock_case(lock_path(folder, case.key), patience=0.0):
             return _set_aside_if_damaged(path)
     return ""
 
@@ -269,10 +260,9 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Checkpo
     try:
         dataset = compute(case, progress=progress, keeper=keeper, threads=threads)
         keep(dataset, case, folder)
-    except TransientError:
-        raise
-    except RoughviscError:  # it would fail again in the same way
-        keeper.remove()
+    except RoughviscError as error:
+        if not error.transient:  # it would fail again in the same way
+            keeper.remove()
         raise
     except KeyboardInterrupt:
         keeper.save()
@@ -296,8 +286,12 @@ def is_result_of(case: Case, path: Path) -> bool:
         return False
     if found != case.key:
         expected = f"the result of case {case.key}, which its name says"
-        raise UnusableFileError(
-            f"{path}: holds the result of case {found}: expected {expected}", key=str(path), found=found
+        raise InputError(
+            f"{path}: holds the result of case {found}: expected {expected}",
+            key=str(path),
+            found=found,
+            expected=expected,
+            transient=True,
         )
     return True
 

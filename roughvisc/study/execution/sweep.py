@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roughvisc.errors import DiskFullError, InputError, RoughviscError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.study.execution.cluster import (
     default_client,
@@ -136,7 +136,7 @@ def run_cases(
     ------
     InputError
         If a setting is wrong, or a file under the name of a result cannot be read.
-    DiskFullError
+    OSError
         If the disk is full; the cases that are left are not begun.
     RoughviscError
         If the scheduler was lost.
@@ -178,8 +178,8 @@ def run_cases(
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise
-        except DiskFullError as error:
-            log.warning("%s", error)
+        except OSError as error:
+            log.warning("%s", error.strerror or error)
             raise
         finally:
             book.save()

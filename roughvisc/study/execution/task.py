@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal, TypedDict, get_args
 import numpy as np
 from distributed.core import Status
 
-from roughvisc.errors import DiskFullError, InUseError, RoughviscError, TransientError
+from roughvisc.errors import RoughviscError
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
@@ -92,6 +92,8 @@ class Outcome:
         What an index keeps of the file, if there is one.
     reused : bool
         Whether it ended so in an earlier run.
+    disk_full : bool
+        Whether the disk was full.
     """
 
     key: str
@@ -102,6 +104,7 @@ class Outcome:
     seconds: float = 0.0
     entry: Entry | None = None
     reused: bool = False
+    disk_full: bool = False
 
 
 def run_case_safely(
@@ -131,10 +134,10 @@ def run_case_safely(
     try:
         path = run_case(case, folder, progress=progress, stop=stop, threads=threads)
         outcome = outcome_of(read_entry(path))
-    except InUseError as error:
-        outcome = Outcome(case.key, "held", str(error), type(error).__name__)
+    except BlockingIOError as error:
+        outcome = Outcome(case.key, "held", f"{error.filename}: {error.strerror}", type(error).__name__)
     except RoughviscError as error:
-        kind: Kind = "hindered" if isinstance(error, TransientError) else "failed"
+        kind: Kind = "hindered" if error.transient else "failed"
         outcome = Outcome(case.key, kind, str(error), type(error).__name__)
     except MemoryError:
         text = "not enough memory; what was computed up to the last checkpoint is kept: roughvisc plan says how much a "
@@ -143,8 +146,8 @@ def run_case_safely(
         )
     except OSError as error:  # a full disk, a folder that went away: not the fault of the case
         place = f"{error.filename}: " if error.filename else ""
-        kind_of = DiskFullError if error.errno in (errno.ENOSPC, errno.EDQUOT) else type(error)
-        outcome = Outcome(case.key, "hindered", f"{place}{error.strerror or error}", kind_of.__name__)
+        text, full = f"{place}{error.strerror or error}", error.errno in (errno.ENOSPC, errno.EDQUOT)
+        outcome = Outcome(case.key, "hindered", text, type(error).__name__, disk_full=full)
     except Exception as error:  # noqa: BLE001  (whatever it is, it stops no other case; its traceback is kept)
         text = f"{type(error).__name__}: {error}"
         outcome = Outcome(case.key, "failed", text, type(error).__name__, traceback.format_exc())

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from roughvisc.errors import ChangedError, InputError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.notebook import table
 from roughvisc.study.statement.identity import identity
 from roughvisc.study.statement.schema import Study
@@ -113,7 +113,7 @@ class Case:
         ------
         InputError
             If the scan cannot be read, or its conditioning or its recipe is impossible.
-        ChangedError
+        RoughviscError
             If its files are no longer those that the key stands for.
         """
         from roughvisc.experiment.resources import require_surface  # slow to import
@@ -138,10 +138,11 @@ class Case:
         except InputError:  # gone, or another file by now
             return True
 
-    def _change(self) -> ChangedError:
+    def _change(self) -> RoughviscError:
         named = getattr(self.settings.surface, "file", None) or "the second face"
         problem = f"{named}: was changed after the study was read: expected the heights that the case's key stands for"
-        return ChangedError(line(self.origin, "surface", f"{problem}; run the study again for the new ones"))
+        text = line(self.origin, "surface", f"{problem}; run the study again for the new ones")
+        return RoughviscError(text, transient=True)
 
     @property
     def made_shape(self) -> tuple[int, int] | None:

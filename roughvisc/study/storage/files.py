@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from roughvisc.errors import FolderError, InputError, UnusableFileError
+from roughvisc.errors import InputError
 
 log = logging.getLogger("roughvisc")
 
@@ -31,12 +31,14 @@ def require_writable(folder: Path, why: str = "") -> None:
 
     Raises
     ------
-    FolderError
+    InputError
         If there is none and none can be made, or it is not writable; with the reason that is given.
     """
     if not is_writable(folder):
         needed = f", {why}" if why else ""
-        raise FolderError(f"{existing_part(folder)}: is not writable: expected a folder with write permission{needed}")
+        raise InputError(
+            f"{existing_part(folder)}: is not writable: expected a folder with write permission{needed}", transient=True
+        )
 
 
 def require_folder(folder: Path) -> None:
@@ -56,7 +58,7 @@ def require_file(path: Path) -> None:
 
     Raises
     ------
-    UnusableFileError
+    InputError
         If it is absent, a folder, a pipe or a device, or must not be read.
     """
     expected = "a result of roughvisc (.nc)"
@@ -70,7 +72,9 @@ def require_file(path: Path) -> None:
         found = "does not exist"
     except OSError as error:
         found = f"cannot be read: {error.strerror or error}"
-    raise UnusableFileError(f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected)
+    raise InputError(
+        f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
+    )
 
 
 def existing_part(folder: Path) -> Path:
@@ -99,16 +103,16 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 
     Raises
     ------
-    FolderError
+    InputError
         If the folder cannot be made or written to.
     """
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FolderError(f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder") from error
-    if not os.access(path.parent, os.W_OK):
-        raise FolderError(f"{path.parent}: is not writable: expected a folder with write permission")
+        text = f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder"
+        raise InputError(text, transient=True) from error
+    require_writable(path.parent)
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
     try:
         yield temporary

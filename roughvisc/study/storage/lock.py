@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
-
-from roughvisc.errors import InUseError
 
 #: The lock of a killed process is free when the system has cleared the process away: wait so long. [s]
 _PATIENCE = 2.0
@@ -32,16 +31,18 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
 
     Raises
     ------
-    InUseError
+    BlockingIOError
         If another run holds it.
     """
     lock = FileLock(path)
     try:
         lock.acquire(timeout=patience)
     except Timeout as error:
-        raise InUseError(
-            f"{path}: another run is at work on this case in this folder: expected one run at a time; wait for it, or "
-            "use another folder"
+        raise BlockingIOError(
+            errno.EWOULDBLOCK,
+            "another run is at work on this case in this folder: expected one run at a time; wait for it, or use "
+            "another folder",
+            str(path),
         ) from error
     try:
         yield

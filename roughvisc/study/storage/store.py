@@ -26,7 +26,7 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
-from roughvisc.errors import DamagedError, InputError, UnusableFileError
+from roughvisc.errors import InputError
 from roughvisc.labels import annotate
 from roughvisc.recorder import chunks
 from roughvisc.steps import STEPS, steps_of, with_steps
@@ -53,12 +53,16 @@ _TINY = 1 << 12  # not compressed [bytes]
 BOUNDS = "_bounds"
 
 
+class DamagedError(InputError):
+    """A file was read, and its content is damaged."""
+
+
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
     """Part of a variable of a result, as it is stored.
 
     Raises
     ------
-    UnusableFileError
+    InputError
         If the file is gone or must not be read.
     DamagedError
         If a block does not match its checksum, or the file holds no such variable.
@@ -83,10 +87,10 @@ def _unreadable(path: Path, error: Exception, what: str = "") -> InputError:
             error = refusal
     if isinstance(error, OSError) and error.errno is not None and error.errno > 0:
         text = f"{path}: cannot be read: {error.strerror or error}: expected a result of roughvisc (.nc)"
-        return UnusableFileError(text, key=str(path), found=error.strerror)
+        return InputError(text, key=str(path), found=error.strerror, transient=True)
     reason = f"{what}{error}"
     text = f"{path}: is damaged: {reason}: expected a whole result; remove the file and run its study again"
-    return DamagedError(text, key=str(path), found=reason)
+    return DamagedError(text, key=str(path), found=reason, transient=True)
 
 
 class ResultBackend(BackendEntrypoint):
@@ -404,7 +408,7 @@ def require_hdf5(path: Path) -> None:
     ------
     DamagedError
         If it is truncated, or no HDF5 file.
-    UnusableFileError
+    InputError
         If the system refuses, or it holds a link, a virtual dataset, or data in another file.
     """
     import h5py
@@ -419,7 +423,13 @@ def require_hdf5(path: Path) -> None:
         raise _unreadable(path, error) from error
     if found:
         expected = "a result with all of its data in the file"
-        raise UnusableFileError(f"{path}: holds {found}: expected {expected}", key=str(path), found=found)
+        raise InputError(
+            f"{path}: holds {found}: expected {expected}",
+            key=str(path),
+            found=found,
+            expected=expected,
+            transient=True,
+        )
 
 
 def _outside(group: Any, seen: set[int]) -> str:
@@ -456,7 +466,7 @@ def open_result(path: str | Path) -> xr.Dataset:
 
     Raises
     ------
-    UnusableFileError
+    InputError
         If the file is absent, must not be read, is of a later version, or holds something else than a result.
     DamagedError
         If it was read and is broken.
@@ -476,7 +486,9 @@ def open_result(path: str | Path) -> xr.Dataset:
     if found := _later_format(dataset.attrs) or _foreign(dataset):
         dataset.close()
         expected = f"a result of roughvisc of format {RESULT_FORMAT}"
-        raise UnusableFileError(f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected)
+        raise InputError(
+            f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
+        )
     return dataset
 
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from roughvisc.errors import InputError, InUseError
+from roughvisc.errors import InputError
 from roughvisc.study.storage.files import require_file, require_folder
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import NETCDF, open_result, require_hdf5, result_path, results_at
@@ -146,7 +146,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> lis
     ]
     if needed == paths:
         return []
-    with suppress(InUseError, OSError), lock_case(lock, patience=0.0):
+    with suppress(OSError), lock_case(lock, patience=0.0):
         return [path for path in paths if path not in needed and (path == lock or _removed(path))]
     return []
 

@@ -8,7 +8,7 @@ import xarray as xr
 from support import BALL
 
 from roughvisc.api import run
-from roughvisc.errors import ChangedError
+from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
@@ -89,7 +89,9 @@ def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
     case = read_study(study)
     key = case.key
     bump(scan, 2e-5)
-    with pytest.raises(ChangedError, match=r"bump\.toml: surface: .*scan\.npy: was changed after the study was read"):
+    text = r"bump\.toml: surface: .*scan\.npy: was changed after the study was read"
+    with pytest.raises(RoughviscError, match=text) as caught:
         run(case, tmp_path / "out", progress=False)
+    assert caught.value.transient
     assert not (tmp_path / "out").exists()
     assert read_study(study).key != key

@@ -15,7 +15,6 @@ import xarray as xr
 from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InUseError
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
@@ -393,7 +392,7 @@ def test_two_runs_at_once__the_second_says_so(whole, tmp_path):
 
     def second(now, end):
         if not refused:
-            with pytest.raises(InUseError) as caught:
+            with pytest.raises(BlockingIOError) as caught:
                 run_case(case, tmp_path)
             refused.append(caught)
 

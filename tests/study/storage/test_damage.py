@@ -14,9 +14,10 @@ import xarray as xr
 from support import BALL, refused
 
 import roughvisc as rv
-from roughvisc.errors import DamagedError, UnusableFileError
+from roughvisc.errors import InputError
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.statement.case import read_cases, read_study
+from roughvisc.study.storage.store import DamagedError
 from roughvisc.study.storage.upkeep import clean_folder, verify
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -244,8 +245,9 @@ def test_run__refuses_what_is_not_damaged_and_leaves_it(copied, change, invoke):
     before = path.lstat()
     with another_user(change):
         status, _, err = invoke("run", study, "--out", path.parent, "-q", "--no-plots")
-        with pytest.raises(UnusableFileError):
+        with pytest.raises(InputError) as caught:
             run_case(case, path.parent)
+        assert not isinstance(caught.value, DamagedError)
         if change is not of_another_case:
             with refused(str(path)):
                 rv.open_result(path)
