@@ -128,9 +128,7 @@ def rows(name):
 
 def _short(words):
     """What is expected, without the units, which have a column."""
-    words = re.sub(
-        r"^a number in [^,]+, or a string with a unit of its kind,?", "a quantity", words
-    )
+    words = re.sub(r"^a number \[[^]]+\], or text with a unit,?", "a quantity", words)
     words = re.sub(r" \[[^\[\]]+\]| in s\b", "", words)
     return re.sub(r"(\w)'(\w)", r"\1’\2", words)
 

@@ -1,7 +1,7 @@
-"""Quantities with units: a number in SI or a string such as "5 mN" becomes a float in SI, and a float a readable text.
+"""Quantities with units: conversion of text such as "5 mN" to floats in SI, and of floats to readable text.
 
-Study files and surface cards write ``"10 um"`` or ``"0.1 MPa s"``; inside the package there are only floats. Figures,
-tables and reprs show them with a prefix that suits: a :class:`Unit` is chosen from the data, then used for all of it.
+Study files and surface cards have ``"10 um"`` or ``"0.1 MPa s"``; the package computes with floats in SI. Figures,
+tables and reprs choose one :class:`Unit` with a suitable prefix for all values that they show together.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
-    # mypy cannot say that text ends at the decorator: to it a quantity inside a function is a number
+    # mypy cannot express that the decorator converts text: inside a function it takes a quantity for a number
     Quantity = float | Any
 else:
-    #: What an argument that :func:`quantities` converts may be: a number in SI, or text with a unit.
+    #: An argument that :func:`quantities` converts: a number in SI, or text with a unit.
     Quantity = float | str
 
 _Taking = TypeVar("_Taking", bound=Callable[..., Any])
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
-# A grammar of our own in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would never come back.
+# A grammar in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would not end.
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
 # of "0.31/MPa" the number is 0.31: the 1 of an inverse stands apart
 _INVERSE = rf"(?:(?<=\s)1\s*)?/\s*(?:{_FACTOR}|\({_PRODUCT}\))"
@@ -41,7 +41,7 @@ _ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradi
 
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
-#: The same from texts, and the units that they may stand before without another meaning; both signs for micro.
+#: Power of ten of each prefix in text, with both signs for micro; and the units that take a prefix unambiguously.
 _POWERS = {prefix: power for power, prefix in _PREFIXES.items()} | {"u": -6, "\N{GREEK SMALL LETTER MU}": -6}
 _WITH_PREFIX = frozenset({"m", "N", "Pa", "s"})
 _CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
@@ -55,31 +55,31 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def quantity(value: str | float, unit: str, name: str = "", *, difference: bool = False) -> float:
-    """Value of a quantity in a given unit.
+def quantity(value: str | float, unit: str, key: str = "", *, difference: bool = False) -> float:
+    """Return a quantity as a number in a given unit.
 
     Parameters
     ----------
     value : str or float
-        A number, taken to be in `unit` already, or a string of a number and a unit, such as ``"10 um"``,
-        ``"0.1 MPa s"`` or ``"3 N/m^2"``.
+        A number in `unit`, or text of a number and a unit, such as ``"10 um"``, ``"0.1 MPa s"`` or ``"3 N/m^2"``.
     unit : str
-        The unit expected, as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
-    name : str, optional
-        What the quantity is, for the message: a key of a study file, or a parameter.
+        Unit of the result, such as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
+    key : str, optional
+        Name of the quantity in messages: a key of a study file, or a parameter.
     difference : bool
-        Whether it is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are refused.
+        Whether the quantity is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are
+        refused.
 
     Returns
     -------
     float
-        The value in `unit`, finite. Strings are rounded to 15 significant digits, since conversions leave
-        noise in the last one (``"10 um"`` would be 9.999999999999999e-06 m).
+        The value in `unit`, finite. Text is rounded to 15 significant digits, because conversions leave noise in the
+        last one (``"10 um"`` would be 9.999999999999999e-06 m).
 
     Raises
     ------
     InputError
-        If the value is no finite number or no quantity, its unit is unknown, or it is of another dimension.
+        If the value is not a finite number or a quantity, or its unit is unknown or of another dimension.
 
     Examples
     --------
@@ -90,41 +90,108 @@ def quantity(value: str | float, unit: str, name: str = "", *, difference: bool 
     >>> quantity("0.3 1/MPa", "1/Pa"), quantity("0.31/MPa", "1/Pa"), quantity("2 1/(kPa s)", "1/(Pa s)")
     (3e-07, 3.1e-07, 0.002)
     """
-    label = f"{name} is {shown(value)}" if name else f"found {shown(value)}"
-    wanted = "a number" if unit in ("", "1") else f"a number in {unit}, or a string with a unit of its kind"
+    expected, problem = _expected(unit), ""
+    result = math.nan
     if isinstance(value, str):
         try:
-            result = _parsed(value, unit, label, wanted, difference)
-        except InputError as error:
-            raise InputError(str(error), key=name, found=value, expected=wanted) from error.__cause__
+            result = _parsed(value, unit, difference)
+        except ValueError as error:
+            problem = f", {error}"
     elif isinstance(value, Real) and not isinstance(value, bool):
         try:
             result = float(value)
         except OverflowError:  # an integer of hundreds of digits
             result = math.inf
-    else:
-        raise InputError(f"{label}: expected {wanted}", key=name, found=value, expected=wanted)
+        expected = f"{expected}, finite"
     if not math.isfinite(result):
-        raise InputError(f"{label}: expected {wanted}, finite", key=name, found=value, expected=f"{wanted}, finite")
+        named = f"{key}: " if key else ""
+        message = f"{named}found {shown(value)}{problem}: expected {expected}"
+        raise InputError(message, key=key, found=value, expected=expected)
     return result
 
 
+def _expected(unit: str) -> str:
+    return "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit"
+
+
+def number(
+    value: Any,
+    unit: str,
+    key: str = "",
+    *,
+    above: float | None = None,
+    least: float | None = None,
+    most: float | None = None,
+    below: float | None = None,
+    difference: bool = False,
+    instead: Mapping[str, str] | None = None,
+) -> float:
+    """Return a quantity as a number in a given unit, and refuse it outside its bounds.
+
+    Parameters
+    ----------
+    value : str or float
+        As for :func:`quantity`; also a scalar of NumPy or xarray.
+    unit, key, difference
+        As for :func:`quantity`.
+    above, least, most, below : float, optional
+        Bounds, of which `above` and `below` are excluded. [unit]
+    instead : mapping of str to str, optional
+        Key -> unit of quantities that may be meant if the value has their unit; the message suggests the key.
+
+    Returns
+    -------
+    float
+        The value in `unit`.
+
+    Raises
+    ------
+    InputError
+        If the value is not such a quantity, or outside the bounds.
+
+    Examples
+    --------
+    >>> number("5 mN", "N", "load", above=0)
+    0.005
+    >>> number("-5 mN", "N", "load", above=0)  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    InputError: load: found '-5 mN': expected a number [N], or text with a unit, above 0
+    >>> number("2 MPa", "N", "load", instead={"pressure": "Pa"})  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    InputError: load: found '2 MPa', in megapascal: expected ...; did you mean pressure = '2 MPa'?
+    """
+    if getattr(value, "shape", None) == ():
+        value = value.item()
+    try:
+        found = quantity(value, unit, key, difference=difference)
+    except InputError as error:
+        for other, its_unit in (instead or {}).items():
+            if is_quantity(value, its_unit):
+                hint = f"{error}; did you mean {other} = {value!r}?"
+                raise InputError(hint, key=key, found=value, expected=error.expected) from None
+        raise
+    bounds = {"above": above, "least": least, "most": most, "below": below}
+    if not within(found, **bounds):
+        raise InputError(key=key, found=value, expected=wanted_quantity(unit, **bounds))
+    return found
+
+
 def in_si(value: Any, unit: str, name: str) -> Any:
-    """A value with the texts in it as numbers; anything else stays as it is.
+    """Convert text in a value to numbers in SI; anything else stays unchanged.
 
     Parameters
     ----------
     value : Any
         A number or text; or a list, tuple or dictionary of such values.
     unit : str
-        The unit expected of text.
+        Unit of the numbers.
     name : str
-        What the value is given as, for the message.
+        Name of the value in messages.
 
     Raises
     ------
     InputError
-        As :func:`quantity` does, of the first text that is no quantity of this kind.
+        As for :func:`quantity`, for the first text that is not such a quantity.
 
     Examples
     --------
@@ -143,14 +210,14 @@ def in_si(value: Any, unit: str, name: str) -> Any:
 
 
 def quantities(**units: str) -> Callable[[_Taking], _Taking]:
-    """Decorator of a function or a dataclass: the arguments named are numbers in SI, or text with a unit.
+    """Decorate a function or a dataclass whose named arguments are numbers in SI or text with a unit.
 
-    Text becomes a number before the function sees it; numbers and all else are handed on.
+    Text is converted before the call; other values are passed on unchanged.
 
     Parameters
     ----------
     **units : str
-        Name of the argument -> its unit, as :func:`quantity` takes it.
+        Name of the argument -> its unit, as for :func:`quantity`.
 
     Examples
     --------
@@ -161,7 +228,7 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     True
     >>> area("2 s")  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
-    InputError: radius is '2 s', which is in second: expected a number in m, or a string with a unit of its kind
+    InputError: radius: found '2 s', in second: expected a number [m], or text with a unit
     """
 
     def decorate(function: Any) -> Any:
@@ -187,12 +254,12 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
 
 
 def number_and_unit(text: str) -> tuple[float, str]:
-    """Number and unit of a quantity as they are written.
+    """Split a quantity into its number and its unit.
 
     Parameters
     ----------
     text : str
-        A quantity that :func:`quantity` takes.
+        Valid input of :func:`quantity`.
 
     Examples
     --------
@@ -204,7 +271,7 @@ def number_and_unit(text: str) -> tuple[float, str]:
 
 
 def is_quantity(value: Any, unit: str) -> bool:
-    """Whether a value is a number, or a string of a number and a unit that converts to this one."""
+    """Whether a value is a number, or text that converts to this unit."""
     try:
         quantity(value, unit)
     except InputError:
@@ -213,7 +280,7 @@ def is_quantity(value: Any, unit: str) -> bool:
 
 
 def shown(value: Any) -> str:
-    """What was found, short enough for a message."""
+    """Return a value as short text for a message."""
     if isinstance(value, Mapping):
         return f"a table with {', '.join(map(str, value)) or 'no keys'}"
     text = repr(value)
@@ -246,97 +313,22 @@ def range_in_words(**bounds: float | None) -> str:
 
 
 def wanted_quantity(unit: str, **bounds: float | None) -> str:
-    """What is expected of a quantity, in words."""
-    wanted = "a number" if unit == "1" else f"a number in {unit}, or a string with a unit of its kind,"
-    return (wanted + range_in_words(**bounds)).rstrip(",")
+    """Describe valid values of a quantity."""
+    limits = range_in_words(**bounds)
+    return _expected(unit) + ("," * (unit not in ("", "1")) + limits if limits else "")
 
 
-def bounded_quantity(
-    value: str | float,
-    unit: str,
-    *,
-    instead: Mapping[str, str] | None = None,
-    difference: bool = False,
-    **bounds: float | None,
-) -> float:
-    """Value of a quantity in a given unit and between bounds: the check of study files and of loading programs.
-
-    Parameters
-    ----------
-    value : str or float
-        As :func:`quantity` takes it.
-    unit : str
-        The unit expected.
-    instead : mapping of str to str, optional
-        Key -> unit of quantities that may be meant where the unit is of another kind; the message suggests the key.
-    difference : bool
-        Whether it is a difference of temperatures.
-    **bounds : float, optional
-        ``above``, ``least``, ``most`` and ``below``, the first and the last excluded. [unit]
-
-    Returns
-    -------
-    float
-        The value in `unit`.
-
-    Raises
-    ------
-    InputError
-        If the value is no quantity of this kind, or outside the bounds.
-
-    Examples
-    --------
-    >>> bounded_quantity("2 MPa", "N", instead={"pressure": "Pa"})  # doctest: +IGNORE_EXCEPTION_DETAIL
-    Traceback (most recent call last):
-    InputError: found '2 MPa', which is in megapascal: expected ...; did you mean pressure = '2 MPa'?
-    """
-    try:
-        number = quantity(value, unit, difference=difference)
-    except InputError as error:
-        for key, other in (instead or {}).items():
-            if is_quantity(value, other):
-                hint = f"{error}; did you mean {key} = {value!r}?"
-                raise InputError(hint, found=value, expected=error.expected) from None
-        raise
-    if not within(number, **bounds):
-        raise InputError(found=value, expected=wanted_quantity(unit, **bounds))
-    return number
-
-
-def stated_quantity(value: Any, unit: str, key: str, **bounds: Any) -> float:
-    """The same of a value that is known by a key, which messages begin with; scalars of NumPy and xarray are taken.
-
-    Parameters
-    ----------
-    value, unit, bounds
-        As :func:`bounded_quantity` has them.
-    key : str
-        What the value is given as.
-
-    Raises
-    ------
-    InputError
-        As :func:`bounded_quantity` does, beginning with the key.
-    """
-    if getattr(value, "shape", None) == ():
-        value = value.item()
-    try:
-        return bounded_quantity(value, unit, **bounds)
-    except InputError as error:
-        raise InputError(f"{key}: {error}", key=key, found=value, expected=error.expected) from None
-
-
-def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> float:
-    text = text.replace("°C", "degC").replace("°F", "degF")
-    matched = _QUANTITY.fullmatch(text) if len(text) <= 100 else None
+def _parsed(text: str, unit: str, difference: bool) -> float:
+    """Return the value of a text in a unit; a :class:`ValueError` states what is wrong with the text."""
+    matched = _QUANTITY.fullmatch(text.replace("°C", "degC").replace("°F", "degF")) if len(text) <= 100 else None
     if matched is None:
-        raise InputError(f"{label}, which is no quantity: expected {wanted}")
-    number, found = float(matched[1]), matched[2]
+        raise ValueError("not a quantity")
+    value, found = float(matched[1]), matched[2]
     dimensionless = unit in ("", "1")
     if found is None:
         if dimensionless:
-            return number
-        raise InputError(f"{label}, a text without a unit: expected {wanted} (such as {f'{matched[1]} {unit}'!r})")
+            return value
+        raise ValueError(f"without a unit (such as {f'{matched[1]} {unit}'!r})")
     if (plain := _prefixed(matched[1], found, unit)) is not None:
         return plain
     from pint import PintError  # slow to import
@@ -347,32 +339,32 @@ def _parsed(text: str, unit: str, label: str, wanted: str, difference: bool) -> 
         given = _registry().Unit(names)
         same_kind = given.dimensionality == expected.dimensionality
         converted, begins = (
-            float(_registry().Quantity(value, given).to(expected).magnitude) if same_kind else math.nan
-            for value in (number, 0.0)
+            float(_registry().Quantity(one, given).to(expected).magnitude) if same_kind else math.nan
+            for one in (value, 0.0)
         )
     # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
     except (PintError, ValueError, KeyError, AssertionError) as error:
-        raise InputError(f"{label}, whose unit {found!r} is not known: expected {wanted}") from error
+        raise ValueError(f"in an unknown unit {found!r}") from error
     angle = expected.dimensionless and any(name in _ANGLES for name in names)
     if not same_kind or (angle and str(expected) not in _ANGLES):
-        raise InputError(f"{label}, which is in {given}: expected {wanted}")
+        raise ValueError(f"in {given}")
     if difference and begins:
-        raise InputError(f"{label}, a temperature: expected a difference of temperatures, such as {f'{number:g} K'!r}")
+        raise ValueError(f"a temperature and not a difference of temperatures (such as {f'{value:g} K'!r})")
     return float(f"{converted:.15g}")
 
 
 def _for_pint(unit: str) -> str:
-    """A unit as pint reads it."""
+    """Return a unit in the notation of pint."""
     if unit.startswith("/"):
         return f"1{unit}"
     return "percent" if unit == "%" else unit.replace("·", "*")
 
 
 def _prefixed(number: str, found: str, unit: str) -> float | None:
-    """Value of a number in a unit whose factors are those expected, with prefixes; None: that is for pint to say.
+    """Return the value of a number whose unit is the expected one with SI prefixes, or None.
 
-    Most quantities of a study are such, and the registry of pint takes 0.2 s to build. A number
-    of at most 15 digits comes out as pint's does once that is rounded to 15 digits.
+    Most quantities of a study are of this form, and the registry of pint takes 0.2 s to build. A number of at most 15
+    digits equals the one of pint rounded to 15 digits.
     """
     expected, factors, power = unit.split(" "), found.split(" "), 0
     if len(expected) != len(factors) or not _WITH_PREFIX.issuperset(expected) or len(number) > 15:

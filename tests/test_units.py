@@ -5,12 +5,13 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity, unit_for
+from roughvisc.units import number, quantity, unit_for
 
 PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
 
@@ -162,3 +163,39 @@ def test_quantity__any_text_gives_a_number_or_an_input_error(text):
 )
 def test_unit_for__reads_well(values, si, text):
     assert unit_for(values, si).text(np.nanmax(np.abs(values))) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds"),
+    [
+        (0, {"above": 0}),
+        (1e-320, {"above": 0}),  # no double is its reciprocal
+        ("-1 mm", {"least": 0}),
+        (0.7, {"above": 0, "most": 0.5}),
+        (1.0, {"least": 0, "below": 1}),
+        (np.float32(2.0), {"most": 1}),
+    ],
+)
+def test_number__outside_its_bounds_is_refused(value, bounds):
+    with refused("radius", value):
+        number(value, "m", "radius", **bounds)
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds", "expected"),
+    [
+        (0, {"least": 0}, 0.0),
+        ("1 mm", {"above": 0, "most": 1e-3}, 1e-3),
+        (np.array(2.0), {"below": 3}, 2.0),
+        (xr.DataArray(2.0), {}, 2.0),
+    ],
+)
+def test_number__within_its_bounds_is_a_float(value, bounds, expected):
+    found = number(value, "m", "radius", **bounds)
+    assert type(found) is float
+    assert found == expected
+
+
+def test_number__of_another_quantity_suggests_its_key():
+    with pytest.raises(InputError, match=r"load: .*pressure = '2 MPa'"):
+        number("2 MPa", "N", "load", instead={"approach": "m", "pressure": "Pa"})

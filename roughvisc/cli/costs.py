@@ -136,7 +136,7 @@ def budget(
     from roughvisc.study.budget.budget import budgets, case_of
     from roughvisc.study.storage.store import open_result
     from roughvisc.study.trade.files import part_of_one
-    from roughvisc.units import stated_quantity
+    from roughvisc.units import number
     from roughvisc.variables.axes import AXES
 
     console = Console(quiet=quiet)
@@ -152,7 +152,7 @@ def budget(
     found = budgets(
         case,
         list(quantities) or ["contact_area"],
-        at=[stated_quantity(one, unit, "--at") for one in places] or None,
+        at=[number(one, unit, "--at") for one in places] or None,
         known=known,
         out=folder,
         workers=workers,

@@ -18,7 +18,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.notebook import table
-from roughvisc.units import Quantity, quantities, said, shown, stated_quantity
+from roughvisc.units import Quantity, number, quantities, said, shown
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
@@ -236,9 +236,9 @@ def in_words(segments: Sequence[Segment]) -> list[str]:
     """The first segments, one by one."""
     first = segments[:TOLD]
     words = [str(segment) for segment in first]
-    for number, (before, segment) in enumerate(pairwise(first), 1):
+    for place, (before, segment) in enumerate(pairwise(first), 1):
         if segment.holds and segment.control == before.control:
-            words[number] = f"hold {said(segment.duration, 's')}"  # what else
+            words[place] = f"hold {said(segment.duration, 's')}"  # what else
     return words
 
 
@@ -292,8 +292,8 @@ class Program:
         """Go to a value of what is controlled, linearly."""
         here = f"program.{len(self.segments)}"
         least = 0.0 if control in PUSHING else None
-        end = stated_quantity(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
-        return self._then(Segment(control, stated_quantity(over, "s", f"{here}.over", least=0), end))
+        end = number(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
+        return self._then(Segment(control, number(over, "s", f"{here}.over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
         """This program followed by another one."""
@@ -400,7 +400,7 @@ class Program:
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
         kept = one_of(control, Control, CONTROLS, f"{here}.control")
-        return self._then(Segment(kept, stated_quantity(duration, "s", f"{here}.hold", least=0)))
+        return self._then(Segment(kept, number(duration, "s", f"{here}.hold", least=0)))
 
     def slide(
         self,
@@ -437,13 +437,13 @@ class Program:
         Program: load to 2 N over 50 ms, slide 2 mm along x over 2 s at 1 mm/s, hold 1 s, slide 2 mm along -x over 2 s at 1 mm/s
         """  # noqa: E501 - one line of output
         here = f"program.{len(self.segments)}"
-        far = stated_quantity(distance, "m", f"{here}.slide", above=0)
+        far = number(distance, "m", f"{here}.slide", above=0)
         if (speed is None) == (over is None):
             raise InputError(f"{here}: speed is {speed!r} and over is {over!r}: expected one of them")
         if speed is None:
-            lasting = stated_quantity(over, "s", f"{here}.over", above=0)
+            lasting = number(over, "s", f"{here}.over", above=0)
         else:
-            lasting = far / stated_quantity(speed, "m/s", f"{here}.speed", above=0)
+            lasting = far / number(speed, "m/s", f"{here}.speed", above=0)
         control = self.segments[-1].control if self.segments else "load"
         towards = one_of(direction, Direction, DIRECTIONS, f"{here}.direction")
         return self._then(Segment(control, lasting, slide=Slide(far, towards)))
@@ -473,14 +473,14 @@ class Program:
         unit = UNITS[one_of(control, Control, CONTROLS, "control")]
         if len(times) != len(values) or not len(times):
             raise InputError(f"table has {len(times)} times and {len(values)} values: expected as many, at least one")
-        if times[0] != 0 and stated_quantity(times[0], "s", "table.times.0"):
+        if times[0] != 0 and number(times[0], "s", "table.times.0"):
             raise InputError(f"table starts at time {times[0]!r} s: expected 0")
         segments = []
         before = 0.0
         for row, (time, value) in enumerate(zip(times, values, strict=True)):
             now, end = (
-                stated_quantity(time, "s", f"table.times.{row}"),
-                stated_quantity(value, unit, f"table.values.{row}"),
+                number(time, "s", f"table.times.{row}"),
+                number(value, unit, f"table.values.{row}"),
             )
             if not now >= before:
                 raise InputError(f"table row {row}: time {time!r} s after {before!r} s: expected increasing times")
@@ -519,10 +519,10 @@ class Program:
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
         unit, instead = UNITS[one_of(control, Control, CONTROLS, "control")], INSTEAD[control]
-        middle = stated_quantity(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
-        height = stated_quantity(amplitude, unit, "cycle.amplitude", instead=instead)
-        length = stated_quantity(period, "s", "cycle.period", above=0)
-        duration = length * stated_quantity(cycles, "1", "cycle.cycles", above=0)
+        middle = number(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
+        height = number(amplitude, unit, "cycle.amplitude", instead=instead)
+        length = number(period, "s", "cycle.period", above=0)
+        duration = length * number(cycles, "1", "cycle.cycles", above=0)
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     @quantities(area="m^2")

@@ -13,7 +13,7 @@ from roughvisc.mechanics.transport.flow import Flow, fluxes
 from roughvisc.mechanics.transport.flow import flow as flow_through
 from roughvisc.observables.derived import need
 from roughvisc.topography.grid import spacing
-from roughvisc.units import stated_quantity
+from roughvisc.units import number
 from roughvisc.variables.axes import axis_of
 from roughvisc.variables.transport import LEAK_MEANINGS
 
@@ -82,8 +82,8 @@ def leakage(
     """
     gap = _gap_of(dataset)
     fluid = {
-        "viscosity": stated_quantity(viscosity, "Pa s", "viscosity", above=0),
-        "pressure_drop": stated_quantity(pressure_drop, "Pa", "pressure_drop", above=0),
+        "viscosity": number(viscosity, "Pa s", "viscosity", above=0),
+        "pressure_drop": number(pressure_drop, "Pa", "pressure_drop", above=0),
     }
     drop, wrap = fluid["pressure_drop"] / fluid["viscosity"], _sides_meet(dataset, sides)
     if along not in ("x", "y"):

@@ -176,7 +176,7 @@ def test_influence__of_a_slipping_sheet_does_not_depend_on_poisson():
         ((0.0,), "thickness is 0.0: expected a positive number"),
         ((math.nan,), "thickness is nan"),
         ((math.inf,), "thickness is inf"),
-        (("1 s",), "thickness is '1 s', which is in second"),
+        (("1 s",), "thickness: found '1 s'"),
         ((1.0, -0.1), "Poisson's ratio of a sheet is -0.1: expected 0 to 1/2"),
         ((1.0, 0.5, "glued"), "base is 'glued': expected 'bonded' or 'slipping'"),
     ],

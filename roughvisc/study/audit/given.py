@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import Base
 from roughvisc.study.statement.case import read_cases
 from roughvisc.study.statement.schema.evaluation import BOUNDS
-from roughvisc.units import stated_quantity
+from roughvisc.units import number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class AuditInputs:
         for name, (unit, bounds) in BOUNDS.items():
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, stated_quantity(value, unit, name, **bounds))
+                object.__setattr__(self, name, number(value, unit, name, **bounds))
         if self.base not in (None, *get_args(Base)):
             raise InputError(key="base", found=self.base, expected=" or ".join(map(repr, get_args(Base))))
 

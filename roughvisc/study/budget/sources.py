@@ -18,7 +18,7 @@ from roughvisc.study.budget.solves import Array
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
 from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case
-from roughvisc.units import stated_quantity, unit_for
+from roughvisc.units import number, unit_for
 
 Population = Literal["patch", "ensemble"]
 #: Power with which the error of the grid is taken to vanish.
@@ -108,7 +108,7 @@ def known_errors(given: Mapping[str, Any]) -> dict[str, Any]:
         if not (isinstance(value, int | float) and 0 <= value < 1):
             raise InputError(key=name, found=value, expected="a relative error, at least 0 and below 1")
     if "cutoff" in known:
-        known["cutoff"] = stated_quantity(known["cutoff"], "m", "cutoff", above=0)
+        known["cutoff"] = number(known["cutoff"], "m", "cutoff", above=0)
     found: dict[str, Any] = {"population": "patch"} | known
     if found["population"] not in get_args(Population):
         expected = " or ".join(map(repr, get_args(Population)))

@@ -42,7 +42,7 @@ from roughvisc.study.statement.schema.section import nearest
 from roughvisc.study.storage.files import atomic_write, require_writable
 from roughvisc.study.storage.store import result_path, write_dataset
 from roughvisc.study.trade.ladder import format_tolerance
-from roughvisc.units import is_quantity, stated_quantity
+from roughvisc.units import is_quantity, number
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -84,13 +84,13 @@ def targets_of(want: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, Any
         if name not in (*QUANTITIES, *KNOWN):
             raise InputError(key="want", found=name, expected=f"some of {', '.join((*QUANTITIES, *KNOWN))}")
         if name in QUANTITIES:
-            targets[name] = stated_quantity(value, "1", f"want.{name}", above=0, below=1)
+            targets[name] = number(value, "1", f"want.{name}", above=0, below=1)
     if not targets:
         raise InputError(key="want", found=dict(want), expected="a target such as {'contact_area': '1 %'}")
     known = {name: value for name, value in want.items() if name in KNOWN}
     for name in ("modulus_error", "time_scale_error"):
         if known.get(name) is not None:
-            known[name] = stated_quantity(known[name], "1", name)
+            known[name] = number(known[name], "1", name)
     return targets, known_errors(known)
 
 

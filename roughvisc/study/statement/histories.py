@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.program import PUSHING, UNITS, Control, Program
 from roughvisc.tables import Wanted, read_table
-from roughvisc.units import bounded_quantity, is_quantity, stated_quantity
+from roughvisc.units import is_quantity, number
 
 Array = NDArray[np.float64]
 
@@ -110,8 +110,8 @@ def part_or_value(value: Any, unit: str, largest: float | None = None, key: str 
     """
     try:
         if isinstance(value, str) and is_quantity(value, "1"):
-            return bounded_quantity(value, "1", least=0) * (1.0 if largest is None else largest)
-        return bounded_quantity(value, unit, least=0)
+            return number(value, "1", least=0) * (1.0 if largest is None else largest)
+        return number(value, unit, least=0)
     except InputError as error:
         where = f"{key}: " if key else ""
         raise InputError(f"{where}{error}, or a part of the largest value such as '0.1 %'") from None
@@ -133,9 +133,9 @@ def read_history(
 ) -> History:
     """As :func:`read_program`, for one column of what is controlled."""
     unit = UNITS[control]
-    start = start if start == "first" else stated_quantity(start, "s", "start")
-    end = None if end is None else stated_quantity(end, "s", "end")
-    zero, factor = stated_quantity(zero, unit, "zero"), stated_quantity(factor, "1", "factor")
+    start = start if start == "first" else number(start, "s", "start")
+    end = None if end is None else number(end, "s", "end")
+    zero, factor = number(zero, unit, "zero"), number(factor, "1", "factor")
     if decimal not in (None, ".", ","):
         raise InputError(f"decimal: found {decimal!r}: expected '.' or ','")
     for name in (time, column):

@@ -28,9 +28,9 @@ PLACES = [
 def test_unit_of__is_what_the_key_expects(above, section, case):
     for name, field in section.model_fields.items():
         words = field.description or ""
-        if words.startswith("a number"):  # "a number in Pa, or a string with a unit of its kind, above 0"
+        if words.startswith("a number"):  # "a number [Pa], or text with a unit, above 0"
             stated = words.partition(",")[0].removeprefix("a number").strip()
-            unit = stated.removeprefix("in ") if stated.startswith("in ") else ""
+            unit = stated.removeprefix("[").removesuffix("]") if stated.startswith("[") else ""
             assert unit_of(f"{above}.{name}", case) == unit, name
 
 

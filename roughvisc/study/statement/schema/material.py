@@ -124,7 +124,7 @@ THICKNESS: dict[str, Any] = {
     "thickness": kind(
         float,
         _thickness,
-        "a number in m, or a string with a unit of its kind, above 0; inf: a half-space",
+        "a number [m], or text with a unit, above 0; inf: a half-space",
         {"type": ["number", "string"]},
         Unit("m"),
     ),

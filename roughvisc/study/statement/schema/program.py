@@ -153,7 +153,7 @@ def _share(unit: str) -> Any:
         part_or_value(value, unit)
         return value
 
-    wanted = f"a number in {unit}, or a string with a unit of its kind, at least 0, or a part such as '0.1 %'"
+    wanted = f"a number [{unit}], or text with a unit, at least 0, or a part such as '0.1 %'"
     return kind(Any, check, wanted, {"type": ["number", "string"]})
 
 

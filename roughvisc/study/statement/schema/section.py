@@ -27,7 +27,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from roughvisc.errors import InputError
-from roughvisc.units import bounded_quantity, range_in_words, shown, wanted_quantity, within
+from roughvisc.units import number, range_in_words, shown, wanted_quantity, within
 
 
 @dataclass(frozen=True)
@@ -73,12 +73,12 @@ def measured(
     """Kind: a quantity in SI as a float, from a number or a string with a unit; ``unit="1"`` is a pure number.
 
     Values are rounded to 15 significant digits, so that ``"10 um"`` and ``1e-5`` are the same to the last bit. All else
-    is as :func:`roughvisc.units.bounded_quantity` has it.
+    is as :func:`roughvisc.units.number` has it.
     """
 
     def check(value: Any) -> float:
-        number = bounded_quantity(value, unit, instead=instead, difference=difference, **bounds)
-        return float(f"{number:.15g}") + 0.0  # no negative zero
+        found = number(value, unit, instead=instead, difference=difference, **bounds)
+        return float(f"{found:.15g}") + 0.0  # no negative zero
 
     schema = {"type": "number" if unit == "1" else ["number", "string"]}
     return kind(float, check, wanted_quantity(unit, **bounds), schema, Unit(unit))
