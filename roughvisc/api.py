@@ -11,7 +11,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.steady_sliding import SteadySliding
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material

@@ -8,8 +8,8 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.mechanics import steady_sliding
 from roughvisc.mechanics.materials.frequency import complex_compliance
-from roughvisc.mechanics.sliding import steady
 from roughvisc.variables import STATUS_MEANINGS
 from roughvisc.variables.sliding import SLIDING
 
@@ -197,14 +197,14 @@ def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion()
 
 def test_unsolved_speed__is_missing_and_the_others_stand(curve, monkeypatch):
     """No curve is known on which the iteration stops early: the middle speed is declared unsolved."""
-    solve = steady.steady_state
+    solve = steady_sliding.steady_state
     states = []
 
     def one_unsolved(*given, **settings):
         states.append(solve(*given, **settings))
         return replace(states[-1], converged=len(states) != 2)
 
-    monkeypatch.setattr("roughvisc.experiment.sliding_grid.steady_state", one_unsolved)
+    monkeypatch.setattr("roughvisc.experiment.sliding.steady_state", one_unsolved)
     with pytest.warns(UserWarning, match="20") as warned:
         found = rv.friction(ROUGH, RUBBER, **PRESS | {"speeds": [0.2, 20.0, 2000.0]}, fields=("pressure",))
     assert len(warned) == 1

@@ -77,3 +77,13 @@ def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
     assert np.isnan(rv.friction(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
     few = rv.from_array(1e-6 * np.array([[0.0, 1.0], [2.0, 0.5]]), 1e-3)
     assert np.isnan(rv.friction(few, RUBBER, **asked).grid_error_area).all()
+
+
+def test_grid_error__does_not_depend_on_the_number_of_rows_of_a_line_contact():
+    found = []
+    for rows in (1, 8):
+        wave = rv.wavy(1e-5, 1e-3, (1e-3, rows * 1e-5), (40, rows), waves=1)
+        found.append(rv.friction(wave, RUBBER, pressure=5e3, speeds=0.1, grid_error=True, progress=False))
+    assert 0.1 < float(found[0].contact_fraction[0]) < 0.9
+    for name in ("grid_error_friction", "grid_error_area", "grid_error_gap"):
+        np.testing.assert_allclose(found[1][name], found[0][name], rtol=1e-6)

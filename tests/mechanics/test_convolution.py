@@ -11,7 +11,7 @@ from roughvisc.mechanics import grid as grids
 from roughvisc.mechanics import threads
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid, transform_library
-from roughvisc.mechanics.sliding.steady import Sliding
+from roughvisc.mechanics.steady_sliding import Sliding
 
 SHAPES = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])

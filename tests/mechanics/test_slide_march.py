@@ -13,7 +13,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.program import Slide
-from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 from roughvisc.mechanics.stepping import Scene, march
 from roughvisc.mechanics.tangential import force_across, slope, tangential_force
 

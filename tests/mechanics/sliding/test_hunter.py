@@ -8,7 +8,7 @@ from references import sliding_cylinder
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
-from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 
 RADIUS, LOAD, TIME = 1e-2, 100.0, 1e-3
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * TIME)

@@ -8,7 +8,7 @@ from dense_sliding import PERIOD, dense_on_body, line_profiles, slid
 from layered import sliding_symbol
 
 import roughvisc as rv
-from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 
 #: Times of the materials lie about PERIOD over the speeds; Poisson's ratios differ.
 RUBBER, POLYMER = rv.zener(1e6, 3e5, 3e2, 0.5), rv.zener(8e6, 2e6, 8e3, 0.35)

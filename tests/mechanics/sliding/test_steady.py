@@ -9,13 +9,13 @@ from scipy import fft
 from support import refused
 
 import roughvisc as rv
+from roughvisc.mechanics import steady_sliding
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid, transforms
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
-from roughvisc.mechanics.sliding import steady
-from roughvisc.mechanics.sliding.steady import Sliding, steady_state
+from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 
 LOSSY = {0.2: 0.48, 0.9: 4.4, 2.2: 20.0}  # the largest loss tangent: retarded over instantaneous compliance
 
@@ -65,7 +65,7 @@ def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_d
     found = steady_state(sliding, height.max() - height, 0.05, tolerance=1e-7)
     assert (found.pressure > 0).all()
     exact = found.power_force * (waves[1] / 0.8) / waves[0]
-    assert sliding.force_across(found.pressure) == pytest.approx(exact, rel=1e-5, abs=1e-9 * found.power_force)
+    assert sliding.force(found.pressure, axis=1) == pytest.approx(exact, rel=1e-5, abs=1e-9 * found.power_force)
 
 
 def test_force_across__in_partial_contact_is_pressure_times_slope_of_the_profile():
@@ -76,7 +76,7 @@ def test_force_across__in_partial_contact_is_pressure_times_slope_of_the_profile
     found = steady_state(sliding, height.max() - height, 0.01)
     assert 0.1 < np.mean(found.pressure > 0) < 0.6
     across = mean_traction(height.T, found.pressure.T) * PERIOD**2
-    assert sliding.force_across(found.pressure) == pytest.approx(across, rel=0.03)
+    assert sliding.force(found.pressure, axis=1) == pytest.approx(across, rel=0.03)
     assert across > 0.3 * found.power_force
 
 
@@ -85,7 +85,7 @@ def test_force_across__is_zero_of_a_surface_that_is_its_own_image_across_the_mot
     sliding = Sliding(Body(rubber(), HALF_SPACE), ROUGH.shape, (PERIOD / 45, PERIOD / 40), 0.1)
     found = steady_state(sliding, height.max() - height, LOAD)
     assert found.power_force > 0
-    assert abs(sliding.force_across(found.pressure)) < 1e-6 * found.power_force
+    assert abs(sliding.force(found.pressure, axis=1)) < 1e-6 * found.power_force
 
 
 @pytest.mark.parametrize("speed", [2e-2, 0.2, 2.0])
@@ -239,11 +239,11 @@ def test_units__do_not_matter():
 def test_narrow_grids__are_transformed_by_one_thread(shape, threads, monkeypatch):
     """Handing a small transform over takes ten times as long as the transform."""
     used = set()
-    monkeypatch.setattr(steady, "transforms", lambda threads, xp: used.add(threads) or transforms(threads, xp))
+    monkeypatch.setattr(steady_sliding, "transforms", lambda threads, xp: used.add(threads) or transforms(threads, xp))
     with fft.set_workers(2):
         sliding = Sliding(Body(rubber(), HALF_SPACE), shape, (1e-3, 1e-3), 1.0)
         pressure = np.zeros(shape)
-        for transformed in (sliding.displacement, sliding.full_contact, sliding.force_along, sliding.force_across):
+        for transformed in (sliding.displacement, sliding.full_contact, sliding.force):
             transformed(pressure)
     assert used == {threads}
 

@@ -4,7 +4,7 @@ import pytest
 from support import BALL, refused
 
 import roughvisc as rv
-from roughvisc.experiment.steady_sliding import SteadySliding
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.statement.schema.keys import unit_of
 

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.protocol import Experiment
-from roughvisc.experiment.steady_sliding import DIRECTIONS, SteadySliding
+from roughvisc.experiment.sliding import DIRECTIONS, SteadySliding
 from roughvisc.mechanics.program import INSTEAD
 from roughvisc.study.statement.schema.section import (
     Section,

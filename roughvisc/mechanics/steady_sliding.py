@@ -23,11 +23,13 @@ References
 ----------
 .. [1] S. Mehrotra, SIAM J. Optim. 2 (1992) 575.
 .. [2] Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856.
+.. [3] H. F. Walker, L. Zhou, Numer. Linear Algebra Appl. 1 (1994) 571.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,7 +40,6 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import largest
 from roughvisc.mechanics.grid import namespace, transforms
-from roughvisc.mechanics.sliding.gmres import gmres
 from roughvisc.mechanics.threads import threads_of
 
 Array = Any  # an array of NumPy or CuPy
@@ -55,6 +56,10 @@ _LOOSEST, _STATED = 0.5, 0.05
 _INSIDE = 0.995
 # Least separation at the start, over the range of the gap.
 _START = 0.3
+# Vectors of GMRES before a restart, and in total.
+_RESTART, _MOST_VECTORS = 60, 300
+# A vector is orthogonalised a second time if its length falls below this fraction of its projection.
+_REPEATED = 0.1
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ class Sliding:
             odd[nx // 2] = 0
         if ny % 2 == 0:
             odd_across[:, -1] = 0
-        self._derivative, self._derivative_across = xp.asarray(1j * odd), xp.asarray(1j * odd_across)
+        self._derivatives = xp.asarray(1j * odd), xp.asarray(1j * odd_across)
         response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
         acting, complex_compliance = response > 0, np.broadcast_to(complex_compliance, response.shape)
         endless = acting & ~np.isfinite(complex_compliance)
@@ -178,43 +183,31 @@ class Sliding:
         found = self._convolved((displacement / most).astype(np.float32), symbol)
         return found.astype(float) * (most * unit)
 
-    def force_along(self, pressure: Array) -> float:
-        r"""Return the force that drives the profile, towards +x, :math:`-\int p\, \partial_x u\, \mathrm dA`. [N]
+    def force(self, pressure: Array, axis: int = 0) -> float:
+        r"""Return the force on the profile along an axis, :math:`-\int p\, \partial u\, \mathrm dA`. [N]
+
+        Along x it drives the profile: the friction force. Along y it keeps the profile on its path.
 
         Parameters
         ----------
         pressure : array, shape (nx, ny)
-            Of a steady state. [Pa]
-
-        Notes
-        -----
-        The displacement in phase with the pressure contributes nothing: its kernel is even, so the sum of the pressure
-        over its slope is zero. The rest does not depend on how steeply the pressure ends at the edges of contact.
+            Pressure of a steady state. [Pa]
+        axis : int
+            0 for x, 1 for y.
         """
-        return self._force(pressure, self._derivative)
+        return -float((pressure * self.slope(pressure, axis)).sum()) * self.cell_area
 
-    def force_across(self, pressure: Array) -> float:
-        r"""Return the force that guides the profile, towards +y, :math:`-\int p\, \partial_y u\, \mathrm dA`. [N]
+    def slope(self, pressure: Array, axis: int = 0) -> Array:
+        """Return the slope of the displacement out of phase with the pressure.
 
-        Parameters
-        ----------
-        pressure : array, shape (nx, ny)
-            Of a steady state. [Pa]
-
-        Notes
-        -----
-        In contact the body has the slope of the profile. Only the displacement out of phase contributes, as in
-        :meth:`force_along`.
+        In contact the body has the slope of the profile. The displacement in phase contributes nothing to a force: its
+        kernel is even, so the sum of the pressure over its slope is zero. The rest does not depend on how steeply the
+        pressure ends at the edges of contact. It is a symmetric operator.
         """
-        return self._force(pressure, self._derivative_across)
-
-    def _force(self, pressure: Array, derivative: Array) -> float:
-        """Sum of the pressure over the slope of the displacement out of phase. [N]"""
-        slope = self._convolved(pressure, self._skew * derivative)
-        return -float((pressure * slope).sum()) * self.cell_area
+        return self._convolved(pressure, self._skew * self._derivatives[axis])
 
     def _convolved(self, field: Array, symbol: Array) -> Array:
-        """Convolution in the precision of field and symbol."""
+        """Return a convolution in the precision of field and symbol."""
         self.convolutions += 1
         waves = self._transforms.waves(field)
         waves *= symbol
@@ -246,8 +239,8 @@ def steady_state(
     xp, total = namespace(gap), load / sliding.cell_area
     pressure = xp.full(gap.shape, total / gap.size)
     opening = gap + sliding.displacement(pressure)
-    if xp.ptp(gap) == 0:
-        return _state(sliding, gap, pressure, xp.zeros_like(gap), True, 0, 0)
+    if xp.ptp(gap) == 0:  # uniform pressure, without friction
+        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, True, 0, 0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
     vectors = 0
@@ -265,13 +258,12 @@ def steady_state(
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
         found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
-        correction = pressure + step - found
-        converged = _is_accurate(sliding, found, correction, tolerance)
-        if converged:
+        force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
+        if max(errors) <= tolerance:
             step, approach_step, count = system.solve(right, enough, _STATED, start=step)
             vectors += count
-            correction = pressure + step - found
-            converged = _is_accurate(sliding, found, correction, tolerance)
+            force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
+        converged = max(errors) <= tolerance
         if converged or iteration == max_iterations:
             break
         widening = -separation - diagonal * step
@@ -291,7 +283,18 @@ def steady_state(
         separation += length * widening
         approach += length * (approach_step + approach_added)
         opening = gap + sliding.displacement(pressure)
-    return _state(sliding, gap, found, correction, converged, iteration, vectors)
+    displacement = sliding.displacement(found)
+    return SteadyState(
+        pressure=found,
+        displacement=displacement,
+        approach=float((found * (gap + displacement)).sum()) / total,
+        power_force=force,
+        residual=errors[0],
+        friction_residual=errors[1],
+        converged=converged,
+        iterations=iteration,
+        vectors=vectors,
+    )
 
 
 class _NewtonSystem:
@@ -357,6 +360,10 @@ class _NewtonSystem:
         scaled *= self._scale
         return scaled
 
+    def _rigid_part(self, field: Array) -> float:
+        """Rigid part of a displacement. [m]"""
+        return float((field * self._punch).sum())
+
     def _precondition(self, scaled: Array) -> Array:
         """Step of the pressure without a change of the load. [Pa]"""
         step = self._inverse(scaled / self._scale)
@@ -370,9 +377,59 @@ class _NewtonSystem:
         pressure += self._outside * field
         return pressure
 
-    def _rigid_part(self, field: Array) -> float:
-        """Rigid part of a displacement. [m]"""
-        return float((field * self._punch).sum())
+
+def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tuple[Array, int]:
+    """Solve a linear system by restarted GMRES [2]_, in the form of Walker and Zhou [3]_.
+
+    Parameters
+    ----------
+    operator : callable
+        Takes and returns an array of the shape of the right-hand side.
+    right : array
+        Right-hand side.
+    enough : float
+        Norm of the residual at which the iteration ends.
+
+    Returns
+    -------
+    array
+        The solution, or the last iterate after 300 vectors.
+    int
+        Number of vectors.
+
+    Notes
+    -----
+    SciPy's GMRES takes its inner products from BLAS, so that its bits depend on the number of threads, which differs
+    between this process and the workers of Dask. CuPy's never stops before a restart. ``einsum`` calls no BLAS here.
+    """
+    xp, shape = namespace(right), right.shape
+    residual, solution, count = right.reshape(-1), xp.zeros(right.size), 0
+    norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
+    while norm > enough and count < _MOST_VECTORS:
+        # The first direction is the residual; each further one is the image of the direction before it, orthonormal.
+        directions = xp.empty((_RESTART + 1, right.size))
+        directions[0] = residual / norm
+        triangle, along_residual = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART)
+        for k in range(_RESTART):
+            image = operator(directions[k].reshape(shape)).reshape(-1)
+            for _ in range(2):  # Gram-Schmidt, a second time if little is left
+                along = xp.einsum("ki,i->k", directions[1 : k + 1], image)
+                image -= xp.einsum("ki,k->i", directions[1 : k + 1], along)
+                triangle[:k, k] += along.tolist()  # on the host, like all of the small system
+                length = math.sqrt(float(xp.einsum("i,i->", image, image)))
+                if length > _REPEATED * math.sqrt(float((along**2).sum())):
+                    break
+            triangle[k, k] = length
+            directions[k + 1] = image / length
+            along_residual[k] = float(xp.einsum("i,i->", directions[k + 1], residual))
+            residual = residual - along_residual[k] * directions[k + 1]
+            norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
+            count += 1
+            if norm <= enough or count == _MOST_VECTORS:
+                break
+        weights = xp.asarray(np.linalg.solve(triangle[: k + 1, : k + 1], along_residual[: k + 1]))
+        solution += xp.einsum("ki,k->i", directions[: k + 1], weights)
+    return solution.reshape(shape), count
 
 
 def _longest(values: Array, step: Array) -> float:
@@ -381,34 +438,12 @@ def _longest(values: Array, step: Array) -> float:
     return min(1.0, -largest(values.take(shrinking) / step.take(shrinking), -math.inf))
 
 
-def _residual(pressure: Array, correction: Array) -> float:
-    """Return the estimated error of a pressure from its correction by Newton's step (note 3)."""
-    return _CAUTION * float(abs(correction).sum() / pressure.sum())
+def _friction_and_errors(sliding: Sliding, pressure: Array, correction: Array) -> tuple[float, float, float]:
+    """Return the friction force of a pressure [N], and the estimated errors of both (note 3).
 
-
-def _friction_residual(sliding: Sliding, pressure: Array, correction: Array) -> float:
-    """Return the estimated relative error of the friction force."""
-    force, corrected = sliding.force_along(pressure), sliding.force_along(pressure + correction)
-    return _CAUTION * abs(corrected - force) / abs(corrected) if corrected != force else 0.0
-
-
-def _is_accurate(sliding: Sliding, pressure: Array, correction: Array, tolerance: float) -> bool:
-    within = _residual(pressure, correction) <= tolerance
-    return within and _friction_residual(sliding, pressure, correction) <= tolerance
-
-
-def _state(
-    sliding: Sliding, gap: Array, pressure: Array, correction: Array, converged: bool, iterations: int, vectors: int
-) -> SteadyState:
-    displacement = sliding.displacement(pressure)
-    return SteadyState(
-        pressure=pressure,
-        displacement=displacement,
-        approach=float((pressure * (gap + displacement)).sum() / pressure.sum()),
-        power_force=sliding.force_along(pressure),
-        residual=_residual(pressure, correction),
-        friction_residual=_friction_residual(sliding, pressure, correction),
-        converged=converged,
-        iterations=iterations,
-        vectors=vectors,
-    )
+    The correction changes the force by twice its sum over the slope, to first order.
+    """
+    slope = sliding.slope(pressure)
+    force, change = (-float((field * slope).sum()) * sliding.cell_area for field in (pressure, 2 * correction))
+    pressure_error = _CAUTION * float(abs(correction).sum() / pressure.sum())
+    return force, pressure_error, _CAUTION * abs(change) / abs(force + change) if change else 0.0

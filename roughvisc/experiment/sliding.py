@@ -1,0 +1,400 @@
+"""Steady sliding: a surface that slides at given speeds gives rows over speed."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any, ClassVar, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
+from roughvisc.experiment.notes import (
+    border_note,
+    contact_stands_alone,
+    creep_left,
+    slope_note,
+    speeds_note,
+    surface_stands_alone,
+    table_note,
+    wake_note,
+)
+from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.protocol import Experiment, Row, Rows
+from roughvisc.experiment.resources import curve_bytes, require_memory
+from roughvisc.labels import warnings_text
+from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.contact.neighbours import faces_between, staircase
+from roughvisc.mechanics.grid import Boundary
+from roughvisc.mechanics.program import Direction
+from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
+from roughvisc.mechanics.tangential import slope
+from roughvisc.problem import Problem
+from roughvisc.recorder import RowStore
+from roughvisc.settings import Settings
+from roughvisc.topography.framing import mirror
+from roughvisc.topography.resampling import resample_periodic
+from roughvisc.units import unit_for
+from roughvisc.variables import STATUS_MEANINGS
+from roughvisc.variables.grid_errors import GRID_ERROR
+
+log = logging.getLogger("roughvisc")
+
+Array = NDArray[np.float64]
+
+#: Most speeds of a plan's coarse curves, evenly spread.
+_FEW = 7
+#: Variables of a speed whose contact is not solved; the others are missing.
+_OF_UNSOLVED = ("force", "nominal_pressure", "pressure_residual", "friction_residual", "iterations", "status")
+#: Fields that a row may have.
+_FIELDS = ("pressure", "gap")
+#: Direction -> quarter turns of the grid, counter-clockwise, after which the profile moves along +x.
+_QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
+# A profile whose change across the motion is below this fraction of its range does not change there.
+_ROUNDING = 1e-12
+#: Quantities with a grid error.
+_QUANTITIES = ("friction_force", "contact_area", "approach", "mean_gap")
+#: Stated error of the area over that of counting at rest. On 24 rough surfaces, at three pressures and three speeds,
+#: the stated error is then at least 0.8 of the true one, and 4.8 times as large in the median; with 1 and the orders
+#: of a contact at rest it was below 0.8 in 15 of these 216.
+_COUNTING_CAUTION = 1.5
+#: The friction force by the slope is meaningful if it differs by at most this fraction from that by the power. At low
+#: speed on a rough surface it is the difference of two large forces.
+_MEANINGFUL = 0.1
+
+DIRECTIONS: tuple[str, ...] = get_args(Direction)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadySliding(Experiment):
+    """What is asked of steady sliding, beside a surface, a material and settings; see :func:`roughvisc.friction`.
+
+    Parameters
+    ----------
+    speeds, load, pressure, direction
+        As :func:`roughvisc.friction` has them; the speeds become a tuple.
+
+    Raises
+    ------
+    InputError
+        If a value is none of those expected.
+
+    Examples
+    --------
+    >>> SteadySliding(speeds=[1e-3, 1.0], load=2.0)
+    Steady sliding: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
+    """
+
+    speeds: Sequence[float] | float
+    load: float | None = None
+    pressure: float | None = None
+    direction: Direction = "x"
+
+    axis: ClassVar[str] = "speed"
+    table: ClassVar[str] = "friction"
+    called: ClassVar[str] = "steady sliding"
+    doing: ClassVar[str] = "sliding"
+    boundary: ClassVar[Boundary] = "periodic"
+    states_grid_error: ClassVar[bool] = True
+    #: Measured at 256 and 1024 squared.
+    convolution_cost: ClassVar[float] = 2.1
+
+    def __post_init__(self) -> None:
+        try:
+            speeds = np.atleast_1d(np.asarray(self.speeds, dtype=float))
+        except (TypeError, ValueError):
+            speeds = np.array([])
+        if speeds.ndim != 1 or not speeds.size or not (np.isfinite(speeds) & (speeds > 0)).all():
+            raise InputError(key="speeds", found=self.speeds, expected="positive numbers [m/s]")
+        object.__setattr__(self, "speeds", tuple(speeds.tolist()))
+        if self.direction not in DIRECTIONS:
+            raise InputError(key="direction", found=self.direction, expected=" or ".join(map(repr, DIRECTIONS)))
+        if (self.load is None) == (self.pressure is None):
+            raise InputError(key="load", found=self.load, expected=f"either this or the pressure ({self.pressure!r})")
+        for name, value, unit in (("load", self.load, "N"), ("pressure", self.pressure, "Pa")):
+            if value is not None and not (isinstance(value, int | float) and 0 < value < math.inf):
+                raise InputError(key=name, found=value, expected=f"a positive number [{unit}]")
+
+    def __repr__(self) -> str:
+        ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.asked), max(self.asked))))
+        count = f"{len(self.asked)} speeds from " if len(self.asked) > 1 else ""
+        pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
+        under = unit_for([pressed[0] or 0.0], pressed[1]).text(pressed[0] or 0.0)
+        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
+
+    @property
+    def asked(self) -> tuple[float, ...]:
+        """The speeds, in the order given. [m/s]"""
+        assert isinstance(self.speeds, tuple)
+        return self.speeds
+
+    def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
+        """The steady state at each speed, from the lowest to the highest; the state counts those that are found."""
+        return SlidingRows(problem, self, state or 0)
+
+    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
+        """What has no meaning where a whole surface slides, repeats without end, and never started."""
+        if settings.boundary not in ("periodic", "mirror"):
+            yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic' or 'mirror'"
+        if settings.boundary == "mirror" and self.load is not None:
+            yield (
+                "boundary",
+                "mirror",
+                "the surface is unfolded to four times its area: expected a pressure",
+            )
+        if "displacement" in settings.fields:
+            yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
+        if settings.missing != "refuse":
+            yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
+        yield from super().unsupported(settings)
+
+    def prepared(self, problem: Problem) -> Problem:
+        """Return the problem on the unfolded surface under the mirror boundary: sliding breaks the symmetry."""
+        if problem.settings.boundary != "mirror":
+            return problem
+        log.info("the surface is unfolded: it slides with its mirror images, on four times as many cells")
+        return problem.on(mirror(problem.height), boundary="periodic")
+
+    def content(self) -> Any:
+        """What differs from the defaults."""
+        found = {one.name: getattr(self, one.name) for one in fields(self) if getattr(self, one.name) != one.default}
+        return found | {"speeds": list(self.asked)}
+
+    def progress(self, done: float, end: float) -> str:
+        """The number of speeds that are found."""
+        return f"speed {done:.0f} of {end:.0f}"
+
+    def creep_time(self, size: float) -> float:
+        """Of the longest wave, at the lowest speed. [s]"""
+        return size / min(self.asked)
+
+    @property
+    def largest_speed(self) -> float:
+        """The largest of the speeds. [m/s]"""
+        return max(self.asked)
+
+    def cheaper(self) -> tuple[SteadySliding, int, float]:
+        """Some of the speeds, evenly spread."""
+        order = np.argsort(self.asked)
+        few = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW, len(order))).astype(int))]
+        few_speeds = replace(self, speeds=[self.asked[number] for number in few])
+        return few_speeds, len(order), 1.0
+
+    def force(self, area: float) -> float:
+        """Load on a surface of an area [m2]. [N]"""
+        return float(self.load) if self.load is not None else float(self.pressure or 0.0) * area
+
+
+@dataclass(frozen=True)
+class SlidingGrid:
+    """Cells of a profile that slides along +x.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (nx, ny)
+        Undeformed gap, turned into the motion; one row if it does not change across the motion. [m]
+    spacing : tuple of float
+        Cell sides, turned likewise; the only row is as wide as the surface. [m]
+    """
+
+    gap: Array
+    spacing: tuple[float, float]
+
+    @classmethod
+    def of(cls, gap: Array, spacing: tuple[float, float], direction: str) -> SlidingGrid:
+        """Return the cells of a surface with a gap [m] and cell sides [m] that slides in a direction."""
+        turned = np.rot90(gap, _QUARTERS[direction])
+        dx, dy = spacing[::-1] if _QUARTERS[direction] % 2 else spacing
+        if float(np.ptp(turned, axis=1).max()) <= _ROUNDING * float(np.ptp(turned)):
+            turned, dy = turned[:, :1], dy * turned.shape[1]
+        return cls(np.ascontiguousarray(turned), (dx, dy))
+
+    @property
+    def period(self) -> float:
+        """Length of the surface along the motion. [m]"""
+        return self.gap.shape[0] * self.spacing[0]
+
+    def law(self, body: Body, speed: float, tolerance: float) -> Body:
+        """Return the body with materials that have a complex compliance at the frequencies of a speed. [m/s]"""
+        return body.over_frequencies(speed * 2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]), tolerance)
+
+    def coarser(self, factor: float) -> SlidingGrid:
+        """Return the same waves on cells longer by about a factor, as far as these can hold the waves."""
+        nx, ny = self.gap.shape
+        shape = coarser_shape((nx, ny), factor, False)
+        gap = resample_periodic(self.gap, shape, first_kept=True)
+        dx, dy = self.spacing
+        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (dx * nx / shape[0], dy * ny / shape[1]))
+
+    def areas(self, contact: NDArray[np.bool_]) -> tuple[float, float]:
+        """Return the area of cells in contact, counted and corrected for the grid. [m2]"""
+        cell = self.spacing[0] * self.spacing[1]
+        counted = np.count_nonzero(contact) * cell
+        return counted, max(counted - staircase(contact, ~contact, cell, True), 0.0)
+
+    def opening(self, found: SteadyState) -> Array:
+        """Return the gap of a steady state. [m]"""
+        return np.where(found.pressure > 0, 0.0, np.maximum(self.gap + found.displacement - found.approach, 0.0))
+
+
+class SlidingRows(Rows):
+    """Steady states of one curve, from the lowest speed to the highest.
+
+    Parameters
+    ----------
+    problem : Problem
+        Surface, body and settings.
+    curve : SteadySliding
+        Speeds, load and direction.
+    found : int
+        Number of speeds found already, the lowest ones.
+    """
+
+    def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
+        self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
+        self._profile = Profile(problem.height, "refuse")
+        shape = (self._profile.gap.shape[0], self._profile.gap.shape[1])
+        require_memory(shape, partial(curve_bytes, problem.settings))
+        if not self._profile.present.all():  # a punch has absent cells by its recipe
+            raise InputError("height is missing at some points: expected none, because the surface repeats")
+        super().__init__(self._profile.height, (), float(len(curve.asked)), self._profile.highest)
+        self._force = curve.force(self._profile.nominal_area)
+        self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
+        self._alone = surface_stands_alone(self._profile.height)
+        #: Part of the creep that is left where the next contact comes, by the speed.
+        self._creep_left: dict[float, float] = {}
+        self._coarser: list[SlidingGrid] = []
+        if problem.settings.grid_error:
+            twice, four_times = self._grid.coarser(2.0), self._grid.coarser(4.0)
+            finer_first = (self._grid, twice, four_times)
+            self._coarser = [few for many, few in pairwise(finer_first) if few.gap.shape != many.gap.shape]
+            if not self._coarser:
+                log.warning("no grid error: %d x %d cells cannot be coarsened", *self._grid.gap.shape)
+
+    def __iter__(self) -> Iterator[Row]:
+        """Slide at each speed."""
+        grid, tolerance = self._grid, self._settings.tolerance
+        for done, number in enumerate(np.argsort(self._curve.asked)[self._done :], self._done + 1):
+            speed = self._curve.asked[number]
+            law = grid.law(self._body, speed, 0.1 * tolerance)  # once a speed: a table takes a fit
+            sliding = Sliding(law, grid.gap.shape, grid.spacing, speed)
+            found = steady_state(sliding, grid.gap, self._force, tolerance=tolerance)
+            row, fields = self._row(found)
+            row["friction_force_across"] = sliding.force(found.pressure, axis=1)
+            if self._settings.grid_error:
+                states = [found]
+                for few in self._coarser:
+                    coarse = Sliding(law, few.gap.shape, few.spacing, speed)
+                    states.append(steady_state(coarse, few.gap, self._force, tolerance=tolerance))
+                row |= grid_errors([grid, *self._coarser], states)
+            creep = 0.0
+            if not found.converged:
+                row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
+                fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
+            elif contact_stands_alone(found.pressure, 0) if self._alone is None else self._alone:
+                ages = grid.period / speed, np.inf
+                creep = max(creep_left(*(float(one.contact_compliance(age)) for age in ages)) for one in law.materials)
+            row["convolutions"] = sliding.convolutions
+            facts = {"number": int(number), "creep_left": creep}
+            yield Row(speed, row, fields, state=done, facts=facts, done=float(done))
+
+    def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
+        """Return the numbers of a state, and its fields in the frame of the surface."""
+        force, area, quarters = self._force, self._profile.nominal_area, _QUARTERS[self._curve.direction]
+        counted, contact_area = self._grid.areas(found.pressure > 0)
+        gap = self._grid.opening(found)
+        whole = "full_contact" if (found.pressure > 0).all() else "converged"
+        row = {
+            "force": force,
+            "nominal_pressure": force / area,
+            "approach": found.approach,
+            "contact_area": contact_area,
+            "contact_area_counted": counted,
+            "contact_fraction": self._profile.contact_fraction(contact_area),
+            "mean_gap": float(gap.mean()),
+            "friction_coefficient": found.power_force / force,
+            "friction_force": found.power_force,
+            "stated_error": max(found.residual, found.friction_residual),
+            "pressure_residual": found.residual,
+            "friction_residual": found.friction_residual,
+            "iterations": found.vectors,
+            "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
+        }
+        fields = {}
+        for name in self._settings.fields:
+            turned = np.rot90({"pressure": found.pressure, "gap": gap}[name], -quarters)
+            fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self._profile.gap.shape))
+        return row, fields
+
+    def order(self, records: RowStore) -> list[int]:
+        """In the order in which the speeds were given."""
+        facts = [plain["facts"] for plain in records.plain]
+        self._creep_left = {self._curve.asked[one["number"]]: one["creep_left"] for one in facts}
+        return [int(place) for place in np.argsort([one["number"] for one in facts])]
+
+    def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
+        """Return the direction, and warnings; these are logged too."""
+        warnings = {
+            "slope": slope_note(self.height, "periodic", np.inf),
+            "border": border_note(self.height, xr.Dataset()),
+            "wake": wake_note(self._creep_left, self._grid.period),
+        }
+        for note in filter(None, warnings.values()):
+            log.warning("%s", note)
+        stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
+        return {
+            "direction": self._curve.direction,
+            "warnings": warnings_text(stated | warnings),
+        }
+
+
+def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:
+    """Return the relative errors of friction, area, approach and gap that the grid causes at a speed.
+
+    Parameters
+    ----------
+    grids : sequence of SlidingGrid
+        The grid of the surface, and none to two coarser ones, the finest first.
+    states : sequence of SteadyState
+        Steady states on these grids.
+
+    Returns
+    -------
+    dict
+        Name of a variable -> error; missing (NaN) if no coarser grid has a solution or there is no friction.
+    """
+    grid, found = grids[0], states[0]
+    if len(grids) == 1 or not (found.converged and found.power_force > 0):
+        return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
+    runs = []
+    for cells, state in zip(grids, states, strict=True):
+        area, gap = cells.areas(state.pressure > 0)[1], float(cells.opening(state).mean())
+        numbers = (state.power_force, area, state.approach, gap) if state.converged else [math.nan] * 4
+        runs.append(dict(zip(_QUANTITIES, numbers, strict=True)))
+    ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
+    errors = {name: float(one) for name, one in grid_uncertainties(runs, ratio, moving=True).items()}
+
+    contact = found.pressure > 0
+    hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
+    hidden_gap /= max(runs[0]["mean_gap"], hidden_gap) or 1.0
+    counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
+    # By pressure times slope of the profile: the surface follows the profile at the centres of the cells in contact and
+    # not at the edges of contact, which is an error of the grid.
+    inclined = float(np.sum(found.pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]
+    apart = abs(inclined / found.power_force - 1)
+    least = {
+        "friction_force": apart if apart <= _MEANINGFUL else 0.0,
+        "contact_area": max(hidden_area, counting),
+        "mean_gap": hidden_gap,
+    }
+    for name, error in least.items():
+        errors[name] = float(np.maximum(errors[name], error))  # NaN stays
+    return {GRID_ERROR[name]: error for name, error in errors.items()}

@@ -1,1 +1,0 @@
-"""A profile that slides at constant speed on a viscoelastic body, in its steady state. Arrays only."""
