@@ -92,7 +92,7 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
     )
 
 
-for name in ("all", "any", "astype", "copy", "max", "mean", "min", "reshape", "sum", "take", "tolist"):
+for name in ("all", "any", "astype", "copy", "max", "mean", "min", "reshape", "sum", "take", "tolist", "view"):
     setattr(DeviceArray, name, on_device(getattr(np.ndarray, name)))
     getattr(DeviceArray, name).__doc__ = None  # with examples that are not ours
 

@@ -260,10 +260,11 @@ class Grid:
         return found
 
     def _memory(self, shape: tuple[int, int], number: Any) -> Array:
-        """Return an array to work in, the same in each convolution: new memory takes up to a third more time."""
-        if (shape, number) not in self._memories:
-            self._memories[shape, number] = self.xp.empty(shape, number)
-        return self._memories[shape, number]
+        """Return a complex array to work in, the same in each convolution: new memory takes up to a third more time."""
+        if shape not in self._memories:
+            self._memories[shape] = self.xp.empty(shape, np.complex128)
+        memory = self._memories[shape].reshape(-1).view(number)  # in either precision: one convolution at a time
+        return memory[: shape[0] * shape[1]].reshape(shape)
 
     # ----------------------------------------------------------------------------------------------------- transforms
 

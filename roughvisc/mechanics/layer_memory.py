@@ -85,7 +85,7 @@ class LayerMemory(Memory):
             if new[i]:
                 symbol += new[i] * self.symbols[i]
         answering = self.grid.answering(symbol, self.waves.kernel(new))
-        return Prediction(float(symbol.any()), self.grid.field_of(carried)[None], modes, new, step, answering)
+        return Prediction(float(symbol.any()), self.grid.field_of(carried), modes, new, step, answering)
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
         """Return the memory after a step, at whose end the pressure [Pa] is given; `unit` is not used."""

@@ -31,6 +31,9 @@ from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 Array = Any  # an array of NumPy or CuPy
 Rule = Literal["linear", "bdf2", "constant"]
 
+#: Orders of the series of ``(1 - (1 + x) exp(-x)) / x``, and its coefficients.
+_ORDERS = np.arange(2.0, 16)
+_COEFFICIENTS = (-1) ** _ORDERS * (_ORDERS - 1) / np.cumprod(_ORDERS)
 #: BDF2 is used if the compliance grows by more than this factor within a step.
 STIFF = 3.0
 #: BDF2 is stable while steps grow by no more than 1 + sqrt(2) [1]_; after a longer growth it starts anew.
@@ -69,8 +72,8 @@ class Prediction:
     ----------
     compliance : float
         ``alpha``. [1/Pa]
-    carried : array, shape (k, nx, ny)
-        Displacement due to the history [m], and with ``k = 2`` the pressure that causes it, times a compliance [-].
+    carried : array, shape (nx, ny)
+        Displacement due to the history. [m]
     modes : array, shape (m, k, nx, ny)
         Part of the new modes that the history determines.
     new : ndarray, shape (m,)
@@ -135,14 +138,14 @@ class Memory:
         rule = rule or self.rule(history, step)
         own, earlier, before, new = self.recursion(step, history.step, rule)
         xp = namespace(history.modes)
-        modes, carried = xp.empty_like(history.modes), xp.zeros_like(history.fields)
+        modes, carried = xp.empty_like(history.modes), xp.zeros_like(history.fields[0])
         for i, mode in enumerate(modes):
             xp.multiply(history.modes[i], own[i], out=mode)
             if earlier[i] and history.earlier is not None:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
                 mode += before[i] * history.fields
-            carried += self.compliances[i] * mode
+            carried += self.compliances[i] * mode[0]
         alpha = self.glassy + float((self.compliances * new).sum())
         return Prediction(alpha, carried, modes, new, step)
 
@@ -168,7 +171,9 @@ class Memory:
             return History(fields, history.modes)
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
             mode += weight * fields
-        return History(fields, prediction.modes, history.modes if self.may_ring else None, prediction.step)
+        # the next step can use BDF2 only if it is stiff and not much longer than this one
+        needed = self.may_ring and self.is_stiff(LARGEST_GROWTH * prediction.step)
+        return History(fields, prediction.modes, history.modes if needed else None, prediction.step)
 
     def present(self, history: History) -> Array:
         """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
@@ -270,6 +275,4 @@ class Memory:
 
 def _early_weight(ratio: np.ndarray) -> np.ndarray:
     """Return ``(1 - (1 + x) exp(-x)) / x`` for small ``x``, without cancellation."""
-    order = np.arange(2.0, 16)
-    terms = (-1) ** order * (order - 1) / np.cumprod(order)
-    return np.asarray((terms * ratio[:, None] ** (order - 1)).sum(axis=-1))
+    return np.asarray((_COEFFICIENTS * ratio[:, None] ** (_ORDERS - 1)).sum(axis=-1))

@@ -385,6 +385,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
             steps = steps[:-1]
         yield from steps
+        steps = []  # their memory is free while the next ones are computed
 
 
 def accepted(state: State, point: Point, segment: int) -> Step:
@@ -509,8 +510,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         )
         first = take_step(scene, fine, middle, control, prescribed(middle, fine), share=shares[0])
         second = take_step(scene, first.point, last, control, prescribed(last, fine), share=shares[1])
-        guess = moved(scene, second.point, coarse, fine)
-        once = take_step(scene, coarse, last, control, prescribed(last, coarse), guess, shares[1])
+        once = take_step(
+            scene, coarse, last, control, prescribed(last, coarse), moved(scene, second.point, coarse, fine), shares[1]
+        )
         shown = [
             end_value(scene, here, one, control, prescribed)
             for here, one in ((fine, first), (first.point, second), (coarse, once))
@@ -528,7 +530,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         doubtful = entered_force > UNCERTAIN * scene.tolerance * force
         if in_middle and (doubtful or entered_force + left * state.difference.pressure > 0.8 * scene.tolerance * force):
             next_event, state = event, with_cost(state, solved)  # the pair ends here, so that its error is known
-            del first, second, once, guess, shown, solved  # their memory is free while the pair is tried again
+            del first, second, once, shown, solved  # their memory is free while the pair is tried again
             continue
         share = added(scene, state, first.point, second.point, once.point, segment)
         factor = PLANNED * max(share, 1e-300) ** (-1 / ORDER)
@@ -539,10 +541,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
         if opens and second.point.approach >= fine.approach and taken > shortest:
             state, length = with_cost(state, solved), 0.2 * taken
-            del first, second, once, guess, shown, solved
+            del first, second, once, shown, solved
             continue
         too_long = share > REJECTED and share < REDUCED * refused
-        if not too_long and scene.tolerance < at_end < 0.9 * refused_end:
+        if not too_long and share > NEARLY_NOTHING and scene.tolerance < at_end < 0.9 * refused_end:
             too_long, refused_end, factor = True, at_end, 0.5
         if not too_long or taken <= shortest:
             easy = share < NEARLY_NOTHING and not scene.memory.is_stiff(GROW_FAST * taken)
@@ -553,7 +555,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         refused = share
         state, length = with_cost(state, solved), taken * max(factor, 0.2)
-        del first, second, once, guess, shown, solved
+        del first, second, once, shown, solved
 
     work, whole = work_of_pair(scene, fine, first.point, second.point)
     after = after_solves(scene, state, second, once, solved, whole, length)
@@ -925,7 +927,8 @@ def take_step(
     """
     memory, step, area = scene.memory, time - here.time, scene.grid.cell_area
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
-    alpha, gap = prediction.compliance, scene.gap + prediction.carried[0]
+    alpha, gap = prediction.compliance, prediction.carried
+    gap += scene.gap
     lowest = scene.lowest(gap)
     before = (here.time, here.pressure, memory.unit(here.history)) if step > 0 and not here.is_late else None
     if value == 0 if control == "load" else value <= lowest:
@@ -934,6 +937,8 @@ def take_step(
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Solved(Point(time, nothing, 0.0, approach, history, before, here.start))
     pressure, unit = guess or extrapolated(scene, here, step)
+    guess = None  # not needed while the contact is solved
+    pressure, unit = alpha * pressure, None if unit is None else alpha * unit
     try:
         found = solve_contact(
             prediction.grid or scene.grid,
@@ -941,15 +946,18 @@ def take_step(
             load=value * alpha / area if control == "load" else None,
             approach=value if control == "approach" else None,
             tolerance=max(SOLVER_SHARE * scene.tolerance * share, 1e-10),
-            start=alpha * pressure,
-            start_displacement=None if unit is None else alpha * unit,
+            start=pressure,
+            start_displacement=unit,
+            overwrite=True,
             present=scene.present,
         )
     except ConvergenceError as error:
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
         ) from error
-    pressure, unit = found.pressure / alpha, found.displacement / alpha
+    pressure, unit = found.pressure, found.displacement
+    pressure /= alpha
+    unit /= alpha
     point = Point(
         time,
         pressure,

@@ -34,7 +34,7 @@ def marched(memory, steps, fields, grid, rule=None):
         prediction = memory.predict(history, step, rule)
         kernel = prediction.grid or grid
         unit = kernel.displacement(pressure)
-        predicted = prediction.compliance * unit + prediction.carried[0]
+        predicted = prediction.compliance * unit + prediction.carried
         history = memory.advance(history, prediction, unit, pressure)
         np.testing.assert_allclose(memory.present(history)[0], predicted, rtol=1e-9, atol=1e-12 * abs(predicted).max())
         found.append(predicted)
@@ -54,7 +54,7 @@ def test_equal_materials__have_the_memory_of_a_half_space(boundary, material, ru
             used = "constant" if rule == "bdf2" and (number < 2 or not memory.may_ring) else rule
             prediction = memory.predict(history, step, used)
             unit = (prediction.grid or grid).displacement(pressure)
-            found.append(prediction.compliance * unit + prediction.carried[0])
+            found.append(prediction.compliance * unit + prediction.carried)
             history = memory.advance(history, prediction, unit, pressure)
         return found, memory.after_rest(history, 0.1)
 

@@ -25,7 +25,7 @@ def history_after(memory, steps, unit_at, rule):
         used = "constant" if rule == "bdf2" and history.earlier is None else rule
         prediction = memory.predict(history, step, used)
         unit = unit_at(time) * FIELD
-        predicted = prediction.compliance * unit + prediction.carried[0]
+        predicted = prediction.compliance * unit + prediction.carried
         history = memory.advance(history, prediction, unit, unit)
         np.testing.assert_allclose(memory.present(history)[0], predicted, rtol=1e-12)
     return history

@@ -106,6 +106,7 @@ def solve_contact(
     tolerance: float = 1e-4,
     start: Array | None = None,
     start_displacement: Array | None = None,
+    overwrite: bool = False,
     present: Array | None = None,
     max_iterations: int = 1000,
 ) -> ContactState:
@@ -125,6 +126,8 @@ def solve_contact(
         First guess of the pressure; negative values count as zero. [-]
     start_displacement : array, shape (nx, ny), optional
         Displacement under `start`, if known to 1e-6 or so; saves a convolution. [m]
+    overwrite : bool
+        Whether `gap` and both of these may be overwritten, which saves the memory of three fields.
     present : array of bool, shape (nx, ny), optional
         Cells with material. Default: all.
     max_iterations : int
@@ -149,7 +152,9 @@ def solve_contact(
     lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
     overlap = 0.0 if approach is None else approach - lowest_gap
     unit = load if load is not None else (overlap / grid.stiffest if overlap > 0 else 1.0)
-    given = ((gap - lowest_gap) / unit).reshape(-1)
+    given = (gap if overwrite else gap.copy()).reshape(-1)
+    given -= lowest_gap
+    given /= unit
     if present is not None:
         given[~present] = 0
     level = overlap / unit
@@ -159,7 +164,9 @@ def solve_contact(
 
     # First guess: the given one, else uniform, or the overlap of the surfaces.
     if start is not None:
-        pressure = xp.maximum(start.reshape(-1), 0) / unit
+        pressure = (start if overwrite else start.copy()).reshape(-1)
+        pressure[pressure < 0] = 0
+        pressure /= unit
     else:
         pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.stiffest
     if present is not None:
@@ -168,14 +175,16 @@ def solve_contact(
     pressure *= scale
     is_extrapolated = start is not None and start_displacement is not None
     if start_displacement is not None and start is not None:
-        separation = given + (scale / unit) * start_displacement.reshape(-1)
+        separation = (start_displacement if overwrite else start_displacement.copy()).reshape(-1)
+        separation *= scale / unit
+        separation += given
     else:
         separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
 
     def without_mean(vector: Array) -> Array:
-        return vector - vector.mean() if under_load else vector
+        return vector - vector.sum() / vector.size if under_load else vector
 
-    on_grid, on_grid32 = (Scatter(xp.zeros(gap.shape, number)) for number in (np.float64, np.float32))
+    on_grid = Scatter(xp.zeros(gap.shape))
     contact = xp.flatnonzero(pressure)
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
     requested_size, requested_gap = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
@@ -187,7 +196,7 @@ def solve_contact(
             contact, previous = xp.flatnonzero(pressure), None
 
         # Approach of the present contact, equation (7) of the paper, and the cells that may change, (13) and (14).
-        level = float(separation[contact].mean()) if under_load else level
+        level = float(separation[contact].sum()) / contact.size if under_load else level
         free = separation < level
         if present is not None:
             free &= present
@@ -196,7 +205,8 @@ def solve_contact(
         held, at = pressure[cells], separation[cells]
         residual = without_mean(at - level)
         size, total = largest(abs(residual)), float(held.sum())
-        lowest, highest = -largest(-at, -level), largest(abs(at))
+        least, most = (float(at.min()), float(at.max())) if at.size else (level, 0.0)
+        lowest, highest = min(least, level), max(most, -least, 0.0)
         weighted = inner(held, at)
         energy = max(weighted - inner(held, given[cells]), 0.0)
         if under_load:
@@ -225,7 +235,8 @@ def solve_contact(
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
         waves = LongWaves.of(grid, cells, held, energy)
         rest = residual if waves is None else residual - waves.means(residual)[waves.block]
-        direction = grid.inverse(on_grid32(rest / size, cells)).reshape(-1)[cells].astype(float) * size
+        direction = grid.inverse(on_grid((rest / size).astype(np.float32), cells)).reshape(-1)[cells].astype(float)
+        direction *= size
         if waves is not None:
             direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
         direction = without_mean(direction)
@@ -273,10 +284,11 @@ def solve_contact(
         # Minimize the energy along the search direction, equation (11): one convolution.
         if is_single:
             most = largest(abs(change))
-            response = grid.displacement(on_grid32(change / most, cells)).reshape(-1)
+            response = grid.displacement(on_grid((change / most).astype(np.float32), cells)).reshape(-1)
             response *= most
         elif is_extrapolated:  # replaces the displacement of the first guess, so that its rounding does not pile up
-            response = grid.displacement(on_grid(trial, cells)).reshape(-1) - (separation - given)
+            response = grid.displacement(on_grid(trial, cells)).reshape(-1)
+            response -= separation - given
         else:
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
         curvature = inner(change, response[cells])
@@ -322,19 +334,19 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
 
 
 class Scatter:
-    """A field of zeros that takes the values of some cells."""
+    """A field of zeros that takes the values of some cells, in their precision."""
 
     def __init__(self, zeros: Array) -> None:
-        self.field = zeros
+        self.zeros, self.flat = zeros, zeros.reshape(-1)
         self.cells: Array | slice = slice(0, 0)
 
     def __call__(self, values: Array, cells: Array) -> Array:
         """Return the field with these values; the next call overwrites it."""
-        flat = self.field.reshape(-1)
-        flat[self.cells] = 0
-        flat[cells] = values
+        self.flat[self.cells] = 0
+        self.flat = self.zeros.reshape(-1).view(values.dtype)[: self.zeros.size]
+        self.flat[cells] = values
         self.cells = cells
-        return self.field
+        return self.flat.reshape(self.zeros.shape)
 
 
 def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
