@@ -33,7 +33,7 @@ BASE = {
 MEASURED = {
     "creep.csv": "time [s], compliance [1/MPa]\n0.01, 0.20\n0.1, 0.31\n1, 0.55\n10, 0.82\n",
     "relaxation.csv": "time [s], modulus [MPa]\n0.01, 3\n0.1, 2\n1, 1.5\n10, 1.2\n",
-    "machine.csv": '"Prüfzeit";"Standardkraft";"Standardweg"\n"s";"N";"mm"\n12,30;-0,0004;0,1000\n'
+    "machine.csv": '"Prüfzeit [s]";"Standardkraft [N]";"Standardweg [mm]"\n12,30;-0,0004;0,1000\n'
     "12,40;0,0102;0,1021\n12,50;0,0199;0,1043\n12,60;0,0200;0,1050\n",
     "dma.csv": "frequency, storage [MPa], loss [MPa]\n0.1, 1, 0.2\n1, 1.5, 0.5\n10, 3, 0.6\n100, 3.5, 0.3\n",
 }

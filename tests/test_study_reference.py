@@ -27,6 +27,7 @@ BESIDE = {
 }
 #: a CSV file whose headings have no units, for the keys that say them
 PLAIN = "0.01, 1\n0.1, 2\n1, 3\n"
+FALLING = "0.01, 3\n0.1, 2\n1, 1\n"
 
 
 @pytest.fixture
@@ -104,12 +105,11 @@ def materials(study_keys, name, key, example, folder):
     base = {} if name not in meanings() else tomllib.loads(meanings()[name].get("beside", ""))
     columns = {} if key == "file" else {k: value(study_keys.meaning(name, k)[1]) for k in COLUMNS.get(model, {})}
     if key.endswith("_unit") and key not in needed:
-        heads = [column.name for column in COLUMNS[model].values() if not column.optional]
-        (folder / "plain.csv").write_text(
-            ", ".join(heads) + "\n" + (PLAIN if len(heads) == 2 else "1, 2, 1\n9, 3, 1\n")
-        )
-        if model == "relaxation_table":
-            (folder / "plain.csv").write_text("time, modulus\n0.01, 3\n0.1, 2\n1, 1\n")
+        read = [column for column in COLUMNS[model].values() if not column.optional]
+        units = [f" [{column.unit}]" if column.unit and column.unit_key != key else "" for column in read]
+        heads = ", ".join(column.name + unit for column, unit in zip(read, units, strict=True))
+        rows = PLAIN if len(read) == 2 else "1, 2, 1\n9, 3, 1\n"
+        (folder / "plain.csv").write_text(f"{heads}\n" + (FALLING if model == "relaxation_table" else rows))
         columns = {"file": "plain.csv"}
     base = {} if key == "file" or "file" in columns else base
     base = {k: v for k, v in base.items() if SPRINGS.get(k) != key}

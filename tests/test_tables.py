@@ -23,18 +23,7 @@ ENCODINGS = {
 STYLES = [(",", "", "."), (",", '"', "."), (",", '"', ",")]
 STYLES += [(separator, quote, mark) for separator in (";", "\t") for quote in ("", '"') for mark in ".,"]
 BLANKS = [(" ", "", "."), ("   ", "", ",")]
-#: style -> heading of a column by name and unit, and the cell below that
-HEADINGS = {
-    "brackets": ("{}[{}]", ""),
-    "parentheses": ("{} ({})", ""),
-    "slash": ("{}/{}", ""),
-    "in": ("{} in {}", ""),
-    "underscore": ("{}_{}", ""),
-    "below": ("{}", "{}"),
-    "below in brackets": ("{}", "[{}]"),
-}
-OWN = ("brackets", "parentheses")
-SI = {"time": "s", "züge": "N"}
+HEADINGS = ("{}[{}]", "{} [{}]", "{} ({})", "{}  [ {} ]")
 UNITS = {"time": {"s": 1.0, "ms": 1e-3, "h": 3600.0}, "züge": {"N": 1.0, "mN": 1e-3, "kN": 1e3}}
 
 
@@ -49,32 +38,24 @@ def cells(draw, mark, grouping):
 
 @st.composite
 def tables(draw):
-    """A table as text, whether another program has written it, and the numbers that are in it."""
-    exported = draw(st.booleans())
-    headed = exported or draw(st.booleans())
-    separator, quote, mark = draw(st.sampled_from(STYLES + BLANKS * exported))
+    """A table as text, and the numbers that are in it."""
+    separator, quote, mark = draw(st.sampled_from(STYLES + BLANKS))
     other = "," if mark == "." else "."
     groupings = ["", "'", "\N{NO-BREAK SPACE}", *([other] if quote or separator != other else [])]
     number = cells(mark, draw(st.sampled_from([""] if " " in separator else groupings)))
     rows = draw(st.lists(st.tuples(number, number), min_size=1, max_size=8))
     lines = [{"time": time, "züge": pull, "n": "7"} for (time, _), (pull, _) in rows]
-    units = dict(SI)
-    if headed:
-        # blanks would part a name from its unit
-        styles = [one for one in HEADINGS if one not in ("in", "parentheses") or " " not in separator]
-        over, under = HEADINGS[draw(st.sampled_from(styles if exported else OWN))]
-        units = {key: draw(st.sampled_from([*known])) for key, known in UNITS.items()}
-        named = {key: over.format(key.title() if exported else key, unit) for key, unit in units.items()}
-        lines.insert(0, named | {"n": "n"})
-        if under:
-            lines.insert(1, {key: under.format(unit) for key, unit in units.items()} | {"n": "-"})
-    names = draw(st.permutations(["time", "züge", "n"])) if headed else ["time", "züge"]
+    heading = draw(st.sampled_from(HEADINGS))
+    units = {key: draw(st.sampled_from([*known])) for key, known in UNITS.items()}
+    case = draw(st.sampled_from([str.lower, str.title, str.upper]))
+    lines.insert(0, {key: heading.format(case(key), unit) for key, unit in units.items()} | {"n": "n"})
+    names = draw(st.permutations(["time", "züge", "n"]))
     text = [separator.join(f"{quote}{line[name]}{quote}" for name in names) for line in lines]
     above = st.lists(st.sampled_from(["Prüfbericht", "", "# 5", "Rate;1,5", "a, b"]), max_size=3)
     end = draw(st.sampled_from(["\n", "\r\n"]))
-    text = end.join([*(draw(above) if exported else []), *text, *[""] * draw(st.integers(0, 2))])
-    values = {key: [row[at][1] * UNITS[key][units[key]] for row in rows] for at, key in enumerate(SI)}
-    return text, exported, values
+    text = end.join([*draw(above), *text, *[""] * draw(st.integers(0, 2))])
+    values = {key: [row[at][1] * UNITS[key][units[key]] for row in rows] for at, key in enumerate(UNITS)}
+    return text, values
 
 
 @pytest.fixture(scope="module")
@@ -84,9 +65,9 @@ def path(tmp_path_factory):
 
 @given(table=tables(), encoding=st.sampled_from([*ENCODINGS]))
 def test_table__written_in_any_way_is_read_back(path, table, encoding):
-    text, exported, values = table
+    text, values = table
     path.write_bytes(ENCODINGS[encoding](text))
-    read, lines = read_table(path, PULL, exported=exported)
+    read, lines = read_table(path, PULL)
     assert {*read} == {*values}
     for key, column in values.items():
         np.testing.assert_allclose(read[key], column, rtol=1e-14, err_msg=f"{key} of {text!r}")
@@ -94,7 +75,7 @@ def test_table__written_in_any_way_is_read_back(path, table, encoding):
     assert lines == [*range(last + 1 - len(lines), last + 1)]
 
 
-@pytest.mark.parametrize("heading", ["time;load\n", "# made by hand\ntime;load", "time [ms],load [mN]\r\n\r\n"])
+@pytest.mark.parametrize("heading", ["# made by hand\ntime [s];load [N]", "time [ms],load [mN]\r\n\r\n"])
 def test_heading_without_rows__is_refused(heading, tmp_path):
     path = tmp_path / "empty.csv"
     path.write_text(heading)
@@ -108,18 +89,48 @@ def test_heading_without_rows__is_refused(heading, tmp_path):
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("0,0\n1,5,2,5\n", "line 2"),
-        ("time,load\n0,0\n1,5,2,5\n", "line 3"),
+        ("0,0\n1,5,2,5\n", "line 3"),
         ('"1,250","2,000"\n"3,125","1,500"\n', "1,250"),
         ("0;1,5\n1;2.25\n", "decimal"),
-        ("0;1e999\n1;2\n", "line 1"),
+        ("0;1e999\n1;2\n", "line 2"),
     ],
 )
 def test_columns__that_could_be_other_numbers_are_refused(text, found, tmp_path):
     path = tmp_path / "table.csv"
-    path.write_text(text)
+    path.write_text(f"time [s]{text[1]}load [N]\n{text}" if text[1] in ",;" else f'"time [s]","load [N]"\n{text}')
     with pytest.raises(InputError, match=rf"table\.csv.*{found}"):
         read_table(path, TIME | LOAD)
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("0;0\n1;2\n", "time [s]; load [N]"),
+        ("0 0\n1 2\n", "time [s] load [N]"),
+        ("time in s,load in N\n0,0\n1,2\n", "time [s], load [N]"),
+        ("time/s;load/N\n0;0\n1;2\n", "time [s]; load [N]"),
+        ("time_s;load_N\n0;0\n1;2\n", "time [s]; load [N]"),
+        ("time [s];load\n0;0\n1;2\n", "load [N]"),
+        ("time;load\ns;N\n0;0\n1;2\n", "time [s]"),
+    ],
+)
+def test_other_headings__are_refused_with_the_heading_to_write(text, written, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"table\.csv") as caught:
+        read_table(path, TIME | LOAD)
+    assert caught.value.expected == written
+    assert repr(written) in str(caught.value)
+
+
+def test_heading__stated_units_stand_in_for_absent_ones_and_must_agree(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("time,load [mN],ratio\n1,2,3\n")
+    ratio = {"ratio": Wanted("ratio", "1"), "rest": Wanted("rest", "Pa", optional=True)}
+    read, _ = read_table(path, {"time": Wanted("time", "s", stated="min")} | LOAD | ratio)
+    assert {key: column.tolist() for key, column in read.items()} == {"time": [60.0], "load": [2e-3], "ratio": [3.0]}
+    with pytest.raises(InputError, match=r"'mN'.*'N'"):
+        read_table(path, {"load": Wanted("load", "N", stated="N")})
 
 
 def test_frequencies__are_not_converted_to_angular_ones(tmp_path):

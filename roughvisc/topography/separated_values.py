@@ -10,7 +10,8 @@ from statistics import mode
 from typing import TextIO
 
 from roughvisc.errors import InputError
-from roughvisc.tables import decimal_mark, plain_number, read_text
+from roughvisc.tables import decimal_mark, name_and_unit, plain_number, read_text
+from roughvisc.units import is_quantity
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
 #: What separates -> a row of numbers with decimal points.
@@ -20,6 +21,8 @@ _ROW[" "] = re.compile(rf"\s*{_NUMBER}(?:\s+{_NUMBER})*\s*")
 _WITH_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 #: A length with a decimal comma in a line that is none of numbers, such as ``# Width: 12,5 um``.
 _LENGTH = re.compile(r"(?<=[:=])(\s*)(\d[\d.]*,\d+)(?=\s*\w{0,2}m\b)")
+#: Cells of a heading, such as ``x [mm]; y [mm]; z [um]``.
+_HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
 #: What stands for a missing height.
 _MISSING = ("", "nan", "bad", "-", "#n/a", "n/a")
 
@@ -31,7 +34,8 @@ def separated_by_blanks(path: Path) -> TextIO:
     ----------
     path : path
         Values between blanks, commas, semicolons or tabs, with a decimal point or a decimal comma. Empty values are
-        missing heights. Lines of other text, such as ``# Width: 26 um``, stay as they are.
+        missing heights. A heading ``x [mm], y [mm], z [um]`` of points or ``height [um]`` of a matrix becomes comments
+        that state the units. Lines of other text, such as ``# Width: 26 um``, stay as they are.
 
     Returns
     -------
@@ -43,13 +47,36 @@ def separated_by_blanks(path: Path) -> TextIO:
     UnicodeError
         If it is no text.
     InputError
-        If a line of the matrix holds what is no number, or the decimal mark cannot be told.
+        If a line of the matrix holds what is no number, the decimal mark is ambiguous, or x and y differ in their unit.
     """
     text = read_text(path)
-    lines = text.splitlines()
+    lines = _units_as_comments(text.splitlines())
+    text = "\n".join(lines) + "\n"
     if not all(_ROW[" "].fullmatch(line) or (line[:1] in ("#", "") and "," not in line) for line in lines):
         text = "\n".join(_rewritten(lines)) + "\n"
     return io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8")
+
+
+def _units_as_comments(lines: list[str]) -> list[str]:
+    """Replace a heading by comments that state its units, as Gwyddion writes them."""
+    first = next((at for at, line in enumerate(lines) if line.strip() and not line.startswith("#")), None)
+    if first is None:
+        return lines
+    line = lines[first].replace('"', "")
+    cells = [name_and_unit(cell) for cell in _HEADING.findall(line)]
+    if _HEADING.sub("", line).strip(" ;,\t") or not all(is_quantity(f"1 {unit}", "m") for _, unit in cells):
+        return lines
+    names, units = [name.lower() for name, _ in cells], [unit for _, unit in cells]
+    comments = [f"# Value units: {units[-1]}"]
+    if names[:2] == ["x", "y"] and len(names) == 3:
+        if units[0] != units[1]:
+            expected = f"expected one unit of both, such as 'x [{units[0]}], y [{units[0]}], z [{units[2]}]'"
+            raise InputError(f"line {first + 1}: found x in {units[0]} and y in {units[1]}: {expected}")
+        comments.insert(0, f"# Lateral units: {units[0]}")
+    elif len(names) != 1:
+        expected = "expected 'x [mm], y [mm], z [um]' of points or 'height [um]' of a matrix"
+        raise InputError(f"line {first + 1}: found the heading {lines[first][:60]!r}: {expected}")
+    return [*lines[:first], "\n".join(comments), *lines[first + 1 :]]  # other lines keep their numbers
 
 
 def _rewritten(lines: list[str]) -> list[str]:

@@ -34,7 +34,7 @@ TABULATED = re.sub(
     r'model = "zener".*?(?=\n\[\[)', 'model = "creep_table"\nfile = "edited.csv"', BALL, count=1, flags=re.S
 )
 CREEP = "time [s]; compliance [1/MPa]\n0,01; 0,20\n0,1; 0,31\n1; 0,55\n10; 0,82\n"
-MACHINE = '"Time","Force"\n"s","mN"\n0,0\n0.1,4\n0.2,7\n0.4,5.5\n'
+MACHINE = '"Time [s]","Force [mN]"\n0,0\n0.1,4\n0.2,7\n0.4,5.5\n'
 #: Values of the wrong kind, size, sign or unit, and signs that mean something to TOML or a table.
 TOKENS = (
     *("1e400", "-1e308", "1e-320", "nan", "-inf", "0", "-1", "1_0", "99999999999999999999", "true", '""', '"\\u0000"'),

@@ -74,6 +74,42 @@ def test_heights_of_metres__are_refused_as_widths_are(tmp_path):
     assert open_scan(tmp_path / "high.nc").shape == SHAPE
 
 
+# -- headings ----------------------------------------------------------------------------------------------------------
+
+POINTS = [(0.5 * i, 0.25 * j, 0.125 * i + 0.5 * j) for j in range(4) for i in range(6)]
+MATRIX = [[0.125 * i + 0.5 * j for i in range(6)] for j in range(4)]
+
+
+def write_rows(path, heading, rows, separator):
+    lines = [separator.join(map(str, row)) for row in rows]
+    path.write_text("\n".join(["# by hand", heading.replace(";", separator), *lines]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("separator", [",", "; ", "\t", " "])
+@pytest.mark.parametrize("heading", ["x [mm];y [mm];z [um]", "X (mm);Y (mm);Height (um)"])
+def test_points__have_the_units_of_their_heading(tmp_path, separator, heading):
+    for name in ("scan.xyz", "scan.csv", "scan.txt"):
+        h = open_scan(write_rows(tmp_path / name, heading, POINTS, separator))
+        np.testing.assert_allclose(h, 1e-6 * np.array(MATRIX).T, rtol=1e-12)
+        np.testing.assert_allclose([h.x[1] - h.x[0], h.y[1] - h.y[0]], [5e-4, 2.5e-4], rtol=1e-12)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_matrix__has_the_unit_of_its_heading(tmp_path, separator):
+    for name in ("scan.csv", "scan.txt", "scan.asc"):
+        path = write_rows(tmp_path / name, "height [nm]", MATRIX, separator)
+        np.testing.assert_allclose(open_scan(path, spacing="1 um"), 1e-9 * np.array(MATRIX).T, rtol=1e-12)
+        assert "unit" in refusal(path, spacing="1 um", unit="mm")
+
+
+@pytest.mark.parametrize("heading", ["x [mm];y [um];z [um]", "y [mm];x [mm];z [um]", "x [mm];z [um];y [mm]"])
+def test_points__with_another_heading_are_refused_with_the_heading_to_write(tmp_path, heading):
+    told = refusal(write_rows(tmp_path / "scan.csv", heading, POINTS, ","))
+    assert "line 2" in told
+    assert "x [mm], y [mm], z [um]" in told
+
+
 # -- channels, units, sizes --------------------------------------------------------------------------------------------
 
 
@@ -112,7 +148,7 @@ def test_points__have_heights_in_a_unit_of_their_own(tmp_path):
     np.testing.assert_allclose(spacing(h), (2e-9, 3e-9), rtol=1e-6)
     assert "unit=" in refusal(path, height_unit="um")
     np.testing.assert_allclose(spacing(open_scan(path, height_unit="um", spacing=CELL)), CELL)
-    with pytest.raises(InputError, match="height_unit is '1 s'"):
+    with pytest.raises(InputError, match="height_unit: found '1 s'"):
         open_scan(path, unit="mm", height_unit="s")
 
 

@@ -90,9 +90,8 @@ def read_program(
     Notes
     -----
     Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
-    names; lines above it are skipped. Upper and lower case do not matter, and the unit may be included. The unit is in
-    the heading (``Force [mN]``, ``Force/mN``, ``Force in mN``), in the line below it, or in the name given here. Two
-    rows at the same time are a jump.
+    names; lines above it are skipped. Upper and lower case do not matter. The unit is in the heading, as
+    ``Force [mN]`` or ``Force (mN)``, or in the name given here. Two rows at the same time are a jump.
     """
     chosen = {key: name for key, name in (("load", load), ("approach", approach), ("pressure", pressure)) if name}
     if len(chosen) > 1:
@@ -142,7 +141,7 @@ def read_history(
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"found {name!r}: expected the name of a column")
     wanted = {"time": Wanted(time, "s"), control: Wanted(column, unit)}
-    columns, lines = read_table(path, wanted, exported=True, decimal=decimal)
+    columns, lines = read_table(path, wanted, decimal=decimal)
     times, values = columns["time"], _less(columns[control], zero) * factor
     _check_times(path, times, lines)
     first = float(times[0]) if start == "first" else float(start)

@@ -38,16 +38,16 @@ def write(folder, text, encoding="utf-8"):
     ("text", "encoding", "names"),
     [
         ("Time [s],Load [mN]\n0,0\n1,200\n3,200\n3.5,0", "utf-8", {"time": "Time", "load": "Load"}),
-        ("Kraft/mN;Zeit/ms\n0;0\n200;1000\n200;3000\n0;3500", "utf-8-sig", {"time": "zeit", "load": "Kraft/mN"}),
+        ("Kraft [mN];Zeit [ms]\n0;0\n200;1000\n200;3000\n0;3500", "utf-8-sig", {"time": "zeit", "load": "Kraft [mN]"}),
         (
-            '"Prüfung";"Gummi 3"\r\n"Rate";"1,5"\r\n\r\n"Prüfzeit";"Kraft"\r\n"s";"N"\r\n'
+            '"Prüfung";"Gummi 3"\r\n"Rate";"1,5"\r\n\r\n"Prüfzeit (s)";"Kraft (N)"\r\n'
             "0,0;0,0\r\n1,0;0,2\r\n3,0;0,2\r\n3,5;0,0",
             "cp1252",
             {"time": "Prüfzeit", "load": "Kraft"},
         ),
-        ("t in s\tF in mN\n0\t0\n1,000\t200\n3,000\t200\n3,500\t0", "utf-16", {"time": "t", "load": "F in mN"}),
-        ("Time  Force\n(s)  (N)\n0 0\n1 2e-1\n3 2E-1\n3.5 0", "utf-8", {"time": "Time", "load": "Force"}),
-        ("time_s,F\n0,0\n1,0.2\n3,0.2\n3.5,0", "utf-8", {"time": "time_s", "load": "F [N]"}),
+        ("t (s)\tF (mN)\n0\t0\n1,000\t200\n3,000\t200\n3,500\t0", "utf-16", NAMES),
+        ("Time (s)  Force (N)\n0 0\n1 2e-1\n3 2E-1\n3.5 0", "utf-8", {"time": "Time", "load": "Force"}),
+        ("t [s],F\n0,0\n1,0.2\n3,0.2\n3.5,0", "utf-8", {"time": "t", "load": "F [N]"}),
         ("t [ms];F [uN]\n0;0\n1.000,0;200.000,0\n3.000,0;200.000,0\n3.500,0;0", "utf-8", NAMES),
         (
             '"t [ms]","F [mN]"\n"0","0"\n"1,000.0","200"\n"3,000.0","200"\n"3,500.0","0"',
@@ -55,7 +55,7 @@ def write(folder, text, encoding="utf-8"):
             NAMES,
         ),
     ],
-    ids=["commas", "slashes", "german", "tabs", "blanks", "unit by hand", "points group", "commas group"],
+    ids=["commas", "semicolons", "german", "tabs", "blanks", "unit by hand", "points group", "commas group"],
 )
 def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
     assert rv.read_program(write(tmp_path, text, encoding), **names) == rv.Program.table(TIMES, LOADS)
@@ -65,6 +65,7 @@ def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
     ("text", "keys", "at"),
     [
         ("t [s],F [N]\n0,0", {"time": "t", "load": "Force"}, "Force"),
+        ("t/s,F/N\n0,0\n1,1", NAMES, r"t \[s\], F \[N\]"),
         ("t [s],F\n0,0\n1,1", NAMES, "unit"),
         ("t [s],F [mm]\n0,0\n1,1", NAMES, "load"),
         ("t [s],F [N],F [mN]\n0,0,0", NAMES, "line 1"),
