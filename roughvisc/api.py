@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
-from roughvisc.problem import Problem
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are

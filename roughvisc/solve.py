@@ -1,33 +1,106 @@
-"""The driver: takes the rows that an experiment yields from a problem, one after the other, and has them recorded."""
+"""The driver: takes the rows that an experiment yields, one after the other, and has them recorded."""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
-from roughvisc.experiment.protocol import Experiment, Outgrown, Rows
+from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
-from roughvisc.labels import annotate, in_order, warnings_of, warnings_text
-from roughvisc.mechanics.body import separability_error
-from roughvisc.mechanics.materials.creep import complete
-from roughvisc.problem import Problem
-from roughvisc.recorder import Checkpoint, MemoryRecorder, Recorder, RowStore
+from roughvisc.labels import annotate, in_order
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.steps import TITLE, with_steps
 from roughvisc.topography.grid import checked, nominal_area
+from roughvisc.topography.indenters import highest
 from roughvisc.variables import RESULT_FORMAT, STEPPED
 
 log = logging.getLogger("roughvisc")
+Array = NDArray[Any]
 Progress = Callable[[float, float], None]
+#: Between two libraries in the account of what a solve was computed with.
+_THEN = "; then "
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Progress of a solve.
+
+    Attributes
+    ----------
+    state : Any
+        From which the rows of the experiment continue; None at the start.
+    done : float
+        Progress, of the end of the rows.
+    rows : int
+        Number of recorded rows, those of steps that are not kept included.
+    wall_time : float
+        Spent so far. [s]
+    transforms : str
+        Libraries that it was computed with, one after the other.
+    """
+
+    state: Any = None
+    done: float = 0.0
+    rows: int = 0
+    wall_time: float = 0.0
+    transforms: str = field(default_factory=transform_library)
+
+    def with_current_transforms(self) -> Checkpoint:
+        """Return the checkpoint of a solve that continues with the transforms of this process."""
+        before = self.transforms.split(_THEN)
+        return replace(self, transforms=_THEN.join(dict.fromkeys([*before, transform_library()])))
+
+
+class Recorder:
+    """Rows of a solve, kept in memory.
+
+    Attributes
+    ----------
+    latest : Checkpoint
+        From which the solve continues.
+    plain : list of dict
+        Values of the rows, with ``kept`` and ``place``.
+    in_memory : bool
+        Whether fields stay in memory.
+    """
+
+    in_memory = True
+
+    def __init__(self) -> None:
+        self.latest = Checkpoint()
+        self.plain: list[dict[str, Any]] = []
+        self._arrays: list[Mapping[str, Array]] = []
+
+    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Record the values and the fields of a row; the arrays are not changed any more."""
+        self.plain.append(plain)
+        self._arrays.append(arrays)
+
+    def update(self, reached: Checkpoint) -> None:
+        """Record the progress; the solve may be stopped here. In memory a state is not needed again."""
+
+    def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
+        """Return a field of some rows, an array (rows, x, y)."""
+        frames = np.empty((len(rows), *shape))
+        for frame, row in zip(frames, rows, strict=True):
+            frame[...] = self._arrays[row][name]
+        return frames
+
+    def restart(self) -> None:
+        """Forget all rows: the solve begins again."""
+        self.plain, self._arrays = [], []
 
 
 def solve(
@@ -38,7 +111,7 @@ def solve(
     progress: bool | Progress = False,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Do an experiment with a problem.
+    """Run an experiment and return its result.
 
     Parameters
     ----------
@@ -47,11 +120,11 @@ def solve(
     experiment : Experiment
         What is done.
     recorder : Recorder, optional
-        Takes what is computed, and knows where to go on from. Default: in memory, from the beginning.
+        Records the rows, and knows from where the run continues. Default: in memory, from the beginning.
     progress : bool or callable
-        A progress bar, or a function called with how far it is of how much.
+        A progress bar, or a function called with the progress and its end.
     threads : int, optional
-        As :func:`roughvisc.simulate` has them.
+        As in :func:`roughvisc.simulate`.
 
     Returns
     -------
@@ -61,141 +134,110 @@ def solve(
     Raises
     ------
     InputError
-        If the input is wrong; nothing has been computed then.
+        If the input is invalid; nothing has been computed then.
     ConvergenceError
         If there is no row.
     """
-    problem = replace(problem, height=checked(problem.height, "height", least=1)).with_known_boundary(
-        experiment.boundary
-    )
-    for name, found, why in experiment.unsupported(problem.settings):
+    from roughvisc.progress import reporting  # slow to import
+
+    height = checked(problem.height, "height", least=1)
+    problem = replace(problem, height=height).with_known_boundary(experiment.boundary)
+    settings = problem.settings
+    for name, found, why in experiment.unsupported(settings):
         raise InputError(f"{name} is {found!r}: {why}")
-    problem = experiment.prepared(problem)
-    problem.check_cells()
-    height, settings, count = problem.height, problem.settings, threads_for(threads)
-    again = settings.grid_error and not experiment.states_grid_error
-    needed = ("pressure",) if again and "pressure" not in settings.fields else ()
-    dataset = _solve_once(
-        problem.on(height, fields=(*settings.fields, *needed)),
-        experiment,
-        recorder or MemoryRecorder(),
-        progress,
-        count,
-    )
-    if not again:
-        return dataset
+    needed: tuple[str, ...] = ()
+    if settings.grid_error and isinstance(experiment, Loading) and "pressure" not in settings.fields:
+        needed = ("pressure",)
+        problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
+    label = "pressing" if experiment.axis == "time" else "sliding"
+    with fft.set_workers(threads_for(threads)):
+        with reporting(progress, label, at=experiment.progress) as report:
+            dataset = _solve_once(problem, experiment, recorder or Recorder(), report)
+        if settings.grid_error and isinstance(experiment, Loading):
+            # coarser grids may be of other sizes: the loads are those of the given area
+            loads = Loading(experiment.program.on_area(nominal_area(height)))
 
-    loads = experiment.on_area(nominal_area(height))  # coarser grids may be of other sizes
+            def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
+                coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
+                found = _solve_once(coarse, loads, Recorder(), lambda *_: None)
+                apart = np.abs(found["time"].values[:, None] - times)  # a slide has others, by half a longer cell
+                return found.isel(time=apart.argmin(axis=0))
 
-    def on_coarser(few: xr.DataArray, places: list[float]) -> xr.Dataset:
-        wanted = replace(problem, settings=experiment.with_rows_at(settings, places)).on(few, fields=("pressure",))
-        found = _solve_once(wanted, loads, MemoryRecorder(), False, count)
-        apart = np.abs(found[experiment.axis].values[:, None] - places)  # a slide has others, by half a longer cell
-        return found.isel({experiment.axis: apart.argmin(axis=0)})
-
-    return annotate(in_order(with_grid_error(dataset, height, on_coarser))).drop_vars(needed)
+            dataset = with_grid_error(dataset, height, on_coarser)
+    return annotate(in_order(dataset)).drop_vars(needed)
 
 
 def _solve_once(
-    problem: Problem, experiment: Experiment, recorder: Recorder, progress: bool | Progress, threads: int
+    problem: Problem, experiment: Experiment, recorder: Recorder, report: Callable[[float, float], None]
 ) -> xr.Dataset:
-    """Do it on the surface as it is."""
-    from roughvisc.progress import reporting  # slow to import
-
-    began = time.perf_counter()
-    reached = recorder.latest
-    spent, state, count = reached.wall_time - began, reached.state, reached.rows
-    with fft.set_workers(threads), reporting(progress, experiment.doing, at=experiment.progress) as report:
-        while True:
-            rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
-            if reached.state is not None:
-                log.info("resumes after %s", experiment.progress(reached.done, rows.end))
-            try:
-                for row in rows:
-                    took = spent + time.perf_counter()
-                    if row.values:
-                        values = {experiment.axis: row.at, **row.values, "wall_time": took}
-                        recorder.rows.append({"row": values, "kept": row.kept, "facts": row.facts}, row.fields)
-                        count += 1
-                    report(row.done, rows.end)
-                    if row.state is not None:
-                        recorder.update(Checkpoint(row.state, row.done, count, took, reached.transforms))
-                break
-            except Outgrown as outgrown:
-                log.info("contact has outgrown its domain: the run begins anew on a larger one")
-                recorder.restart()
-                reached, state, count = recorder.latest, outgrown.state, 0
-        if not rows.order(recorder.rows):
-            raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-        return dataset_of(problem, experiment, rows, recorder.rows)
+    """Solve on the given grid, without the runs on coarser grids."""
+    began, reached = time.perf_counter(), recorder.latest
+    state, count, spent = reached.state, reached.rows, reached.wall_time
+    while True:
+        rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
+        if reached.state is not None:
+            log.info("resumes after %s", experiment.progress(reached.done, rows.end))
+        try:
+            for row in rows:
+                took = spent + time.perf_counter() - began
+                if row.values:
+                    values = {experiment.axis: row.at, **row.values, "wall_time": took}
+                    recorder.append(values | {"kept": row.kept, "place": row.place}, row.fields)
+                    count += 1
+                report(row.done, rows.end)
+                if row.state is not None:
+                    recorder.update(Checkpoint(row.state, row.done, count, took, reached.transforms))
+            return dataset_of(experiment, rows, recorder)
+        except Outgrown as outgrown:
+            log.info("contact has outgrown its domain: the run begins again on a larger one")
+            recorder.restart()
+            reached, state, count = recorder.latest, outgrown.state, 0
 
 
-def dataset_of(problem: Problem, experiment: Experiment, rows: Rows, records: RowStore) -> xr.Dataset:
-    """All rows of a solve as a labelled Dataset; fields in a file are read when they are asked for.
+def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dataset:
+    """Return all rows of a solve as a Dataset; fields in a file are read when they are needed.
 
     Parameters
     ----------
-    problem, experiment : Problem, Experiment
-        What was solved.
+    experiment : Experiment
+        What is done.
     rows : Rows
-        Of the experiment, all of them found.
-    records : RowStore
-        What was recorded of them, at least one row.
+        Rows of the experiment, all of them found.
+    recorder : Recorder
+        Holds what was recorded of them.
 
     Returns
     -------
     xarray.Dataset
         Over the axis of the experiment, as :mod:`roughvisc.variables` declares it.
+
+    Raises
+    ------
+    ConvergenceError
+        If there is no row.
     """
-    height, axis, settings = rows.height, experiment.axis, problem.settings
-    kept = rows.order(records)
-    values = [plain["row"] | rows.settled(records, number) for number, plain in enumerate(records.plain)]
-    columns = {name: np.array([values[number][name] for number in kept]) for name in values[kept[0]]}
-    columns = rows.columns(columns)
-    stamp = columns.pop(axis)
-    variables: dict[str, Any] = {name: ((axis,), column) for name, column in columns.items()}
+    height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
+    steps = pd.DataFrame(recorder.plain)
+    if not len(steps) or not steps["kept"].any():
+        raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
+    kept = steps[steps["kept"]].sort_values("place", kind="stable").drop(columns=["kept", "place"])
+    dataset = kept.set_index(axis).to_xarray()
     for name in settings.fields:
-        frames = records.stacked(partial(rows.field, records, name), kept, (height.shape[0], height.shape[1]))
-        variables[name] = ((axis, "x", "y"), frames)
-    highest = {} if rows.highest is None else {"highest": rows.highest}
-    variables["height"] = (("x", "y"), np.asarray(height.values, dtype=float), highest)
+        field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
+        dataset[name] = (axis, "x", "y"), field
+    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)}
     if "filled" in height.coords:
-        variables["filled"] = (("x", "y"), height["filled"].values)
-    dataset = xr.Dataset(
-        variables,
-        coords={axis: (axis, stamp), "x": height["x"].values, "y": height["y"].values},
-        attrs={
-            "Conventions": "CF-1.11",
-            "result_format": RESULT_FORMAT,
-            **settings.to_attributes(),
-            "history": str(height.attrs.get("history", "")),
-        },
-    )
-    dataset = annotate(in_order(dataset))
-    stated = _of_the_scene(problem, experiment) | rows.attributes(dataset)
-    stated["warnings"] = warnings_text(warnings_of(stated))
-    dataset.attrs |= {name: value for name, value in stated.items() if value != ""}
-    return with_steps(dataset, _steps(values)) if axis == "time" else dataset
-
-
-def _steps(values: list[dict[str, Any]]) -> xr.Dataset:
-    """Histories of every accepted step, over ``step``."""
-    names = [name for name in STEPPED if name in values[0]]
-    columns = {name: ("time", np.array([row[name] for row in values])) for name in names}
-    steps = annotate(xr.Dataset(columns, coords={"time": [row["time"] for row in values]}, attrs={"title": TITLE}))
-    return steps.drop_indexes("time").rename_dims(time="step")
-
-
-def _of_the_scene(problem: Problem, experiment: Experiment) -> dict[str, Any]:
-    """What an audit asks that the variables do not say, so that a result without a study can be audited too."""
-    body, height = problem.body, problem.height
-    material = complete(body.material)
-    size = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
-    return {
-        **body.attributes(),
-        "compliance_at_once": float(material.contact_compliance(0.0)),
-        "compliance_at_end": float(material.contact_compliance(experiment.creep_time(size))),
-        "poisson": "" if separability_error(body.material) else material.poisson,
-        "time_scale": experiment.time_scale,
-        "recipe": str(height.attrs.get("recipe", "")),
+        dataset["filled"] = ("x", "y"), height["filled"].values
+    dataset = dataset.assign_coords(x=height["x"].values, y=height["y"].values)
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "result_format": RESULT_FORMAT,
+        **settings.to_attributes(),
+        "history": str(height.attrs.get("history", "")),
     }
+    dataset = annotate(in_order(rows.finish(dataset)))
+    if axis != "time":
+        return dataset
+    histories = steps.set_index("time")[[name for name in STEPPED if name in steps]].to_xarray()
+    histories = annotate(histories.assign_attrs(title=TITLE)).drop_indexes("time").rename_dims(time="step")
+    return with_steps(dataset, histories)

@@ -12,7 +12,7 @@ PACKAGE = pathlib.Path(rv.__file__).parent
 LAYERS = (
     ("errors labels lazy notebook progress steps tables units variables",),
     ("mechanics", "topography"),
-    ("experiment problem recorder settings solve",),
+    ("experiment settings solve",),
     ("observables",),
     ("study",),
     ("views",),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError
+from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
 from roughvisc.experiment.domain import enlarged_indenter, estimated
 from roughvisc.experiment.notes import (
     accuracy_note,
@@ -26,15 +27,12 @@ from roughvisc.experiment.notes import (
     wake_note,
 )
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.protocol import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.resources import require_loading
 from roughvisc.experiment.scene import (
     build_scene,
     check_program,
     domain_of,
-    kept_times,
     slide_note,
-    snap_to_cells,
 )
 from roughvisc.experiment.stated import (
     Fields,
@@ -51,16 +49,12 @@ from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, State, Step, at_rest, march
-from roughvisc.problem import Problem
-from roughvisc.settings import Settings
 from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
-#: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
-_FEW = 9
 
 
 @dataclass(frozen=True)
@@ -100,9 +94,6 @@ class Loading(Experiment):
 
     axis: ClassVar[str] = "time"
     table: ClassVar[str] = "program"
-    called: ClassVar[str] = "a loading program"
-    doing: ClassVar[str] = "pressing"
-    states: ClassVar[tuple[type, ...]] = (LoadingState, State, Point, History, Difference)
 
     def __repr__(self) -> str:
         return repr(self.program)
@@ -119,41 +110,14 @@ class Loading(Experiment):
             for one in self.program.segments
         ]
 
-    def on_area(self, area: float) -> Loading:
-        """The same with loads in place of nominal pressures."""
-        return Loading(self.program.on_area(area))
-
-    def with_common_rows(self, settings: Settings, spacings: Sequence[tuple[float, float]]) -> Settings:
-        """Those with kept times that are a few where all steps were kept, and lie at whole cells of all grids. [s]"""
-        settings = replace(settings, times=settings.times or _FEW)
-        if not self.program.slides:
-            return settings
-        times = kept_times(self.program, settings.times)
-        return self.with_rows_at(settings, snap_to_cells(self.program, times, *spacings) or ())
-
-    def with_rows_at(self, settings: Settings, places: Sequence[float]) -> Settings:
-        """Those with these kept times. [s]"""
-        return replace(settings, times=places)
-
-    def creep_time(self, size: float) -> float:
-        """To the end of the program. [s]"""
-        return self.program.duration
-
-    @property
-    def time_scale(self) -> float:
-        """Of the program. [s]"""
-        return self.program.time_scale
-
-    @property
-    def largest_speed(self) -> float:
-        """Of its slides. [m/s]"""
-        slides = ((one.slide, one.duration) for one in self.program.segments)
-        return max((slide.distance / duration for slide, duration in slides if slide), default=0.0)
-
     def progress(self, done: float, end: float) -> str:
         """The time reached. [s]"""
         unit = unit_for(end, "s")
         return f"t = {unit(done):.3g} of {unit.text(end)}"
+
+
+#: Dataclasses that the state of a row is made of, beside plain values, tuples and arrays: for checkpoints.
+STATES = (LoadingState, State, Point, History, Difference)
 
 
 class LoadingRows(Rows):
@@ -175,13 +139,14 @@ class LoadingRows(Rows):
         self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
     ) -> None:
         height, body, settings = problem.height, problem.body, problem.settings
-        self._problem, self._settings = problem, settings
+        self._given, self._settings = problem, settings
         shape = height.sizes["x"], height.sizes["y"]
         require_loading(shape, nominal_area(height), program, settings, body, in_memory=in_memory)
         check_program(Profile(height, settings.missing, body.kernel), body, program, settings)
         self._start = state or LoadingState(enlarged=enlargements(problem, program))
         larger = enlarged_indenter(height, self._start.enlarged)
         assert larger is not None, "it was made before"
+        self.problem = replace(problem, height=larger)
         self.profile = Profile(larger, settings.missing, body.kernel)
         self.profile.nominal_area = nominal_area(height)
         self._domain = domain_of(self.profile, body, program, settings, self._start.outgrown)
@@ -189,16 +154,6 @@ class LoadingRows(Rows):
         log.info("memory: %s", self._choice.note)
         self.end = program.duration
         self._border = self._start.border
-
-    @property
-    def height(self) -> xr.DataArray:  # type: ignore[override]
-        """Height of the surface; an indenter that was enlarged has its enlarged grid. [m]"""
-        return self.profile.height
-
-    @property
-    def highest(self) -> float:  # type: ignore[override]
-        """Height of the highest point. [m]"""
-        return self.profile.highest
 
     def __iter__(self) -> Iterator[Row]:
         """March to the end of the program.
@@ -304,7 +259,7 @@ class LoadingRows(Rows):
         if kept:
             row |= stated | area_columns(step, scene, fields, touching, area)
             arrays = self._stored(step, fields)
-        return Row(point.time, row, arrays, kept, state, {}, point.time)
+        return Row(point.time, row, arrays, kept, 0, state, point.time)
 
     def _stored(self, step: Step, fields: Fields) -> dict[str, Array]:
         """Return the fields that are stored, on the whole surface."""
@@ -339,15 +294,14 @@ class LoadingRows(Rows):
             meaning = "converged"
         return STATUS_MEANINGS.index(meaning)
 
-    def columns(self, columns: dict[str, Array]) -> dict[str, Array]:
-        """What each row has cost, from the sums till then; and the nominal pressure."""
-        for counter in ("iterations", "convolutions"):
-            columns[counter] = np.diff(columns[counter], prepend=0)
-        columns["nominal_pressure"] = columns["force"] / self.profile.nominal_area
-        return columns
+    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Return the result: costs of each row from the sums till then, nominal pressure, attributes.
 
-    def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
-        """Return the memory model, numbers for an audit, and warnings; warnings are logged too."""
+        The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
+        """
+        for counter in ("iterations", "convolutions"):
+            dataset[counter] = "time", np.diff(dataset[counter].values, prepend=0)
+        dataset["nominal_pressure"] = dataset["force"] / self.profile.nominal_area
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
         approach = float(np.fmax.reduce(dataset["approach"].values))
         repeats = settings.boundary == "periodic"
@@ -366,15 +320,19 @@ class LoadingRows(Rows):
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
-        stated["material"] = table_note(self._problem.body.materials)
-        # of what was pressed, a series or not; of layers those of the top one
-        pressed = {"compliance_at_once": scene.compliance(0.0), "compliance_at_end": scene.compliance(self.end)}
-        return {
+        stated["material"] = table_note(self.problem.body.materials)
+        attributes = self._given.attributes(self.end, scene.program.time_scale)
+        if self.problem.body.separates:  # of what was pressed, a series or not; of layers those of the top one
+            attributes |= {
+                "compliance_at_once": scene.compliance(0.0),
+                "compliance_at_end": scene.compliance(self.end),
+            }
+        attributes |= {
             "memory": choice.note,
             "series_error": choice.series_error,
             "warnings": warnings_text(stated | warnings),
-            **(pressed if self._problem.body.separates else {}),
         }
+        return dataset.assign_attrs({name: value for name, value in attributes.items() if value != ""})
 
     def _wake_note(self, dataset: xr.Dataset) -> str:
         """What to say of a contact that stands alone and slides into the wake of the one before."""

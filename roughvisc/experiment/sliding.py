@@ -15,6 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
 from roughvisc.experiment.notes import (
@@ -28,7 +29,6 @@ from roughvisc.experiment.notes import (
     wake_note,
 )
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.protocol import Experiment, Row, Rows
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
@@ -37,8 +37,6 @@ from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
-from roughvisc.problem import Problem
-from roughvisc.recorder import RowStore
 from roughvisc.settings import Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
@@ -50,8 +48,6 @@ log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
-#: Most speeds of a plan's coarse curves, evenly spread.
-_FEW = 7
 #: Variables of a speed whose contact is not solved; the others are missing.
 _OF_UNSOLVED = ("force", "nominal_pressure", "pressure_residual", "friction_residual", "iterations", "status")
 #: Fields that a row may have.
@@ -100,12 +96,7 @@ class SteadySliding(Experiment):
 
     axis: ClassVar[str] = "speed"
     table: ClassVar[str] = "friction"
-    called: ClassVar[str] = "steady sliding"
-    doing: ClassVar[str] = "sliding"
     boundary: ClassVar[Boundary] = "periodic"
-    states_grid_error: ClassVar[bool] = True
-    #: Measured at 256 and 1024 squared.
-    convolution_cost: ClassVar[float] = 2.1
 
     def __post_init__(self) -> None:
         try:
@@ -137,7 +128,14 @@ class SteadySliding(Experiment):
         return self.speeds
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
-        """The steady state at each speed, from the lowest to the highest; the state counts those that are found."""
+        """Return the steady states, from the lowest speed to the highest; the state counts those that are found.
+
+        Under the mirror boundary the surface is unfolded first: sliding breaks the symmetry.
+        """
+        if problem.settings.boundary == "mirror":
+            log.info("the surface is unfolded: it slides with its mirror images, on four times as many cells")
+            settings = replace(problem.settings, boundary="periodic")
+            problem = replace(problem, height=mirror(problem.height), settings=settings)
         return SlidingRows(problem, self, state or 0)
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
@@ -156,13 +154,6 @@ class SteadySliding(Experiment):
             yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
         yield from super().unsupported(settings)
 
-    def prepared(self, problem: Problem) -> Problem:
-        """Return the problem on the unfolded surface under the mirror boundary: sliding breaks the symmetry."""
-        if problem.settings.boundary != "mirror":
-            return problem
-        log.info("the surface is unfolded: it slides with its mirror images, on four times as many cells")
-        return problem.on(mirror(problem.height), boundary="periodic")
-
     def content(self) -> Any:
         """What differs from the defaults."""
         found = {one.name: getattr(self, one.name) for one in fields(self) if getattr(self, one.name) != one.default}
@@ -171,22 +162,6 @@ class SteadySliding(Experiment):
     def progress(self, done: float, end: float) -> str:
         """The number of speeds that are found."""
         return f"speed {done:.0f} of {end:.0f}"
-
-    def creep_time(self, size: float) -> float:
-        """Of the longest wave, at the lowest speed. [s]"""
-        return size / min(self.asked)
-
-    @property
-    def largest_speed(self) -> float:
-        """The largest of the speeds. [m/s]"""
-        return max(self.asked)
-
-    def cheaper(self) -> tuple[SteadySliding, int, float]:
-        """Some of the speeds, evenly spread."""
-        order = np.argsort(self.asked)
-        few = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW, len(order))).astype(int))]
-        few_speeds = replace(self, speeds=[self.asked[number] for number in few])
-        return few_speeds, len(order), 1.0
 
     def force(self, area: float) -> float:
         """Load on a surface of an area [m2]. [N]"""
@@ -265,12 +240,10 @@ class SlidingRows(Rows):
         require_memory(shape, partial(curve_bytes, problem.settings))
         if not self._profile.present.all():  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
-        super().__init__(self._profile.height, (), float(len(curve.asked)), self._profile.highest)
+        self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.asked))
         self._force = curve.force(self._profile.nominal_area)
         self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
         self._alone = surface_stands_alone(self._profile.height)
-        #: Part of the creep that is left where the next contact comes, by the speed.
-        self._creep_left: dict[float, float] = {}
         self._coarser: list[SlidingGrid] = []
         if problem.settings.grid_error:
             twice, four_times = self._grid.coarser(2.0), self._grid.coarser(4.0)
@@ -303,8 +276,8 @@ class SlidingRows(Rows):
                 ages = grid.period / speed, np.inf
                 creep = max(creep_left(*(float(one.contact_compliance(age)) for age in ages)) for one in law.materials)
             row["convolutions"] = sliding.convolutions
-            facts = {"number": int(number), "creep_left": creep}
-            yield Row(speed, row, fields, state=done, facts=facts, done=float(done))
+            row["creep_left"] = creep  # where the next contact comes
+            yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the numbers of a state, and its fields in the frame of the surface."""
@@ -334,26 +307,25 @@ class SlidingRows(Rows):
             fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self._profile.gap.shape))
         return row, fields
 
-    def order(self, records: RowStore) -> list[int]:
-        """In the order in which the speeds were given."""
-        facts = [plain["facts"] for plain in records.plain]
-        self._creep_left = {self._curve.asked[one["number"]]: one["creep_left"] for one in facts}
-        return [int(place) for place in np.argsort([one["number"] for one in facts])]
-
-    def attributes(self, dataset: xr.Dataset) -> dict[str, Any]:
-        """Return the direction, and warnings; these are logged too."""
+    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Return the result with the direction, numbers for an audit, and warnings, which are logged too."""
+        height, speeds = self.problem.height, dataset["speed"].values.tolist()
+        left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
+        longest = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
         warnings = {
-            "slope": slope_note(self.height, "periodic", np.inf),
-            "border": border_note(self.height, xr.Dataset()),
-            "wake": wake_note(self._creep_left, self._grid.period),
+            "slope": slope_note(height, "periodic", np.inf),
+            "border": border_note(height, xr.Dataset()),
+            "wake": wake_note(left, self._grid.period),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
-        return {
+        attributes = self.problem.attributes(longest / min(self._curve.asked), math.inf) | {
             "direction": self._curve.direction,
             "warnings": warnings_text(stated | warnings),
         }
+        stated_attributes = {name: value for name, value in attributes.items() if value != ""}
+        return dataset.drop_vars("creep_left").assign_attrs(stated_attributes)
 
 
 def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:

@@ -24,11 +24,11 @@ from scipy import fft
 from scipy.special import erf, erfinv
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.base import Experiment, Problem
 from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
 from roughvisc.experiment.domain import Domain, enlarged_indenter, estimated, whole_domain
 from roughvisc.experiment.loading import Loading, enlargements
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.protocol import Experiment
 from roughvisc.experiment.resources import (
     PART,
     PROCESS,
@@ -41,15 +41,16 @@ from roughvisc.experiment.resources import (
     too_large,
 )
 from roughvisc.experiment.scene import check_program, domain_of, kept_times, memory_options, snap_to_cells
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory_choice import Choice, choose_memory
 from roughvisc.mechanics.program import Program, Segment, Slide
 from roughvisc.notebook import table
-from roughvisc.problem import Problem
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
+from roughvisc.study.quantities import creep_time
 from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import existing_part
 from roughvisc.study.storage.parameters import labels_of, parameters_of
@@ -99,6 +100,9 @@ _COARSE, _COARSE_CURVE = 64, 48
 _STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
 #: Largest numbers of convolutions and steps of a coarse run: a limit of time would depend on the load of the machine.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 5000, 800
+#: Speeds of a coarse friction curve: of more, evenly spread ones. Time of a convolution of a curve, with all that goes
+#: with it, over that of one in a contact problem, measured at 256 and 1024 squared.
+_FEW_SPEEDS, _CURVE_CONVOLUTION = 7, 2.1
 #: First step of a hold, in parts of the hold: later ones become longer in proportion.
 _FIRST_STEP = 0.005
 #: Cells of a slide on the coarse grid, at most.
@@ -300,9 +304,10 @@ class _Setups:
             raise found
         height, slope = found
         area, body = nominal_area(height), case.body()
-        experiment = case.experiment().on_area(area)
+        experiment = case.experiment()
+        if isinstance(experiment, Loading):
+            experiment = Loading(experiment.program.on_area(area))
         problem = Problem(height, body, case.solving()).with_known_boundary(experiment.boundary)
-        problem.check_cells()
         settings = problem.settings
         profile = Profile(height, settings.missing, body.kernel)
         if not isinstance(experiment, Loading):
@@ -314,7 +319,8 @@ class _Setups:
         if times:
             larger = enlarged_indenter(height, times)
             assert larger is not None, "the number of enlargements is a possible one"
-            problem, profile = problem.on(larger), Profile(larger, settings.missing, body.kernel)
+            problem = replace(problem, height=larger)
+            profile = Profile(larger, settings.missing, body.kernel)
         domain = domain_of(profile, body, program, settings, 0)
         reaches_border = False
         if settings.boundary == "free" and settings.edge == "error" and body.separates:
@@ -438,7 +444,10 @@ def coarse_run(setup: Setup) -> CoarseRun:
             settings = replace(settings, times=settings.times and len(program.corners))
         experiment = Loading(program)
     else:
-        experiment, count, _ = experiment.cheaper()
+        assert isinstance(experiment, SteadySliding)
+        order = np.argsort(experiment.asked)
+        few_speeds = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW_SPEEDS, len(order))).astype(int))]
+        experiment, count = replace(experiment, speeds=[experiment.asked[one] for one in few_speeds]), len(order)
     problem = Problem(few, problem.body, settings)
     course = _course(problem, experiment)
     fraction, contact, tally = course.fraction, course.contact, course.tally()
@@ -632,7 +641,8 @@ def _planned(
     steps = run.steps * (2 ** (_STEPS_GROW * octaves) if settings.time_step == "auto" else 1.0)
     power = _WORK_GROWS if isinstance(experiment, Loading) else _CURVE_GROWS
     work, rows, force = run.convolutions * 2 ** (power * octaves), run.steps, run.force if is_own else math.nan
-    fraction, dearer = corrected(run.fraction, setup.domain_slope, rms_slope(run.height)), experiment.convolution_cost
+    fraction = corrected(run.fraction, setup.domain_slope, rms_slope(run.height))
+    dearer = 1.0 if isinstance(experiment, Loading) else _CURVE_CONVOLUTION
     contact = np.array(run.contact or (0.0,)) * (fraction / run.fraction if run.fraction > 0 else 1.0)
     row, kind, passes = _row_of(case, whole) | {"marched": is_own}, "curve", 0.0
     if isinstance(experiment, Loading):
@@ -653,8 +663,7 @@ def _planned(
             "program_note": case.program().note,
         }
     else:
-        dearer *= experiment.cheaper()[2]
-        row |= {"memory_model": experiment.called} | ({"speeds": rows} if experiment.axis == "speed" else {})
+        row |= {"memory_model": "steady sliding", "speeds": rows}
 
     def needed(cells: float) -> float:
         if isinstance(experiment, Loading):
@@ -668,7 +677,7 @@ def _planned(
     seconds = work * (run.seconds + dearer * max(beyond, 0.0)) + passes * _PASS * (height.size - run.height.size)
     again = 1 + (_GRID_ERROR if settings.grid_error else 0.0)
     length = max(float(np.ptp(whole[axis].values)) for axis in ("x", "y"))
-    full = full_contact_pressure(setup.slope, complete(body.material), experiment.creep_time(length))
+    full = full_contact_pressure(setup.slope, complete(body.material), creep_time(experiment, length))
     memory, pressure = needed(whole.size), force / setup.area
     row |= {
         "solved_cells_x": height.sizes["x"],

@@ -11,6 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import Experiment
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.observables.conductance import conductance
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
@@ -130,10 +133,26 @@ def _is_over(name: str, axis: str) -> bool:
     return bool(QUANTITIES[name].fields) or name in AXES[axis].variables
 
 
+def is_sliding(experiment: Experiment) -> bool:
+    """Return whether the surface slides."""
+    return not isinstance(experiment, Loading) or bool(experiment.program.slides)
+
+
+def creep_time(experiment: Experiment, size: float) -> float:
+    """Return the time till which the material under a surface of a length [m] creeps.
+
+    It is the end of the program, or the time in which the surface slides by its length at the lowest speed. [s]
+    """
+    if isinstance(experiment, Loading):
+        return experiment.program.duration
+    assert isinstance(experiment, SteadySliding)
+    return size / min(experiment.asked)
+
+
 def observables_of(case: Case) -> list[str]:
     """Names of the quantities that the results of a case have."""
     experiment = case.experiment()
-    slides = experiment.largest_speed > 0
+    slides = is_sliding(experiment)
     return [one for one in QUANTITIES if _is_over(one, experiment.axis) and (slides or one != "friction_coefficient")]
 
 

@@ -63,15 +63,15 @@ def test_contact_that_outgrows_its_domain__begins_anew(monkeypatch):
     whole = pressed(bump())
     anew = []
     monkeypatch.setattr(domain, "MARGIN", 0.4)
-    monkeypatch.setattr("roughvisc.recorder.MemoryRecorder.restart", counted(anew))
+    monkeypatch.setattr("roughvisc.solve.Recorder.restart", counted(anew))
     assert_same(pressed(bump()), whole)
     assert anew, "the first domain was too small"
 
 
 def counted(calls):
-    from roughvisc.recorder import MemoryRecorder
+    from roughvisc.solve import Recorder
 
-    sound = MemoryRecorder.restart
+    sound = Recorder.restart
     return lambda self: calls.append(self) or sound(self)
 
 

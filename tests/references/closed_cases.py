@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from references.fixed_contact import punch_approach, punch_dissipation, punch_force
 from references.layer import ElasticLayer
 from references.sheet import OnSheet
+from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.body import Body, body_of
@@ -41,7 +42,6 @@ from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.sheet import Base, Sheet
 from roughvisc.mechanics.sheet import sheet as sheet_of
-from roughvisc.problem import Problem
 from roughvisc.settings import Settings
 from roughvisc.solve import solve
 from roughvisc.topography.grid import spacing

@@ -11,8 +11,8 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError
+from roughvisc.experiment.base import Problem
 from roughvisc.experiment.resources import PROCESS
-from roughvisc.problem import Problem
 from roughvisc.study import plan as plan_module
 from roughvisc.study.statement.case import read_cases, vary
 

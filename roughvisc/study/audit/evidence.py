@@ -19,6 +19,7 @@ from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.sheet import BASE, Sheet, complement
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
+from roughvisc.study.quantities import creep_time
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.framing import with_images
 from roughvisc.topography.grid import spacing
@@ -299,7 +300,7 @@ def _check(dataset: Any) -> None:
 def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[Body, ...]:
     if "poisson" in attrs and "compliance_at_end" in attrs:
         return (Body(*(float(attrs[name]) for name in ("compliance_at_once", "compliance_at_end", "poisson"))),)
-    return bodies_of(case, case.experiment().creep_time(size)) if case is not None else ()
+    return bodies_of(case, creep_time(case.experiment(), size)) if case is not None else ()
 
 
 def _stated(case: Case | None) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.study.budget.solves import Array
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
-from roughvisc.study.quantities import Observable
+from roughvisc.study.quantities import Observable, creep_time, is_sliding
 from roughvisc.study.statement.case import Case
 from roughvisc.units import number, unit_for
 
@@ -212,7 +212,7 @@ def _next_octave(asked: Asked, quantity: Observable, values: Values, left: Array
         return Found(0.0, f"the grid holds all waves down to {_length(asked.cutoff)}")
     change = _apart(values, "own", "smooth")
     factor = quantity.octave_factor
-    if asked.variants.case.experiment().largest_speed > 0 and quantity.name == "contact_area":
+    if is_sliding(asked.variants.case.experiment()) and quantity.name == "contact_area":
         factor = _SLIDING_OCTAVE
     words = f"without the shortest octave; {asked.octaves:.2g} octaves down to {_length(asked.cutoff)} are not held"
     return Found(factor * asked.octaves * np.abs(change), words, np.sign(change).astype(int), ("smooth",))
@@ -243,7 +243,7 @@ def _of_material(asked: Asked, error: float, solve: str, what: str, values: Valu
 def _creeps(case: Case) -> bool:
     material = case.material()
     at_once, later = (float(material.contact_compliance(time)) for time in (0.0, 1e-9))
-    end = case.experiment().creep_time(1.0)
+    end = creep_time(case.experiment(), 1.0)
     return float(material.contact_compliance(end)) > at_once or later > at_once
 
 

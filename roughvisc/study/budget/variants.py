@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -96,6 +96,6 @@ def with_rows(case: Case, places: Any, fields: Iterable[str]) -> Case:
     """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
     settings, experiment = case.solving(), case.experiment()
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
-    if places is not None:
-        changes |= changed_keys(settings, experiment.with_rows_at(settings, [float(one) for one in places]))
+    if places is not None and experiment.axis == "time":
+        changes |= changed_keys(settings, replace(settings, times=[float(one) for one in places]))
     return vary(case, changes)

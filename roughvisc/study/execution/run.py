@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, RoughviscError, TooLargeError
+from roughvisc.experiment.base import Problem
 from roughvisc.labels import annotate, warnings_of
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.problem import Problem
 from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.identity import NUMERICS_REVISION, program
@@ -202,7 +202,6 @@ def run_case(
             keeper = CheckpointWriter(
                 folder / f".{case.key}.unfinished",
                 case.key,
-                case.experiment().states,
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,
                 stop=stop,

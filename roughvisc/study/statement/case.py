@@ -24,7 +24,7 @@ from roughvisc.units import shown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from roughvisc.experiment.protocol import Experiment
+    from roughvisc.experiment.base import Experiment
     from roughvisc.mechanics.body import Body
     from roughvisc.mechanics.materials.creep import Material
     from roughvisc.mechanics.program import Program
@@ -174,7 +174,7 @@ class Case:
         try:
             return self.settings.loading()
         except InputError as error:
-            raise InputError(f"{self.origin}: {error}" if self.origin else str(error)) from error
+            raise (error.prefixed(str(self.origin)) if self.origin else error) from None
 
     def experiment(self) -> Experiment:
         """What is done with the surface."""

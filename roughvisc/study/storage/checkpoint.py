@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
 
-from roughvisc.recorder import Checkpoint, Frame
+from roughvisc.experiment.loading import STATES
+from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.statement.identity import NUMERICS_REVISION
 from roughvisc.study.storage.files import (
     atomic_write,
@@ -50,7 +51,7 @@ _SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
 #: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
 _WAITING = 8 << 20
 #: Raised by whoever changes what a checkpoint holds of a state.
-_LAYOUT = 2
+_LAYOUT = 3
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
 
@@ -180,17 +181,13 @@ class RowFile:
         self._waiting, self._weight = [], 0
         return True
 
-    def arrays(self, row: int, *names: str) -> Mapping[str, Array]:
-        """Arrays of a row, those of these names at least."""
+    def array(self, row: int, name: str) -> Array:
+        """Return an array of a row."""
         written = len(self._begins) - 1
         if row >= written:
-            return self._waiting[row - written]
+            return self._waiting[row - written][name]
         self._stream.seek(self._begins[row])
-        return read_record(self._stream, names)[1]
-
-    def stacked(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> Any:
-        """The frames of some rows, read when they are asked for."""
-        return LazilyIndexedArray(_Frames(frame, rows, shape))
+        return read_record(self._stream, [name])[1][name]
 
     def sync(self) -> None:
         """Have all rows on the disk."""
@@ -215,12 +212,12 @@ class RowFile:
 
 
 class _Frames(BackendArray):
-    """What xarray takes for an array (time, x, y) that it has not read yet."""
+    """Field of some rows of a file, an array (rows, x, y) that xarray has not read yet."""
 
     dtype = np.dtype(float)
 
-    def __init__(self, frame: Frame, rows: Sequence[int], shape: tuple[int, int]) -> None:
-        self._frame, self._rows = frame, np.array(rows, int)
+    def __init__(self, file: RowFile, name: str, rows: Sequence[int], shape: tuple[int, int]) -> None:
+        self._file, self._name, self._rows = file, name, np.array(rows, int)
         self.shape = (len(rows), *shape)
 
     def __getitem__(self, key: Any) -> Any:
@@ -229,10 +226,10 @@ class _Frames(BackendArray):
     def _read(self, key: tuple[Any, ...]) -> Any:
         rows = self._rows[key[0]]
         if rows.ndim == 0:
-            return self._frame(int(rows), np.zeros(self.shape[1:]))[key[1:]]
-        read = np.zeros((rows.size, *self.shape[1:]))
+            return self._file.array(int(rows), self._name)[key[1:]]
+        read = np.empty((rows.size, *self.shape[1:]))
         for place, row in zip(read, rows, strict=True):
-            self._frame(int(row), place)
+            place[...] = self._file.array(int(row), self._name)
         return read[(slice(None), *key[1:])]
 
 
@@ -245,7 +242,7 @@ def save_checkpoint(path: Path, reached: Checkpoint, key: str) -> None:
         write_record(stream, plain, arrays)
 
 
-def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkpoint | None:
+def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
     """How far the case of that key has come; None if the file is absent, damaged, or of something else.
 
     Parameters
@@ -254,15 +251,13 @@ def load_checkpoint(path: Path, key: str, states: Sequence[type] = ()) -> Checkp
         Of the file.
     key : str
         Of the case.
-    states : sequence of type
-        Dataclasses that the state of its experiment is made of: no others are made.
     """
     try:
         with open(path, "rb", buffering=0) as stream:
             plain, arrays = read_record(stream)
         found = plain["key"], plain["revision"], plain["result_format"], plain["layout"]
         if found == (key, NUMERICS_REVISION, RESULT_FORMAT, _LAYOUT):
-            kinds = {kind.__name__: kind for kind in (Checkpoint, *states)}
+            kinds = {kind.__name__: kind for kind in (Checkpoint, *STATES)}
             reached = _unflatten({"type": "Checkpoint", "parts": plain["reached"]}, arrays, kinds)
     except FileNotFoundError:
         return None
@@ -304,8 +299,8 @@ def _unflatten(value: Any, arrays: dict[str, Any], kinds: Mapping[str, type]) ->
     return kinds[value["type"]](**{name: _unflatten(part, arrays, kinds) for name, part in parts})
 
 
-class CheckpointWriter:
-    """Keeps what a run has computed: rows in one file, how far it has come in two others, all in one folder.
+class CheckpointWriter(Recorder):
+    """Recorder of a run in a folder: rows in one file, checkpoints in two others.
 
     Parameters
     ----------
@@ -313,8 +308,6 @@ class CheckpointWriter:
         Of this run alone; made if need be.
     key : str
         Of the case.
-    states : sequence of type
-        Dataclasses that the state of the experiment is made of.
     seconds, steps : float, int or None
         A checkpoint is written after so long, but not so often that it would take a twentieth of the time; and after
         so many accepted steps.
@@ -322,11 +315,12 @@ class CheckpointWriter:
         Asked after every accepted step.
     """
 
+    in_memory = False
+
     def __init__(
         self,
         folder: Path,
         key: str,
-        states: Sequence[type] = (),
         *,
         seconds: float = 30.0,
         steps: int | None = None,
@@ -334,25 +328,35 @@ class CheckpointWriter:
     ) -> None:
         self._paths = [folder / "checkpoint.0", folder / "checkpoint.1"]
         folder.mkdir(exist_ok=True)
-        self.rows = RowFile(folder / "rows")
-        self.in_memory = False
-        #: How far the run has come: no state of an earlier step is held.
+        self._rows = RowFile(folder / "rows")
         self.latest = Checkpoint()
         self._folder = folder
         self._key = key
         self._interval, self._steps, self._stop = seconds, steps, stop
-        self._states = states
         self._pending, self._last_save = 0, time.monotonic()
+
+    @property
+    def plain(self) -> list[dict[str, Any]]:  # type: ignore[override]
+        """Values of the rows."""
+        return self._rows.plain
+
+    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
+        """Record the values and the fields of a row; the arrays are not changed any more."""
+        self._rows.append(plain, arrays)
+
+    def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
+        """Return a field of some rows, an array (rows, x, y) that is read when it is needed."""
+        return LazilyIndexedArray(_Frames(self._rows, name, rows, shape))
 
     def resume(self) -> None:
         """Find out where to go on from: the last whole checkpoint whose rows are there; the start if there is none."""
         for leftover in self._folder.glob(".*"):
             leftover.unlink()
-        read = [(load_checkpoint(path, self._key, self._states), path) for path in self._paths]
+        read = [(load_checkpoint(path, self._key), path) for path in self._paths]
         found = [(reached, path) for reached, path in read if reached is not None]
         for reached, path in sorted(found, key=lambda pair: -pair[0].wall_time):
             here = reached.with_current_transforms()
-            if self.rows.keep_first(reached.rows):
+            if self._rows.keep_first(reached.rows):
                 log.info("%s: goes on from here", path)
                 self.latest = here
                 if path == self._paths[0]:
@@ -361,7 +365,7 @@ class CheckpointWriter:
             log.warning("%s: its rows are damaged; not used", path)
         for path in self._paths:
             path.unlink(missing_ok=True)
-        self.rows.keep_first(0)
+        self._rows.keep_first(0)
 
     def update(self, reached: Checkpoint) -> None:
         """Take note of an accepted step; write a checkpoint if it is time to.
@@ -384,7 +388,7 @@ class CheckpointWriter:
         """Forget all rows: the run begins anew."""
         for path in self._paths:
             path.unlink(missing_ok=True)
-        self.rows.keep_first(0)
+        self._rows.keep_first(0)
         self.latest, self._pending = Checkpoint(), 0
 
     def save(self) -> None:
@@ -392,7 +396,7 @@ class CheckpointWriter:
         if not self._pending:
             return
         began = time.monotonic()
-        self.rows.sync()  # first: a checkpoint counts on its rows
+        self._rows.sync()  # first: a checkpoint counts on its rows
         save_checkpoint(self._paths[0], self.latest, self._key)
         self._paths.reverse()
         self._pending, self._last_save = 0, time.monotonic()
@@ -400,11 +404,11 @@ class CheckpointWriter:
 
     def remove(self) -> None:
         """Remove all that was kept: the result is written, or cannot be had."""
-        self.rows.close()
+        self._rows.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def close(self) -> None:
         """Close the files; without a checkpoint nothing in them is of use."""
-        self.rows.close()
+        self._rows.close()
         if not any(path.exists() for path in self._paths):
             self.remove()

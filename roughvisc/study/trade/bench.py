@@ -11,7 +11,7 @@ import xarray as xr
 
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution.run import compute, unconverged
-from roughvisc.study.quantities import Observable, observables_of
+from roughvisc.study.quantities import Observable, is_sliding, observables_of
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import Setting, changed, has_steps, shape_of
 from roughvisc.variables.axes import AXES
@@ -29,7 +29,7 @@ _LITTLE = 0.05
 def quantities_of(case: Case) -> tuple[str, ...]:
     """Return the quantities that can be compared in the results of a case."""
     experiment = case.experiment()
-    names = (*USUAL, "friction_coefficient") if experiment.largest_speed > 0 else USUAL
+    names = (*USUAL, "friction_coefficient") if is_sliding(experiment) else USUAL
     return tuple(name for name in names if name in AXES[experiment.axis].variables)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.scene import kept_times, snap_to_cells
 from roughvisc.labels import annotate
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.progress import reporting
@@ -24,6 +27,9 @@ from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import RESULT_FORMAT
 from roughvisc.variables.axes import AXES
+
+#: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
+_FEW = 9
 
 
 @quantities(budget="s")
@@ -111,7 +117,12 @@ def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], deri
     shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
     shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]
     cells = [(sides[0] * shape[0] / nx, sides[1] * shape[1] / ny) for nx, ny in shapes]
-    return vary(case, changes | changed_keys(settings, experiment.with_common_rows(settings, cells)))
+    if isinstance(experiment, Loading):  # all accepted steps differ from setting to setting
+        program, times = experiment.program, settings.times or _FEW
+        if program.slides:
+            times = snap_to_cells(program, kept_times(program, times), *cells) or ()
+        changes |= changed_keys(settings, replace(settings, times=times))
+    return vary(case, changes)
 
 
 def _row(bench: TimedRuns, setting: Setting, finest: ReferenceRun) -> dict[str, Any]:

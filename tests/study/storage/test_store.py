@@ -1,6 +1,7 @@
 """Files of results: whole or absent, plain to every reader, lazy to ours."""
 
 import tracemalloc
+from types import SimpleNamespace
 
 import netCDF4
 import numpy as np
@@ -183,11 +184,8 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
     ds = hertz_creep((257, 256), 24)
     shape = ds["pressure"].shape
 
-    def filled(number, out):
-        out[...] = number
-        return out
-
-    lazy = LazilyIndexedArray(records._Frames(filled, range(shape[0]), shape[1:]))
+    file = SimpleNamespace(array=lambda row, name: np.full(shape[1:], float(row)))
+    lazy = LazilyIndexedArray(records._Frames(file, "pressure", range(shape[0]), shape[1:]))
     ds = ds.assign(pressure=(ds["pressure"].dims, lazy, ds["pressure"].attrs))
     write_result(ds, tmp_path / "first.nc")  # what is imported late is there
     tracemalloc.start()

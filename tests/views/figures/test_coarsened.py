@@ -5,7 +5,6 @@ import pytest
 import xarray as xr
 
 import roughvisc as rv
-from roughvisc import recorder as chunks
 from roughvisc.study.storage import store
 from roughvisc.views.figures import coarsened
 
@@ -42,8 +41,8 @@ def coarse(monkeypatch):
 @pytest.fixture
 def stored(tmp_path, monkeypatch):
     """The result in a file of small chunks, and the shapes that are read of it."""
-    monkeypatch.setattr(chunks, "_MANY_CELLS", 100)
-    monkeypatch.setattr(chunks, "_CHUNK_OF_MANY", (1, 8, 8))
+    monkeypatch.setattr(store, "_MANY_CELLS", 100)
+    monkeypatch.setattr(store, "_CHUNK_OF_MANY", (1, 8, 8))
     path, shapes = store.write_result(result(displacement=True), tmp_path / "result.nc"), []
     read = store._Field._read
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema, model_validator
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.protocol import Experiment
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection
@@ -75,7 +75,7 @@ class Study(Section):
         """
         if self.program is None:
             other = self.experiment()
-            raise InputError(f"{other.table}: found {other.called}, which has no program: expected [[program]] tables")
+            raise InputError(key=other.table, found="steady sliding", expected="[[program]] tables")
         program = Program()
         for segment in self.program:
             program = segment.extend(program)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.protocol import Experiment
+from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.sliding import DIRECTIONS, SteadySliding
 from roughvisc.mechanics.program import INSTEAD
 from roughvisc.study.statement.schema.section import (

@@ -1,0 +1,204 @@
+"""Base of the experiments: what is done with a surface, as rows along one axis.
+
+The driver (:mod:`roughvisc.solve`), files, sweeps, tables and figures know no kind of experiment. They take rows.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.body import Body, separability_error
+from roughvisc.mechanics.materials.creep import complete
+from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.topography.borders import boundary_of
+from roughvisc.topography.grid import spacing
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Surface, body and settings of an experiment.
+
+    Attributes
+    ----------
+    height : xarray.DataArray, dims (x, y)
+        Profile, peaks up. [m]
+    body : Body
+        The body under it.
+    settings : Settings
+        How it is computed and what is kept.
+    """
+
+    height: xr.DataArray
+    body: Body
+    settings: Settings
+
+    def with_known_boundary(self, only: Literal["free", "periodic"] | None) -> Problem:
+        """Return the problem with the boundary that ``auto`` stands for, see :func:`known_boundary`.
+
+        Raises
+        ------
+        InputError
+            If the boundary must be stated, or the kernel of the body is not accurate on the cells in free space. With
+            periodic and mirror boundaries the transfer function is exact on any cells.
+        """
+        found = known_boundary(self.settings, only, partial(boundary_of, self.height))
+        if found is None:
+            name = self.height.attrs.get("source_file", "height")
+            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
+        if found == "free":
+            self.body.kernel.check_cells(spacing(self.height, "height"))
+        return replace(self, settings=replace(self.settings, boundary=found))
+
+    def attributes(self, end: float, time_scale: float) -> dict[str, Any]:
+        """Return the facts of the body and the surface that an audit of a result without its study needs.
+
+        Parameters
+        ----------
+        end : float
+            Time till which the material creeps. [s]
+        time_scale : float
+            Shortest time in which the load or the approach changes; infinite in a steady state. [s]
+        """
+        material = complete(self.body.material)
+        return {
+            **self.body.attributes(),
+            "compliance_at_once": float(material.contact_compliance(0.0)),
+            "compliance_at_end": float(material.contact_compliance(end)),
+            "poisson": "" if separability_error(self.body.material) else material.poisson,
+            "time_scale": time_scale,
+            "recipe": str(self.height.attrs.get("recipe", "")),
+        }
+
+
+@dataclass(frozen=True)
+class Row:
+    """Result of an experiment at one position of its axis.
+
+    Attributes
+    ----------
+    at : float
+        Position on the axis, in its units.
+    values : dict
+        Variables of the row. If empty, the experiment has come so far and leaves no row.
+    fields : dict
+        Kept fields.
+    kept : bool
+        Whether it is a row of the result, or of the history of all steps only.
+    place : int
+        Rows of the result are sorted by it; rows with equal places stay in the order in which they are found.
+    state : Any
+        Plain value from which the rows continue after this one; None if they cannot.
+    done : float
+        Progress, of :attr:`Rows.end`.
+    """
+
+    at: float
+    values: dict[str, Any] = field(default_factory=dict)
+    fields: Mapping[str, Array] = field(default_factory=dict)
+    kept: bool = True
+    place: int = 0
+    state: Any = None
+    done: float = 0.0
+
+
+class Outgrown(Exception):
+    """Contact has outgrown the domain of a solve, which must begin again on a larger one.
+
+    Parameters
+    ----------
+    state : Any
+        From which the rows begin again.
+    """
+
+    def __init__(self, state: Any) -> None:
+        super().__init__("contact has outgrown the domain")
+        self.state = state
+
+
+class Rows(ABC):
+    """Rows of an experiment on a problem.
+
+    Attributes
+    ----------
+    problem : Problem
+        As it is computed; its surface may be larger than that of the given problem.
+    end : float
+        End of the experiment, in the unit of :attr:`Row.done`.
+    """
+
+    problem: Problem
+    end: float
+
+    @abstractmethod
+    def __iter__(self) -> Iterator[Row]:
+        """Compute the rows.
+
+        Raises
+        ------
+        Outgrown
+            If contact has outgrown the domain.
+        """
+
+    @abstractmethod
+    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
+        """Return the result, with its attributes, from a Dataset of the values and fields of its rows."""
+
+
+class Experiment(ABC):
+    """What is done with a surface; a frozen value.
+
+    Attributes
+    ----------
+    axis : str
+        Name of the axis of its rows, one of :data:`roughvisc.variables.axes.AXES`.
+    boundary : {"free", "periodic"} or None
+        Boundary that ``auto`` stands for. None: that of the surface.
+    """
+
+    axis: ClassVar[str]
+    boundary: ClassVar[Literal["free", "periodic"] | None] = None
+
+    @abstractmethod
+    def rows(self, problem: Problem, state: Any = None, *, in_memory: bool = True) -> Rows:
+        """Return the rows that follow the state of an earlier row.
+
+        Parameters
+        ----------
+        problem : Problem
+            Surface, body and settings.
+        state : Any
+            State of the last recorded row. None: from the beginning.
+        in_memory : bool
+            Whether the kept fields stay in memory.
+
+        Raises
+        ------
+        InputError
+            If problem and experiment do not go together; nothing has been computed then.
+        """
+
+    @abstractmethod
+    def content(self) -> Any:
+        """Return all that determines the experiment, as JSON has it: for the key of a case."""
+
+    @abstractmethod
+    def progress(self, done: float, end: float) -> str:
+        """Return the progress in words."""
+
+    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
+        """Yield the settings that have no meaning here: their names, their values, and what is expected."""
+        for name, entry in ENTRIES.items():
+            found = getattr(settings, name)
+            if entry.only_over not in ("", self.axis) and found != getattr(Settings, name):
+                yield name, found, f"a result over {self.axis} has none: expected the usual"
