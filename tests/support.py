@@ -194,6 +194,19 @@ def told(figure):
     return [text.get_text() for text in found if text is not None and text.get_gid() != "exaggeration"]
 
 
+def relative_errors(found, exact):
+    """Of each row the largest of pressure, force and approach, over the largest force and approach so far."""
+    cell = float(np.prod([float(exact[axis][1] - exact[axis][0]) for axis in ("x", "y")]))
+    force, approach = (np.maximum.accumulate(abs(exact[name].values)) for name in ("force", "approach"))
+    apart = {name: abs(found[name].values - exact[name].values) for name in ("pressure", "force", "approach")}
+    errors = [
+        (apart["pressure"].sum(axis=(1, 2)) * cell, force),
+        (apart["force"], force),
+        (apart["approach"], approach),
+    ]
+    return np.max([np.divide(one, scale, out=np.zeros_like(one), where=scale > 0) for one, scale in errors], axis=0)
+
+
 def refused(key=None, found=None):
     """Expect an InputError at this key, and with this value if one is given."""
 

@@ -47,6 +47,8 @@ SHORTEST_STEP = 1e-3
 PATIENCE = 30
 #: The relative duality gap may be this many times the tolerance if the estimated error of the pressure is small enough.
 GAP_SLACK = 1.5
+#: A first step is taken whole; the next one is conjugate to it if the minimum along it is at most this part of it away.
+NEARLY_MINIMUM = 0.1
 #: Factor of the estimated error, so that it is hardly ever too small; and with the second level of the preconditioner.
 CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
 #: Cells from which steps are convolved in single precision, if the error at the start is so many times the tolerance:
@@ -294,6 +296,9 @@ def solve_contact(
         curvature = inner(change, response[cells])
         minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
         fraction, was_cut = admissible_fraction(held, trial, change, minimum)
+        if is_extrapolated and not is_single:  # taken whole: of no other pressure is the displacement known exactly
+            fraction, is_extrapolated = 1.0, False
+            curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
         if fraction != 1:
             trial = xp.maximum(held + fraction * change, 0)
         pressure[cells] = trial
