@@ -20,13 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.half_space import check_grid, love_kernel, rectangle_displacement
+from roughvisc.mechanics.half_space import check_grid, love_kernel
 from roughvisc.mechanics.materials.creep import Creep, Material, complete
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
-Counts = NDArray[np.intp]
 
 
 class Kernel(Protocol):
@@ -98,31 +97,6 @@ class Kernel(Protocol):
         """Return the attributes of a result that describe the body: names and values."""
         return {"kernel": repr(self)}
 
-    def under_rectangle(
-        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
-    ) -> Array:
-        """Return the displacement of cells in a rectangle of cells that all carry unit pressure.
-
-        Parameters
-        ----------
-        before, after : pair of ndarray of int, shapes (nx,) and (ny,)
-            Number of cells of the rectangle on either side of each cell, along x and along y.
-        spacing : tuple of float
-            Cell sides. [m]
-
-        Returns
-        -------
-        ndarray, shape (nx, ny)
-            Sums of :meth:`influence`. A kernel with a closed form overrides this method. [m]
-        """
-        reach = [max(int(np.max(a)), int(np.max(b))) + 1 for a, b in zip(before, after, strict=True)]
-        quadrant = np.array(self.influence((reach[0], reach[1]), spacing))
-        quadrant[0] /= 2  # a cell's own row and column are in two quadrants
-        quadrant[:, 0] /= 2
-        total = np.cumsum(np.cumsum(quadrant, axis=0), axis=1)
-        x, y = ((a, b) for a, b in zip(before, after, strict=True))
-        return np.asarray(sum(total[np.ix_(i, j)] for i in x for j in y))
-
 
 @dataclass(frozen=True)
 class HalfSpace(Kernel):
@@ -147,15 +121,6 @@ class HalfSpace(Kernel):
     def described(self) -> dict[str, Any]:
         """Return nothing: a half-space is the default."""
         return {}
-
-    def under_rectangle(
-        self, before: tuple[Counts, Counts], after: tuple[Counts, Counts], spacing: tuple[float, float]
-    ) -> Array:
-        """Return the same as for any kernel, in closed form. [m]"""
-        axes = list(zip(before, after, spacing, strict=True))
-        x, y = ((a - b) / 2 * side for a, b, side in axes)
-        sides = [int(a[0] + b[0] + 1) * side for a, b, side in axes]
-        return rectangle_displacement(x[:, None], y, (sides[0], sides[1]))
 
 
 #: The default kernel.
@@ -222,14 +187,13 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
     check_grid(shape, spacing)
     waves = periodic_waves(shape, spacing)
     symbol = np.array(kernel.transfer(*waves), dtype=float)
-    amiss = ~(np.isfinite(symbol) & (symbol > 0))
-    amiss[0, 0] = not 0 <= symbol[0, 0] < math.inf
-    if amiss.any():
-        i, j = (int(n) for n in np.argwhere(amiss)[0])
-        qx, qy = (float(one.ravel()[at]) for one, at in zip(waves, (i, j), strict=True))
+    wrong = ~(np.isfinite(symbol) & (symbol > 0))
+    wrong[0, 0] = not 0 <= symbol[0, 0] < math.inf
+    if wrong.any():
+        i, j = np.argwhere(wrong)[0]
         raise InputError(
-            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {qx:g} and {qy:g} 1/m: "
-            "expected a positive number, or zero where both are zero"
+            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {waves[0][i, 0]:g} and "
+            f"{waves[1][0, j]:g} 1/m: expected a positive number, or zero where both are zero"
         )
     return symbol
 

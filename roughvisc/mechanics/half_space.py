@@ -72,31 +72,12 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     return kernel * (longer / math.pi)
 
 
-def _corner_sum(x: Array, y: Array, dx: float | Array, dy: float | Array) -> Array:
+def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
     total = np.zeros_like(x)
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
         total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
     return total
-
-
-def rectangle_displacement(x: NDArray, y: NDArray, sides: tuple[float | Array, float | Array]) -> Array:
-    """Return the displacement under unit pressure on a rectangle, in closed form.
-
-    Parameters
-    ----------
-    x, y : ndarray
-        Positions relative to the centre, which broadcast; none may lie on the lines of the edges. [m]
-    sides : tuple of float or ndarray
-        Sides of the rectangle, or of one rectangle for each position. [m]
-
-    Returns
-    -------
-    ndarray
-        Displacement at unit contact compliance; exact to rounding in and near the rectangle. [m]
-    """
-    positions = np.broadcast_arrays(x, y)
-    return _corner_sum(positions[0], positions[1], sides[0], sides[1]) / math.pi
 
 
 _gauss_rule = cache(np.polynomial.legendre.leggauss)

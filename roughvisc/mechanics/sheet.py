@@ -13,10 +13,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel, separability_error
-from roughvisc.mechanics.half_space import check_grid, love_kernel, rectangle_displacement
+from roughvisc.mechanics.half_space import check_grid, love_kernel
 from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.units import Quantity, quantities
 
@@ -32,17 +33,8 @@ SHORTEST_WAVE = 24.0
 _PIECE, _NODES = 0.15, 10
 # Gauss points per side of a cell of so many thicknesses that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cells of more thicknesses than the first are long, see :func:`long_cell_influence`; beyond the second: refused.
+# Cells of more thicknesses than the first are long; beyond the second: refused.
 _LONG, _LONGEST = 0.5, 50.0
-# With this kappa the response to long waves is right to 1e-3 of 4/3 q^2 on cells of any length (measured).
-_KAPPA = 3.0
-# Distance at which erfc(kappa r) is below rounding, and Gauss points that integrate over as much to rounding.
-_SHORT_REACH, _GAUSS_POINTS = 6.2 / _KAPPA, 32
-# Wave number at which the second part of the kernel, 2/q erfc(q / 2 kappa), is below rounding.
-_LAST_WAVE = 12 * _KAPPA
-# Minus the second derivative, to fourth order in the spacing.
-_SECOND_DIFFERENCE = (-1 / 12, 16 / 12, -30 / 12, 16 / 12, -1 / 12)
-_MARGIN = len(_SECOND_DIFFERENCE) // 2
 # Below this, sinh(2 x) - 2 x is computed from its series.
 _SERIES_BELOW = 0.5
 
@@ -119,7 +111,7 @@ class Sheet(Kernel):
 
     In free space the kernel is that of the half-space less a smooth correction,
     ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
-    the thickness it is that of :func:`long_cell_influence`.
+    the thickness its transform is :meth:`transfer` of difference quotients.
 
     References
     ----------
@@ -143,15 +135,6 @@ class Sheet(Kernel):
         """Displacement of the sheet under uniform unit pressure. [m]"""
         slope = (1 - 2 * self.poisson) / (1 - self.poisson) ** 2 if self.base == "bonded" else 1.0
         return slope * self.thickness
-
-    @property
-    def long_wave_factor(self) -> float:
-        """``S`` of the longest waves: they do not displace a surface above a rigid base."""
-        return 0.0
-
-    def complement(self, x: ArrayLike) -> Array:
-        """Return ``1 - S`` of waves, without cancellation. `x` is the wave number times the thickness."""
-        return complement(x, self.poisson, self.base)
 
     @property
     def relief(self) -> float:
@@ -178,8 +161,7 @@ class Sheet(Kernel):
         check_grid(shape, spacing)
         dx, dy = (side / self.thickness for side in spacing)
         if max(dx, dy) > _LONG:
-            uniform = self.uniform_displacement / self.thickness
-            return self.thickness * long_cell_influence(shape, (dx, dy), self._scaled_transfer, uniform, _REACH)
+            return self._influence_of_long_cells(shape, spacing)
         kernel = love_kernel(shape, spacing)
         x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
         near = np.hypot(x[:, None], y) <= _REACH - math.hypot(dx, dy) / 2
@@ -195,9 +177,20 @@ class Sheet(Kernel):
         kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
         return kernel
 
-    def _scaled_transfer(self, x: Array) -> Array:
-        """Return the transfer function over the thickness, of wave numbers times the thickness."""
-        return 2 / x * reduction(x, self.poisson, self.base)
+    def _influence_of_long_cells(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+        """Return the kernel whose transform is the transfer function of fourth-order difference quotients. [m]
+
+        They replace ``qx^2`` by ``4 (s + s^2 / 3) / dx^2`` with ``s = sin^2(qx dx / 2)``. The transform is then smooth
+        at the shortest wave, so that the kernel decays exponentially. Its relative error of long waves is below
+        ``(q dx)^4 / 90``.
+        """
+        counts = [
+            max(n, math.ceil(_REACH * self.thickness / side) + 16) for n, side in zip(shape, spacing, strict=True)
+        ]
+        sines = [np.sin(np.pi / 2 * np.arange(count) / (count - 1)) ** 2 for count in counts]
+        qx, qy = (2 / side * np.sqrt(s + s**2 / 3) for s, side in zip(sines, spacing, strict=True))
+        influence: Array = fft.idctn(self.transfer(qx[:, None], qy), type=1)
+        return influence[: shape[0], : shape[1]]
 
     def check_cells(self, spacing: tuple[float, float]) -> None:
         """Refuse cells longer than fifty thicknesses."""
@@ -208,79 +201,6 @@ class Sheet(Kernel):
                 f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
                 "periodic boundaries, or a thicker sheet"
             )
-
-
-def long_cell_influence(
-    shape: tuple[int, int],
-    sides: tuple[float, float],
-    transfer: Callable[[Array], Array],
-    uniform: float,
-    reach: float,
-) -> Array:
-    """Return the displacement of cells under unit pressure on the cell at the origin, for cells of any length.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Number of cells ``(nx, ny)``.
-    sides : tuple of float
-        Cell sides. [thicknesses]
-    transfer : callable
-        ``K_q`` of positive wave numbers. [thicknesses]
-    uniform : float
-        Its limit ``K_0`` at zero. [thicknesses]
-    reach : float
-        Distance beyond which the kernel is zero to rounding. [thicknesses]
-
-    Returns
-    -------
-    ndarray, shape (nx, ny)
-        [thicknesses]
-    """
-    from scipy.special import erf  # slow to import
-
-    rest = uniform - 2 / (math.sqrt(math.pi) * _KAPPA)
-    influence = np.zeros(shape)
-
-    # a Fourier sum over half-integer wave numbers: its nearest images lie two reaches away
-    waves = np.asarray((np.arange(math.ceil(_LAST_WAVE * reach / math.pi)) + 0.5) * math.pi / reach, dtype=np.float64)
-    squared = waves[:, None] ** 2 + waves**2
-    q = np.sqrt(squared)
-    smooth = (transfer(q) - 2 / q * erf(q / (2 * _KAPPA)) - rest * np.exp(-squared / (12 * _KAPPA**2))) / squared
-    nx, ny = (min(n, math.ceil(reach / side + 0.5) + _MARGIN) for n, side in zip(shape, sides, strict=True))
-    means = _cell_waves(nx, sides[0], waves, reach) @ smooth @ _cell_waves(ny, sides[1], waves, reach).T
-    for shift, weight in enumerate(_SECOND_DIFFERENCE):
-        influence[:nx, :ny] -= weight / sides[0] ** 2 * means[shift : shift + nx, _MARGIN:-_MARGIN]
-        influence[:nx, :ny] -= weight / sides[1] ** 2 * means[_MARGIN:-_MARGIN, shift : shift + ny]
-
-    nx, ny = (min(n, math.ceil(_SHORT_REACH / side + 0.5)) for n, side in zip(shape, sides, strict=True))
-    x, width = _clipped_cells(np.arange(nx), sides[0], _SHORT_REACH)
-    y, depth = _clipped_cells(np.arange(ny), sides[1], _SHORT_REACH)
-    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
-    at_x, at_y = (at[:, None] + side[:, None] * nodes / 2 for at, side in ((x, width), (y, depth)))
-    distance = np.hypot(at_x[:, None, :, None], at_y[:, None, :])
-    beyond = erf(_KAPPA * distance) / (math.pi * distance)  # what 1 / (pi r) has more than the first part
-    influence[:nx, :ny] += rectangle_displacement(x[:, None], y, (width[:, None], depth))
-    influence[:nx, :ny] -= np.outer(width, depth) / 4 * (beyond @ weights @ weights)
-    share_x, share_y = (
-        (erf(math.sqrt(3) * _KAPPA * (at + side / 2)) - erf(math.sqrt(3) * _KAPPA * (at - side / 2))) / 2
-        for at, side in ((x, width), (y, depth))
-    )
-    influence[:nx, :ny] += rest * np.outer(share_x, share_y)
-    return influence
-
-
-def _clipped_cells(cells: NDArray[np.intp], side: float, reach: float) -> tuple[Array, Array]:
-    """Return centre and length of the part of each cell within a distance of the origin, along an axis."""
-    lower, upper = (np.clip((cells + end) * side, -reach, reach) for end in (-0.5, 0.5))
-    return (lower + upper) / 2, upper - lower
-
-
-def _cell_waves(count: int, side: float, waves: Array, reach: float) -> Array:
-    """Return integrals of waves over cells from the origin on, and over some cells on either side."""
-    centre, length = _clipped_cells(np.arange(-_MARGIN, count + _MARGIN), side, reach)
-    integrals = np.cos(np.outer(centre, waves)) * np.sin(np.outer(length / 2, waves)) * (2 / waves)
-    return np.asarray(integrals / reach)
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:

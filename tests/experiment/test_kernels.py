@@ -100,7 +100,7 @@ def refuse(*_):
 
 @pytest.fixture
 def no_half_space(monkeypatch):
-    for name in ("influence", "transfer", "under_rectangle"):
+    for name in ("influence", "transfer"):
         monkeypatch.setattr(HalfSpace, name, refuse)
 
 

@@ -25,7 +25,7 @@ from scipy.special import j0
 from references.layer import ElasticLayer
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms.indenters import Indenter, places, positive, punch_pressure
-from roughvisc.mechanics.sheet import SHORTEST_WAVE, Sheet, panels
+from roughvisc.mechanics.sheet import SHORTEST_WAVE, Sheet, complement, panels
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -237,9 +237,19 @@ def _smooth(indenter: Indenter, sheet: Sheet | ElasticLayer, radius: float) -> _
         return indenter.reduced(x * sheet.thickness) / sheet.thickness
 
     contact = _solved(profile, radius, sheet)
-    if sheet.long_wave_factor > 1:
+    if _long_wave_factor(sheet) > 1:
         _check_disc(contact, indenter, sheet)
     return contact
+
+
+def _long_wave_factor(sheet: Sheet | ElasticLayer) -> float:
+    """Return ``S`` of the longest waves: they do not displace a surface above a rigid base."""
+    return 0.0 if isinstance(sheet, Sheet) else sheet.long_wave_factor
+
+
+def _complement(sheet: Sheet | ElasticLayer, x: Array) -> Array:
+    """Return ``1 - S`` of waves, without cancellation."""
+    return complement(x, sheet.poisson, sheet.base) if isinstance(sheet, Sheet) else sheet.complement(x)
 
 
 def _check_disc(contact: _Contact, indenter: Indenter, layer: Sheet | ElasticLayer) -> None:
@@ -267,9 +277,9 @@ def _solved(
     nodes, weights = panels(1, radius, _NODES + int(_NODES_PER_THICKNESS * radius))
     count = math.ceil(2 * SHORTEST_WAVE * max(radius, 2.0) / _PHASE)
     waves, wave_weights = panels(count, SHORTEST_WAVE, _IN_PANEL)
-    if sheet.long_wave_factor > 1:  # a stiff layer gives way by x^-3 down to waves that feel the base alone
-        waves, wave_weights = _graded(waves, wave_weights, math.ceil(math.log2(sheet.long_wave_factor)))
-    lost = 2 / math.pi * wave_weights * sheet.complement(waves)
+    if _long_wave_factor(sheet) > 1:  # a stiff layer gives way by x^-3 down to waves that feel the base alone
+        waves, wave_weights = _graded(waves, wave_weights, math.ceil(math.log2(_long_wave_factor(sheet))))
+    lost = 2 / math.pi * wave_weights * _complement(sheet, waves)
     cosines = np.cos(np.outer(nodes, waves))
     matrix = np.eye(nodes.size) - (cosines * lost) @ cosines.T * weights
     sides = 2 / math.pi * np.stack([np.ones_like(nodes), profile(nodes)], axis=1)
