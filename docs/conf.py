@@ -58,24 +58,20 @@ copyright = author
 
 
 def _with_tables(app, docname, source):
-    """Put the table of the vocabulary, and those of the keys of study files, where the pages ask for them."""
-    from roughvisc.variables import STATUS_MEANINGS, VARIABLES
-    from roughvisc.variables.sliding import SLIDING
+    """Insert the tables of variables and of the keys of study files."""
+    from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
 
-    def table(variables):
-        rows = ["| variable | dimensions | unit | meaning |", "|---|---|---|---|"]
-        for name, one in variables.items():
-            meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
-            if name == "status":
-                meaning += ": " + ", ".join(
-                    f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS)
-                )
-            rows.append(f"| `{name}` | {', '.join(one.dims)} | {one.units or '-'} | {meaning} |")
-        return "\n".join(rows)
-
+    rows = ["| variable | over | unit | meaning |", "|---|---|---|---|"]
+    for name, one in VARIABLES.items():
+        over = [
+            "steps" if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims
+        ]
+        meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
+        if name == "status":
+            meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
+        rows.append(f"| `{name}` | {', '.join(over) or '-'} | {one.units or '-'} | {meaning} |")
     if docname == "nomenclature":
-        source[0] = source[0].replace("VARIABLES_TABLE", table(VARIABLES))
-        source[0] = source[0].replace("SLIDING_TABLE", table(SLIDING))
+        source[0] = source[0].replace("VARIABLES_TABLE", "\n".join(rows))
     if docname == "study-files":
         from study_keys import filled
 

@@ -184,7 +184,7 @@ def friction(
     Returns
     -------
     xarray.Dataset
-        Variables over ``speed``, in the given order, as declared in :data:`roughvisc.variables.sliding.SLIDING`.
+        Variables over ``speed``, in the given order, as declared in :data:`roughvisc.variables.sliding.VARIABLES`.
 
     Raises
     ------

@@ -1,7 +1,4 @@
-"""Labels of a Dataset: units, names and comments of its variables, as they are declared in the vocabulary.
-
-A variable that is not declared, or whose dimensions differ, is refused.
-"""
+"""Units, names and comments of the variables of a Dataset, as declared in :mod:`roughvisc.variables`."""
 
 from __future__ import annotations
 
@@ -13,11 +10,13 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
-from roughvisc.variables import FLAGS, VARIABLES, Variable
-from roughvisc.variables.axes import AXES, ROW, ROWS, axis_of
+from roughvisc.variables import AXES, ROW, ROWS, STEP, VARIABLES, Variable, axis_of, errors_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
+_CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
 
 
 def heading(name: str, unit: str) -> str:
@@ -31,81 +30,67 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def annotate(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset with the declared dtype and attributes on every variable.
+def label(dataset: xr.Dataset, declared: Mapping[str, Variable] = VARIABLES) -> xr.Dataset:
+    """Return a Dataset with the declared dtype and attributes on every variable.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Holds declared variables only, and scalar coordinates of any name: what was varied in a case. Extra leading
-        dimensions (``case``) are allowed.
+        Holds declared variables only, and coordinates of any name: what was varied in a case. Extra leading dimensions
+        (``case``) are allowed.
+    declared : mapping
+        Name -> declaration.
 
     Raises
     ------
     KeyError
         If a variable is not declared.
     ValueError
-        If a variable's dimensions are not the declared ones.
+        If the dimensions of a variable do not end in the declared ones.
+
+    Notes
+    -----
+    Values after the last row of a case are missing, if the cases have rows of their own.
     """
-    declared = {
-        name: _declared(str(name), one.dims)
-        for name, one in dataset.variables.items()
-        if name in VARIABLES or name not in dataset.coords or one.dims
-    }
-    other = {}
-    for name, one in declared.items():
-        variable = dataset.variables[name]
+    axis = axis_of(dataset.variables)
+    if ROW in dataset.dims and axis in dataset.coords:
+        dataset = dataset.where(dataset[axis].notnull())
+    attributes: dict[Hashable, dict[str, Any]] = {}
+    converted = {}
+    for name, variable in dataset.variables.items():
+        one = declared.get(str(name))
+        if one is None or not _ends_in(variable.dims, one.dims):
+            if name in dataset.coords:
+                continue
+            if one is None:
+                raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
+            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {one.dims}")
         if variable.dtype != np.dtype(one.dtype) and variable.dtype.kind not in "fUO":
-            other[name] = variable.astype(one.dtype)
-    annotated = dataset.assign(other)  # once: each assignment merges the whole
-    for name, one in declared.items():
-        attributes = one.attributes() | ({"cartesian_axis": one.axis} if one.axis else {})
-        if stated := " ".join(other for other in one.ancillary if other in annotated):
-            attributes["ancillary_variables"] = stated
-        annotated.variables[name].attrs.update(attributes)
-    for name in FLAGS.keys() & set(annotated.variables):
-        annotated.variables[name].attrs.update(_flags(name))
-    return annotated
+            converted[name] = variable.astype(one.dtype)
+        attributes[name] = one.attributes()
+        if stated := " ".join(other for other in errors_of(str(name)) if other in dataset):
+            attributes[name]["ancillary_variables"] = stated
+        if name in _CARTESIAN:
+            attributes[name]["cartesian_axis"] = _CARTESIAN[str(name)]
+    labelled = dataset.assign(converted)  # once: each assignment merges the whole
+    for name, found in attributes.items():
+        labelled.variables[name].attrs.update(found)
+    return labelled
+
+
+def _ends_in(dims: tuple[Hashable, ...], declared: tuple[str, ...]) -> bool:
+    """Return whether dimensions end in the declared ones; a row may lie over any axis of rows."""
+    own = dims[len(dims) - len(declared) :]
+    rows = (*AXES, ROW, STEP)
+    return len(own) == len(declared) and all(
+        dim in rows if one in (ROW, STEP) else dim == one for dim, one in zip(own, declared, strict=True)
+    )
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
     """Return a result with its variables in the order of their declaration: main results first."""
-    known = list(AXES[axis_of(dataset.variables)].variables)
+    known = list(VARIABLES)
     return dataset[sorted(dataset.data_vars, key=lambda name: known.index(name) if name in known else len(known))]
-
-
-def _flags(name: str) -> dict[str, Any]:
-    """CF attributes that say what the values of a status mean."""
-    meanings = FLAGS[name]
-    return {"flag_values": np.arange(len(meanings), dtype="int8"), "flag_meanings": " ".join(meanings)}
-
-
-def describe(dataset: xr.Dataset) -> xr.Dataset:
-    """Dataset of derived variables alone, with the declared attributes and no others; missing after a case's last row.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Holds declared variables only; coordinates that are not declared, such as ``case``, stay as they are.
-
-    Raises
-    ------
-    KeyError
-        If a variable is not declared.
-    ValueError
-        If a variable's dimensions do not end in the declared ones.
-    """
-    described = dataset.copy()
-    if ROW in described.dims and (axis := axis_of(described.variables)) in described.coords:
-        described = described.where(described[axis].notnull())
-    for name, variable in described.variables.items():
-        if name in described.coords and (name not in VARIABLES or name not in described.dims):
-            continue
-        variable.attrs = _declared(str(name), variable.dims).attributes()
-        if name in FLAGS:
-            variable.attrs |= _flags(str(name))
-    described.attrs = {}
-    return described
 
 
 def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
@@ -161,18 +146,3 @@ def _same_unit(found: str, declared: str) -> bool:
     except InputError:
         return False
     return factor == 1.0
-
-
-def _declared(name: str, dims: tuple[Hashable, ...]) -> Variable:
-    """What is declared of a variable over its axis, if its dimensions are those."""
-    axis = axis_of(dims)
-    if ROW in dims:  # of cases over one axis, which the dimension does not name
-        axis = next((one.name for one in AXES.values() if name in one.variables), axis)
-        dims = tuple(axis if dim == ROW else dim for dim in dims)
-    known = AXES[axis].variables
-    if name not in known:
-        raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-    declared = known[name]
-    if dims[len(dims) - len(declared.dims) :] != declared.dims:
-        raise ValueError(f"variable {name!r} has dimensions {dims}, declared are {declared.dims}")
-    return declared

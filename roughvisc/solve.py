@@ -19,7 +19,7 @@ from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
-from roughvisc.labels import annotate, in_order
+from roughvisc.labels import in_order, label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.steps import TITLE, with_steps
 from roughvisc.topography.grid import checked, nominal_area
@@ -149,9 +149,9 @@ def solve(
     if settings.grid_error and isinstance(experiment, Loading) and "pressure" not in settings.fields:
         needed = ("pressure",)
         problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
-    label = "pressing" if experiment.axis == "time" else "sliding"
+    doing = "pressing" if experiment.axis == "time" else "sliding"
     with fft.set_workers(threads_for(threads)):
-        with reporting(progress, label, at=experiment.progress) as report:
+        with reporting(progress, doing, at=experiment.progress) as report:
             dataset = _solve_once(problem, experiment, recorder or Recorder(), report)
         if settings.grid_error and isinstance(experiment, Loading):
             # coarser grids may be of other sizes: the loads are those of the given area
@@ -164,7 +164,7 @@ def solve(
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser)
-    return annotate(in_order(dataset)).drop_vars(needed)
+    return label(in_order(dataset)).drop_vars(needed)
 
 
 def _solve_once(
@@ -235,9 +235,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         **settings.to_attributes(),
         "history": str(height.attrs.get("history", "")),
     }
-    dataset = annotate(in_order(rows.finish(dataset)))
+    dataset = label(in_order(rows.finish(dataset)))
     if axis != "time":
         return dataset
     histories = steps.set_index("time")[[name for name in STEPPED if name in steps]].to_xarray()
-    histories = annotate(histories.assign_attrs(title=TITLE)).drop_indexes("time").rename_dims(time="step")
+    histories = label(histories.assign_attrs(title=TITLE)).drop_indexes("time").rename_dims(time="step")
     return with_steps(dataset, histories)

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 from scipy import ndimage
 
-from roughvisc.labels import annotate
+from roughvisc.labels import label
 
 
 def _cells(shape, size):
@@ -29,7 +29,6 @@ def _histories(fields, force, approach, residual=3e-6):
         contact_area_counted=counted,
         contact_fraction=0.97 * counted / (cell * present.sum()),
         mean_gap=fields["gap"].mean(("x", "y")),
-        iterations=("time", 8 + frames % 5),
         convolutions=("time", 11 + frames % 5),
         **_accuracy(force, approach, 0.97 * counted.values, residual),
         status=("time", status),
@@ -47,7 +46,6 @@ def _accuracy(force, approach, area, residual):
         "stated_error": stated,
         "time_error": steps,
         "residual": solver,
-        "force_error": np.zeros(len(force)),
         "approach_error": 0.3 * steps * np.maximum.accumulate(np.abs(approach)),
         "contact_area_error": 0.01 * area,
     }
@@ -60,7 +58,7 @@ def _work(force, approach):
 
 
 def _attributes(dataset, title, boundary):
-    dataset = annotate(dataset)
+    dataset = label(dataset)
     dataset.attrs.update(title=title, boundary=boundary, tolerance=1e-3, Conventions="CF-1.11", result_format=1)
     return dataset
 

@@ -137,12 +137,12 @@ def budget(
     from roughvisc.study.storage.store import open_result
     from roughvisc.study.trade.files import part_of_one
     from roughvisc.units import number
-    from roughvisc.variables.axes import AXES
+    from roughvisc.variables import VARIABLES
 
     console = Console(quiet=quiet)
     case, folder = case_of(open_result(study) if study.suffix == ".nc" else study, out)
     axis = case.experiment().axis
-    unit = AXES[axis].variables[axis].units
+    unit = VARIABLES[axis].units
     known = {
         "modulus_error": None if modulus_error is None else part_of_one(modulus_error, "--modulus-error"),
         "time_scale_error": None if time_scale_error is None else part_of_one(time_scale_error, "--time-scale-error"),

@@ -22,8 +22,7 @@ from roughvisc.experiment.coarser import coarser, pressure_distance
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.indenters import grown
-from roughvisc.variables.axes import AXES, axis_of
-from roughvisc.variables.grid_errors import GRID_ERROR
+from roughvisc.variables import GRID_ERROR, axis_of
 
 Array = NDArray[np.float64]
 #: Powers of the cell's side with which the error of a quantity vanishes: no lower one is believed, and no higher one
@@ -145,7 +144,7 @@ def with_grid_error(
     Notes
     -----
     Errors are relative to the largest value, that of the pressure (L1) to the largest force; ``grid_error`` is the
-    larger one of pressure and approach. All runs have an error in time within the tolerance, so that these are no
+    largest of pressure, force and approach. All runs have an error in time within the tolerance, so that these are no
     estimates much below it. Missing where there is no coarser solution; where there is one but no third grid, the
     safety factor is larger. The coarser grids have all waves that they can hold: see
     :func:`~roughvisc.experiment.coarser.coarser`.
@@ -188,11 +187,12 @@ def with_grid_error(
 
 def _with_errors(dataset: xr.Dataset, found: Mapping[str, Array]) -> xr.Dataset:
     """Return a result with the errors of its grid."""
-    axis = axis_of(dataset.variables)
-    known = {name: GRID_ERROR[name] for name in found if name in GRID_ERROR}
-    columns = {known[name]: found[name] for name in known if known[name] in AXES[axis].variables}
-    columns["grid_error"] = np.maximum(found["pressure"], found["approach"])
-    return dataset.assign({name: (axis, values) for name, values in columns.items()})
+    axis, errors = axis_of(dataset.variables), {}
+    for name, error in found.items():
+        variable = GRID_ERROR[name]
+        errors[variable] = np.maximum(errors[variable], error) if variable in errors else error
+    errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
+    return dataset.assign({name: (axis, values) for name, values in errors.items()})
 
 
 def _largest(dataset: xr.Dataset, name: str) -> float:

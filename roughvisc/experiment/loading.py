@@ -246,7 +246,6 @@ class LoadingRows(Rows):
             "approach": point.approach,
             "work": step.work,
             "time_error": time_error(step, largest),
-            "iterations": step.iterations,
             "convolutions": step.convolutions,
             "status": self._status(step, count),
             "contact_area": area,
@@ -299,8 +298,7 @@ class LoadingRows(Rows):
 
         The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
         """
-        for counter in ("iterations", "convolutions"):
-            dataset[counter] = "time", np.diff(dataset[counter].values, prepend=0)
+        dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
         dataset["nominal_pressure"] = dataset["force"] / self.profile.nominal_area
         scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
         approach = float(np.fmax.reduce(dataset["approach"].values))

@@ -41,15 +41,14 @@ from roughvisc.settings import Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.units import unit_for
-from roughvisc.variables import STATUS_MEANINGS
-from roughvisc.variables.grid_errors import GRID_ERROR
+from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
 #: Variables of a speed whose contact is not solved; the others are missing.
-_OF_UNSOLVED = ("force", "nominal_pressure", "pressure_residual", "friction_residual", "iterations", "status")
+_OF_UNSOLVED = ("force", "nominal_pressure", "residual", "status")
 #: Fields that a row may have.
 _FIELDS = ("pressure", "gap")
 #: Direction -> quarter turns of the grid, counter-clockwise, after which the profile moves along +x.
@@ -296,9 +295,7 @@ class SlidingRows(Rows):
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
             "stated_error": max(found.residual, found.friction_residual),
-            "pressure_residual": found.residual,
-            "friction_residual": found.friction_residual,
-            "iterations": found.vectors,
+            "residual": found.residual,
             "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
         }
         fields = {}

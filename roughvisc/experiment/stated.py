@@ -176,7 +176,6 @@ def error_columns(
     return {
         "stated_error": relative,
         "residual": point.solver_error,
-        "force_error": force,
         "approach_error": approach,
     }
 

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.derived import material_of, need_history
 from roughvisc.observables.response import history
 from roughvisc.topography.grid import nominal_area
@@ -91,7 +91,7 @@ def area_by_theory(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         "persson_contact_area": ("time", area * persson_fraction(strain)),
         "asperity_contact_area": ("time", area * asperity_fraction(strain)),
     }
-    return describe(xr.Dataset(found, coords={"time": dataset["time"]}))
+    return label(xr.Dataset(found, coords={"time": dataset["time"]}))
 
 
 def nominal_area_of(dataset: xr.Dataset) -> float:

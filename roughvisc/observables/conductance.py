@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.frozen import over_frames
 from roughvisc.observables.resistivity import Kind, resistivities
 
@@ -58,7 +58,7 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     stiffness, error = over_frames(dataset, _punch, outputs=2)
     name, factor = f"{flows}_conductance", 2 / sum(both)
     found = {name: factor * stiffness, f"{name}_error": factor * error}
-    described = describe(xr.Dataset(found))
+    described = label(xr.Dataset(found))
     for variable in described.data_vars.values():
         variable.attrs["resistivity"] = list(both)
     return described

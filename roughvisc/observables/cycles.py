@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.derived import need
 from roughvisc.observables.response import history
 
@@ -60,7 +60,7 @@ def cycle_work(dataset: xr.Dataset, *, program: Any = None) -> xr.Dataset:
         {"cycle_start": ("cycle", starts[covered]), "cycle_work": ("cycle", (after - before)[covered])},
         coords={"cycle": number[covered].astype("int64")},
     )
-    return describe(found)
+    return label(found)
 
 
 def _work_at(at: np.ndarray, slack: np.ndarray, times: np.ndarray, work: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.units import quantities
 
@@ -32,9 +32,7 @@ def _density(field: xr.DataArray, bins, name: str) -> xr.Dataset:
 
     dim = f"{name}_bin"
     density = frame_by_frame(measure, field, over=(dim, len(limits) - 1))
-    return describe(
-        xr.Dataset({f"{name}_density": density}).assign_coords({dim: (dim, (limits[1:] + limits[:-1]) / 2)})
-    )
+    return label(xr.Dataset({f"{name}_density": density}).assign_coords({dim: (dim, (limits[1:] + limits[:-1]) / 2)}))
 
 
 @quantities(bins="Pa")

@@ -12,7 +12,7 @@ from scipy.special import erf
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.mechanics.body import body_of
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.derived import material_of
@@ -64,7 +64,7 @@ def persson(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
         "persson_friction_coefficient": ("speed", list(coefficients)),
         "persson_contact_fraction": ("speed", list(fractions)),
     }
-    return describe(xr.Dataset(columns, coords={"speed": dataset["speed"]}))
+    return label(xr.Dataset(columns, coords={"speed": dataset["speed"]}))
 
 
 def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.derived import frame_by_frame, material_of
 from roughvisc.observables.spots import contact
 from roughvisc.topography.grid import spacing
@@ -63,7 +63,7 @@ def incremental_stiffness(
         "frozen_stiffness": stiffness,
         "frozen_stiffness_error": error,
     }
-    return describe(xr.Dataset(found))
+    return label(xr.Dataset(found))
 
 
 def over_frames(dataset: xr.Dataset, measure: Callable[..., tuple[float, ...]], outputs: int) -> Any:

@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.mechanics.transport.flow import Flow, fluxes
 from roughvisc.mechanics.transport.flow import flow as flow_through
 from roughvisc.observables.derived import need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
-from roughvisc.variables.axes import axis_of
-from roughvisc.variables.transport import LEAK_MEANINGS
+from roughvisc.variables import LEAK_MEANINGS, axis_of
 
 #: Distance of the bounds, relative, up to which a leak rate counts as known.
 _CERTIFIED = 1e-6
@@ -124,7 +123,7 @@ def leakage(
     }
     for axis, one in zip((along, across), fields, strict=False):
         variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
-    described = describe(xr.Dataset(variables))
+    described = label(xr.Dataset(variables))
     asked: dict[str, Any] = {"along": along, "sides": "periodic" if wrap else "closed"}
     described["transmissivity"].attrs |= asked
     described["hydraulic_aperture"].attrs |= asked

@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import describe
+from roughvisc.labels import label
 from roughvisc.observables.connectivity import cluster_sizes
 from roughvisc.observables.derived import frame_by_frame, need
 from roughvisc.topography.grid import spacing
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import axis_of
 
 
 def _is_periodic(dataset: xr.Dataset) -> bool:
@@ -82,7 +82,7 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
 
     cell = math.prod(spacing(dataset, "clusters"))
     count, mean, largest = frame_by_frame(measure, field, outputs=3)
-    return describe(
+    return label(
         xr.Dataset(
             {
                 "cluster_count": count.astype("int64"),
@@ -120,4 +120,4 @@ def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
     areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
     for row, found in zip(areas, sizes, strict=True):
         row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
-    return describe(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))
+    return label(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))

@@ -18,7 +18,6 @@ from roughvisc.observables.conductance import conductance
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.study.statement.case import Case
-from roughvisc.variables.axes import AXES
 
 Array = NDArray[np.float64]
 #: Keyword arguments of the observables, as ``[observe]`` of a study states them.
@@ -90,8 +89,9 @@ def _stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     return incremental_stiffness(result)["incremental_stiffness"]
 
 
-def _variable(name: str) -> Callable[[xr.Dataset, Array], Any]:
-    return lambda result, values: result[name].values if name in result else None
+def _of_approach(result: xr.Dataset, values: Array) -> Any:
+    """The mean gap of a periodic surface is off by the error of the approach too."""
+    return result["approach_error"].values if "approach_error" in result else None
 
 
 def _of_area(result: xr.Dataset, values: Array) -> Any:
@@ -111,26 +111,21 @@ def _of_gap(result: xr.Dataset, values: Array) -> Any:
     return np.abs(values) * np.divide(6 * result["approach_error"].values, gap, out=np.zeros_like(gap), where=gap > 0)
 
 
-_OF_APPROACH = _variable("approach_error")  # by which the mean gap of a periodic surface is off too
 _CONDUCTED: dict[str, Any] = {"fields": ("pressure",), "grid_factor": 2.5, "octave_factor": 2.5, "stated": _of_area}
 #: name -> quantity
 QUANTITIES = {
     one.name: one
     for one in (
         Observable("contact_area", "m^2", octave_factor=1.6, stated=_of_area),
-        Observable("mean_gap", "m", stated=_OF_APPROACH),
-        Observable("approach", "m", stated=_OF_APPROACH),
-        Observable("force", "N", stated=_variable("force_error")),
+        Observable("mean_gap", "m", stated=_of_approach),
+        Observable("approach", "m", stated=_of_approach),
+        Observable("force", "N"),
         Observable("friction_coefficient", "1", octave_factor=1.8),
         Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), stated=_of_gap),
         Observable("thermal_conductance", "W/K", _thermal, **_CONDUCTED),
         Observable("incremental_stiffness", "N/m", _stiffness, **_CONDUCTED),
     )
 }
-
-
-def _is_over(name: str, axis: str) -> bool:
-    return bool(QUANTITIES[name].fields) or name in AXES[axis].variables
 
 
 def is_sliding(experiment: Experiment) -> bool:
@@ -151,9 +146,8 @@ def creep_time(experiment: Experiment, size: float) -> float:
 
 def observables_of(case: Case) -> list[str]:
     """Names of the quantities that the results of a case have."""
-    experiment = case.experiment()
-    slides = is_sliding(experiment)
-    return [one for one in QUANTITIES if _is_over(one, experiment.axis) and (slides or one != "friction_coefficient")]
+    slides = is_sliding(case.experiment())
+    return [one for one in QUANTITIES if slides or one != "friction_coefficient"]
 
 
 def known_quantity(name: Any, case: Case) -> Observable:
@@ -164,12 +158,8 @@ def known_quantity(name: Any, case: Case) -> Observable:
     InputError
         If there is none of that name, or the results do not hold it.
     """
-    axis = case.experiment().axis
     if name not in QUANTITIES:
         raise InputError(key="quantity", found=name, expected=f"one of {', '.join(QUANTITIES)}")
     if name == "friction_coefficient" and name not in observables_of(case):
         raise InputError(key="quantity", found=name, expected="a number of a surface that does not slide")
-    if not _is_over(name, axis):
-        has = ", ".join(one for one in QUANTITIES if _is_over(one, axis))
-        raise InputError(key="quantity", found=name, expected=f"one of {has}, as results over {axis} have them")
     return QUANTITIES[name]

@@ -10,8 +10,7 @@ import xarray as xr
 from roughvisc.labels import heading
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.units import Quantity, quantities
-from roughvisc.variables import FLAGS
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 from roughvisc.views.figures.rows import frame_at, require, rows_of
 from roughvisc.views.figures.sections import deformed_surface
 
@@ -45,8 +44,9 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     require(dataset, rows)
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
     table = dataset[names].reset_coords(drop=True).to_dataframe().replace([np.inf, -np.inf], np.nan)
-    for name in FLAGS.keys() & set(table):
-        table[name] = [FLAGS[name][value] for value in table[name]]
+    for name in table:
+        if meanings := VARIABLES[name].meanings if name in VARIABLES else ():
+            table[name] = [meanings[value] for value in table[name]]
     headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
     settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # the same on every system
     with atomic_write(path) as temporary:

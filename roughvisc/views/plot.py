@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import axis_of
 from roughvisc.views.figures.files import write_figure
 from roughvisc.views.figures.rows import fullest_frame, require, rows_of
 

@@ -10,8 +10,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics import steady_sliding
 from roughvisc.mechanics.materials.frequency import complex_compliance
-from roughvisc.variables import STATUS_MEANINGS
-from roughvisc.variables.sliding import SLIDING
+from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
@@ -25,9 +24,9 @@ def curve():
 
 def test_dataset__is_labelled_and_in_the_order_given(curve):
     assert curve.speed.values.tolist() == [0.2, 2e-3, 20.0]
-    assert set(curve.variables) <= set(SLIDING)
+    assert set(curve.variables) <= set(VARIABLES)
     for name, variable in curve.variables.items():
-        assert variable.attrs["long_name"] == SLIDING[name].long_name
+        assert variable.attrs["long_name"] == VARIABLES[name].long_name
     assert curve.pressure.dims == ("speed", "x", "y")
     assert curve.friction_coefficient.attrs["units"] == "1"
     assert curve.status.attrs["flag_meanings"].split()[0] == "converged"

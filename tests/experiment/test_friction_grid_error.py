@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.variables.sliding import SLIDING
+from roughvisc.variables import VARIABLES
 
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
 SPEEDS = [1e-2, 0.1, 1.0]
@@ -68,7 +68,7 @@ def test_grid_error__falls_with_the_grid_and_is_labelled():
     ]
     for name in ("grid_error_friction", "grid_error_area"):
         assert float(found[1][name][0]) < 0.5 * float(found[0][name][0])
-        assert found[0][name].attrs["long_name"] == SLIDING[name].long_name
+        assert found[0][name].attrs["long_name"] == VARIABLES[name].long_name
 
 
 def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():

@@ -147,5 +147,5 @@ def test_checkpoint__goes_on_with_the_same_bits(tmp_path):
     with pytest.raises(Enough):
         rv.run(case, tmp_path / "part", progress=stop)
     resumed = rv.run(case, tmp_path / "part", progress=False)
-    for name in ("pressure", "gap", "approach", "iterations"):
+    for name in ("pressure", "gap", "approach", "convolutions"):
         assert resumed[name].values.tobytes() == whole[name].values.tobytes(), name

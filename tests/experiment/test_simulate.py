@@ -270,7 +270,7 @@ def test_threads__change_no_bit(monkeypatch):
         with fft.set_workers(threads):
             found.append(simulate(rough, program=rv.Program().load(1e-3, over=0.1), boundary="periodic", fields=FIELDS))
     for ds in found[1:]:
-        for name in (*FIELDS, "approach", "work", "iterations"):
+        for name in (*FIELDS, "approach", "work", "convolutions"):
             assert ds[name].values.tobytes() == found[0][name].values.tobytes(), name
 
 

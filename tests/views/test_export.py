@@ -84,7 +84,7 @@ def test_csv__is_written_out_in_full(tmp_path):
             "force": ("time", [0.1 + 0.2, -0.0, 5e-324], {"units": "N"}),
             "residual": ("time", [1e-5, np.nan, np.inf], {"units": "1"}),
             "height": (("x", "y"), np.zeros((2, 2))),
-            "iterations": ("time", np.array([3, 0, 12], np.int32)),
+            "convolutions": ("time", np.array([3, 0, 12], np.int32)),
             "status": ("time", np.array([0, 1, 0], np.int8)),
         },
         coords={"time": ("time", [0.0, 1e-6, 1e22], {"units": "s"}), "load": 2.0},
@@ -92,7 +92,7 @@ def test_csv__is_written_out_in_full(tmp_path):
     path = rv.to_csv(ds, tmp_path / "a.csv.gz")
     first, second = STATUS_MEANINGS[:2]
     lines = [
-        "time [s],force [N],residual,iterations,status",
+        "time [s],force [N],residual,convolutions,status",
         f"0.0,0.30000000000000004,1e-05,3,{first}",
         f"1e-06,-0.0,,0,{second}",
         f"1e+22,5e-324,,12,{first}",

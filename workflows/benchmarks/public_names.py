@@ -44,7 +44,11 @@ def study_keys():
 
 
 def variables():
-    tables = (declared("roughvisc.variables", "VARIABLES"), declared("roughvisc.variables.sliding", "SLIDING"))
+    tables = (
+        declared("roughvisc.variables", "VARIABLES"),
+        declared("roughvisc.variables.sliding", "SLIDING"),  # of the first edition
+        declared("roughvisc.study.trade.trade", "VARIABLES"),
+    )
     return {
         name: f"{one.dims} {one.units} {getattr(one, 'group', '')}".strip()
         for table in tables

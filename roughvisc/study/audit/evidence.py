@@ -23,8 +23,7 @@ from roughvisc.study.quantities import creep_time
 from roughvisc.study.statement.case import Case
 from roughvisc.topography.framing import with_images
 from roughvisc.topography.grid import spacing
-from roughvisc.variables import OTHER_DIMS
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import OTHER_DIMS, axis_of
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.store import result_path
 from roughvisc.topography.parameters import parameters
 from roughvisc.units import Quantity, in_si, quantities
-from roughvisc.variables.axes import AXES
+from roughvisc.variables import AXES, VARIABLES
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -149,7 +149,7 @@ def budgets(
     quantities = [known_quantity(name, case) for name in names]
     errors = known_errors(known or {})
     axis = AXES[case.experiment().axis]
-    given = in_si(at, axis.variables[axis.name].units, "at")
+    given = in_si(at, VARIABLES[axis.name].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, places, [field for one in quantities for field in one.fields])
     finished = Path(source) if source else result_path(result_folder(case), case.key)
@@ -239,7 +239,7 @@ def assembled(
             "upper": (axis, known * np.exp(up), units | {"long_name": "upper bound at 95 %"}),
             "case_cost": ((), seconds["own"], {"units": "s", "long_name": "wall time of the case itself"}),
         },
-        coords={"source": list(judged), axis: (axis, places, {"units": AXES[axis].variables[axis].units})},
+        coords={"source": list(judged), axis: (axis, places, {"units": VARIABLES[axis].units})},
         attrs={
             "quantity": quantity.name,
             "population": population,

@@ -21,7 +21,7 @@ from roughvisc.study.quantities import Observable
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.trade.ladder import has_steps
 from roughvisc.topography.grid import spacing
-from roughvisc.variables.axes import AXES
+from roughvisc.variables import AXES
 
 #: The tolerance over the target: steps and solver then count for little beside all else.
 FIFTH = 0.2

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, RoughviscError, TooLargeError
 from roughvisc.experiment.base import Problem
-from roughvisc.labels import annotate, warnings_of
+from roughvisc.labels import label, warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
@@ -28,8 +28,7 @@ from roughvisc.study.storage.files import existing_part, is_writable, partial_fi
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.parameters import labels_of_case
 from roughvisc.study.storage.store import DamagedError, open_result, result_path, set_aside, write_result
-from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, NOT_CONVERGED, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,10 +99,10 @@ def compute(
         dataset = solve(problem, case.experiment(), keeper, progress=progress, threads=threads)
     if "speed" in dataset:
         reduced = case.settings.material.shift * dataset["speed"].values
-        dataset = annotate(dataset.assign(reduced_speed=("speed", reduced)))
+        dataset = label(dataset.assign(reduced_speed=("speed", reduced)))
     scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
     transforms = transform_library() if keeper is None else keeper.latest.transforms
-    provenance = _provenance(case, axis_of(dataset), dataset.attrs.pop("history", ""), transforms)
+    provenance = _provenance(case, dataset.attrs.pop("history", ""), transforms)
     dataset.attrs = provenance | dataset.attrs | scan
     return dataset.assign_coords(labels_of_case(json.loads(case.to_json())))
 
@@ -121,7 +120,7 @@ def _named(case: Case) -> Iterator[None]:
         raise ConvergenceError(f"{case.origin}: {error}") from error
 
 
-def _provenance(case: Case, rows: str, before: str, transforms: str) -> dict[str, str | int]:
+def _provenance(case: Case, before: str, transforms: str) -> dict[str, str | int]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     named = f"run of {case.origin.name}" if case.origin else "run of a case"
@@ -134,7 +133,7 @@ def _provenance(case: Case, rows: str, before: str, transforms: str) -> dict[str
         "transforms": transforms,
         "history": "\n".join(filter(None, [before, f"{now} {program()}: {named}"])),
         "references": REFERENCES,
-        "comment": f"{AXES[rows].model} Attribute 'case' states the whole computation (JSON, SI units); "
+        "comment": "Attribute 'case' states the whole computation (JSON, SI units); "
         "'stated_error' how accurate it is; "
         "'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
         "case": case.to_json(),
@@ -313,13 +312,9 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     if not bad.size:
         return ""
     # another program may have left the estimates out
-    left = (
-        np.asarray(histories[AXES[rows].residual], dtype=float)[bad]
-        if AXES[rows].residual in histories
-        else np.zeros(0)
-    )
+    left = np.asarray(histories["residual"], dtype=float)[bad] if "residual" in histories else np.zeros(0)
     known = left[np.isfinite(left)]
     by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
     axis = AXES[rows]
     first = axis.place(float(histories[rows][bad[0]]))
-    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try {axis.advice}"
+    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try a looser tolerance"

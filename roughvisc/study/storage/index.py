@@ -23,21 +23,15 @@ from roughvisc.study.statement.identity import program_version
 from roughvisc.study.storage.files import require_file, require_folder, warn_once
 from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
 from roughvisc.study.storage.store import is_json_table, open_result, result_files, result_path
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import ROW, STEP, VARIABLES, axis_of
 
 log = logging.getLogger("roughvisc")
 
 INDEX = ".index.json.gz"
+#: Names of histories over the rows, and of the coordinates of the rows.
+_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in ((ROW,), (STEP,)))
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
-
-
-def _names_of_histories() -> tuple[str, ...]:
-    """Return the names of histories over the rows, and of the coordinate of the rows."""
-    found = (
-        name for axis in AXES.values() for name, variable in axis.variables.items() if variable.dims == (axis.name,)
-    )
-    return tuple(dict.fromkeys(found))
 
 
 @dataclass(frozen=True)
@@ -117,7 +111,7 @@ def read_entry(path: Path) -> Entry:
     stamp = _stamp(path)
     with open_result(path) as result:
         attributes = {name: one.item() if isinstance(one, np.generic) else one for name, one in result.attrs.items()}
-        histories = {name: result[name].values for name in _names_of_histories() if name in result.variables}
+        histories = {name: result[name].values for name in _HISTORIES if name in result.variables}
         fields = {str(name): one.dtype.str for name, one in result.variables.items() if one.dims[-2:] == ("x", "y")}
         grid = [np.asarray(result[name].values, float) for name in ("x", "y") if name in result.variables]
     along = axis_of(histories)

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.labels import annotate
+from roughvisc.labels import label
 from roughvisc.study.statement.case import Case
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.files import warn_once
@@ -21,8 +21,7 @@ from roughvisc.study.storage.parameters import CASE_KEY, case_numbers, identifie
 from roughvisc.study.storage.store import no_results, read_variable
 from roughvisc.study.storage.sweep_cases import SweepCase, read_sweep, sweep_cases
 from roughvisc.units import unit_for
-from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import AXES, ROW, ROWS
+from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
 #: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
 _BLOCK = 16 << 20
@@ -113,11 +112,11 @@ def _listed(folder: Path, index: Index, cases: Any) -> list[SweepCase]:
 def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
     """Results one after another over ``case``."""
     first = entries[0]
-    along, known = first.along, AXES[first.along].variables
+    along = first.along
     places = [entry.histories[along] for entry in entries]
     common = all(np.array_equal(one, places[0]) for one in places)
     variables: dict[str, Any] = {
-        name: (("case", *known[name].dims), _side_by_side([entry.histories[name] for entry in entries]))
+        name: (("case", *VARIABLES[name].over(along)), _side_by_side([entry.histories[name] for entry in entries]))
         for name in first.histories
         if name != along and all(name in entry.histories for entry in entries)
     }
@@ -131,20 +130,22 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
             "fields; open each with open_result for its fields",
         )
     for name in first.fields if one_grid else ():
-        if name in known and all(name in entry.fields for entry in entries):
-            dims = known[name].dims
+        if name in VARIABLES and all(name in entry.fields for entry in entries):
+            dims = VARIABLES[name].over(along)
             if dims[0] == along or not one_surface:
                 variables[name] = (("case", *dims), _lazy(folder, entries, name))
             else:
                 variables[name] = (dims, _lazy(folder, entries[:1], name)[0])
     coords = ({along: places[0]} if common else {}) | ({"x": first.x, "y": first.y} if one_grid else {})
-    dataset = annotate(xr.Dataset(variables, coords=coords, attrs=_attributes(entries)))
+    dataset = label(xr.Dataset(variables, coords=coords, attrs=_attributes(entries)))
     if common:
         return dataset
     dataset = dataset.rename_dims({along: ROW})
     counts = np.array([len(one) for one in places])
     rows = ("case", counts, {"long_name": f"number of {AXES[along].rows}", "units": "1"})
-    return dataset.assign_coords({along: (("case", ROW), _side_by_side(places), known[along].attributes()), ROWS: rows})
+    return dataset.assign_coords(
+        {along: (("case", ROW), _side_by_side(places), VARIABLES[along].attributes()), ROWS: rows}
+    )
 
 
 def _grid(entry: Entry) -> str:
@@ -220,7 +221,7 @@ def _lazy(folder: Path, entries: Sequence[Entry], name: str) -> Any:
     first = entries[0]
     grid = (len(first.x), len(first.y))
     dtype = np.result_type(*(entry.fields[name] for entry in entries))
-    in_rows = AXES[first.along].variables[name].dims[0] == first.along
+    in_rows = VARIABLES[name].over(first.along)[0] == first.along
     rows = np.array([entry.rows for entry in entries])
     if in_rows and np.ptp(rows):
         dtype = np.result_type(dtype, np.float16)

@@ -27,13 +27,12 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
 from roughvisc.errors import InputError
-from roughvisc.labels import annotate
+from roughvisc.labels import label
 from roughvisc.steps import STEPS, steps_of, with_steps
 from roughvisc.study.storage.files import atomic_write, require_file
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import shown
-from roughvisc.variables import RESULT_FORMAT
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 log = logging.getLogger("roughvisc")
 
@@ -60,6 +59,8 @@ _MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
 _LONGEST_CHUNK = 1024
 #: End of the name of the borders of cells in a file; a Dataset has none, its cells are all alike.
 BOUNDS = "_bounds"
+#: Variables without which a value has no place; none of them is missing.
+_COORDINATES = (*AXES, *(f"{axis}{end}" for axis in ("x", "y") for end in ("", BOUNDS)))
 
 
 class DamagedError(InputError):
@@ -155,14 +156,6 @@ def is_field(variable: xr.Variable) -> bool:
     return variable.ndim == 3 and variable.dims[0] in AXES and variable.dims[1:] == ("x", "y")
 
 
-def may_be_missing(name: str) -> bool:
-    """Whether a value of a variable may be missing, and NaN says so; any other has no fill value.
-
-    Of steps between kept times the mean gap is not known over a grid that has grown since.
-    """
-    return any(name in axis.variables and axis.variables[name].may_be_missing for axis in AXES.values())
-
-
 def bits_kept(variable: xr.Variable, precision: float | None) -> int | None:
     """Bits of a double's fraction to keep of a field, so that rounding changes it by less than that part; None: all."""
     if precision is None or not is_field(variable):
@@ -179,11 +172,11 @@ def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
-    """What netCDF4 is told of a variable."""
+    """Return the arguments of netCDF4 for a variable; coordinates have no fill value."""
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.ndim:
         encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
-    if variable.dtype.kind == "f" and may_be_missing(name):
+    if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
         encoding["fill_value"] = variable.dtype.type(np.nan)
     bits = bits_kept(variable, precision)
     if bits is not None:
@@ -279,11 +272,11 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Notes
     -----
     zlib level 1, the one filter that every reader has, where it saves much, by a sample.
-    ``_FillValue`` is declared only where a value may be missing. netCDF4 is used as it is: on a Dask worker xarray
+    netCDF4 is used as it is: on a Dask worker xarray
     would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
     """
     steps = steps_of(dataset)
-    parts = {"": _with_bounds(annotate(dataset).assign_attrs(_NEEDED_ATTRIBUTES))}
+    parts = {"": _with_bounds(label(dataset).assign_attrs(_NEEDED_ATTRIBUTES))}
     parts |= {} if steps is None else {STEPS: steps}
     parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
     with atomic_write(path) as temporary:
@@ -520,9 +513,8 @@ def _foreign(dataset: xr.Dataset) -> str:
     rows = axis_of(dataset)
     if absent := [name for name in AXES[rows].needed if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"
-    known = AXES[rows].variables
     for name, variable in dataset.variables.items():
-        if name in known and variable.dtype.kind not in ("U" if known[str(name)].dtype == "str" else "fiub"):
+        if name in VARIABLES and variable.dtype.kind not in ("U" if VARIABLES[str(name)].dtype == "str" else "fiub"):
             return f"holds {name} as {variable.dtype}"
     if odd := [name for name in AXES[rows].needed if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"

@@ -23,8 +23,7 @@ from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, read_sweep
 from roughvisc.units import number_and_unit, quantity
-from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.axes import AXES
+from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, variables_in_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -137,14 +136,13 @@ def realisations_table(index: Index, cases: Sequence[SweepCase]) -> pd.DataFrame
         entries = [index.entries[cases[place].key] for place in places]
         drawn = [cases[place].case["varied"][REALISATION] for place in places]
         axis = AXES[entries[0].along]
-        for name in axis.in_table("last"):
-            variable = axis.variables[name]
+        for name in variables_in_table("last"):
+            variable = VARIABLES[name]
             values = np.array(
                 [_summary_row(one, name) if len(one.histories.get(name, ())) else np.nan for one in entries]
             )
             known = values[np.isfinite(values)]
-            of_error = name.endswith(("_lower", "_upper")) or name.startswith("grid_error_")
-            if name == axis.name or of_error or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
+            if name in AXES or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
                 continue
             found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
             told = {str(key): one.item() for key, one in found.data_vars.items()}
@@ -165,11 +163,11 @@ def _table(folder: Path, index: Index, cases: Sequence[SweepCase], held: Mapping
     entries = [index.entries.get(key) for key in keys]
     failures = {key: stated_failure(folder, key) for key, entry in zip(keys, entries, strict=True) if entry is None}
     columns: dict[str, Any] = {"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)}
+    headings = {name: heading(name, one.units) for name, one in VARIABLES.items()}
     for rows in dict.fromkeys(entry.along for entry in entries if entry):
         mine = [entry if entry and entry.along == rows else None for entry in entries]
-        headings = {name: heading(name, one.units) for name, one in AXES[rows].variables.items()}
         for which, before, take in (("last", "", _summary_row), ("largest", "largest ", _largest)):
-            for name in AXES[rows].in_table(which):
+            for name in variables_in_table(which):
                 column = columns.setdefault(f"{before}{headings[name]}", [np.nan] * len(keys))
                 for place, entry in enumerate(mine):
                     if entry and len(entry.histories.get(name, ())):

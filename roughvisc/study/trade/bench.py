@@ -14,7 +14,6 @@ from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.quantities import Observable, is_sliding, observables_of
 from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import Setting, changed, has_steps, shape_of
-from roughvisc.variables.axes import AXES
 
 Report = Callable[[str, float, float], None]
 #: Quantities that are compared, in the order of the results, beside the friction coefficient of a slide.
@@ -28,9 +27,7 @@ _LITTLE = 0.05
 
 def quantities_of(case: Case) -> tuple[str, ...]:
     """Return the quantities that can be compared in the results of a case."""
-    experiment = case.experiment()
-    names = (*USUAL, "friction_coefficient") if is_sliding(experiment) else USUAL
-    return tuple(name for name in names if name in AXES[experiment.axis].variables)
+    return (*USUAL, "friction_coefficient") if is_sliding(case.experiment()) else USUAL
 
 
 def further_quantities_of(case: Case) -> tuple[str, ...]:

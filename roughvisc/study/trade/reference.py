@@ -15,7 +15,7 @@ from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.study.trade.bench import NotRun, TimedRuns
 from roughvisc.study.trade.ladder import Setting
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, axis_of
 
 Array = NDArray[np.float64]
 #: The reference's tolerance is the sharpest measured one over this.

@@ -15,7 +15,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.scene import kept_times, snap_to_cells
-from roughvisc.labels import annotate
+from roughvisc.labels import label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.progress import reporting
 from roughvisc.study.quantities import QUANTITIES, Observable
@@ -25,8 +25,40 @@ from roughvisc.study.trade.ladder import Setting, changed_keys, is_data, ladder,
 from roughvisc.study.trade.reference import ReferenceRun, all_grids
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
-from roughvisc.variables import RESULT_FORMAT
-from roughvisc.variables.axes import AXES
+from roughvisc.variables import AXES, RESULT_FORMAT, Variable
+
+_RUNS = ("setting",)
+_OFF = "largest possible error, by Richardson extrapolation"
+#: Variables of a trade.
+VARIABLES = {
+    "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
+    "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
+    "tolerance": Variable(_RUNS, "1", "tolerance"),
+    "coarsening": Variable(_RUNS, "1", "length of a cell over that of the study's"),
+    "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
+    "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
+    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result"),
+    "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
+    "steps": Variable(_RUNS, "1", "accepted time steps"),
+    "note": Variable(_RUNS, "", "why the setting was not measured; empty if it was", dtype="str"),
+    "error": Variable(
+        ("setting", "quantity"),
+        "1",
+        "relative error against the reference",
+        "the worst over the kept times; pressure: its absolute difference summed (L1) over the largest force; any "
+        "other: over its largest value",
+    ),
+    "coarsening_error": Variable(
+        ("setting", "quantity"),
+        "1",
+        "part of the error that the coarser grid alone makes",
+        "of a run as sharp in time as the reference; on a scan it includes what the surface has lost",
+    ),
+    "reference_time_uncertainty": Variable(("quantity",), "1", "uncertainty of the reference due to time steps", _OFF),
+    "reference_grid_uncertainty": Variable(
+        ("quantity",), "1", "uncertainty of the reference due to the grid", f"{_OFF}; of a scan: what its spacing hides"
+    ),
+}
 
 #: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
 _FEW = 9
@@ -111,9 +143,7 @@ def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], deri
     keep, settings, experiment = case.settings.keep, case.solving(), case.experiment()
     changes: dict[str, Any] = {"solve.grid_error": False}
     fields = [*keep.fields, *(field for one in derived for field in one.fields)]
-    if "pressure" in AXES[experiment.axis].variables:
-        fields.append("pressure")
-    changes["keep.fields"] = [*dict.fromkeys(fields)]
+    changes["keep.fields"] = [*dict.fromkeys([*fields, "pressure"])]
     shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
     shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]
     cells = [(sides[0] * shape[0] / nx, sides[1] * shape[1] / ny) for nx, ny in shapes]
@@ -173,7 +203,7 @@ def _labelled(bench: TimedRuns, rows: Sequence[dict[str, Any]], finest: Referenc
         unsure = [getattr(finest, part)[name] for name in quantities]
         columns[f"reference_{part}_uncertainty"] = ("quantity", np.array(unsure))
     coords = {name: columns.pop(name) for name in _COORDS}
-    dataset = annotate(xr.Dataset(columns, coords | {"quantity": list(quantities)}))
+    dataset = label(xr.Dataset(columns, coords | {"quantity": list(quantities)}), VARIABLES)
     dataset.attrs = {
         "Conventions": "CF-1.11",
         "result_format": RESULT_FORMAT,

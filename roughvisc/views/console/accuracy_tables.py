@@ -12,7 +12,7 @@ from roughvisc.study.audit.audit import Audit
 from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, NOT_KNOWN
 from roughvisc.study.trade.recommend import WORDS, cheapest, choice, duration, pareto_front, percent
 from roughvisc.units import unit_for
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, axis_of
 from roughvisc.views.console.tables import titled
 
 #: The words tell the verdicts apart; weight and colour help to find them.

@@ -10,9 +10,7 @@ import xarray as xr
 from rich.console import Group
 
 from roughvisc.observables.leakage import closing_times
-from roughvisc.variables.axes import AXES, Axis, axis_of
-from roughvisc.variables.grid_errors import GRID_ERROR
-from roughvisc.variables.spots import CONDUCTANCES
+from roughvisc.variables import AXES, CONDUCTANCES, GRID_ERROR, VARIABLES, Axis, axis_of, variables_in_table
 from roughvisc.views.console.tables import accuracy_rows, number, readable, two_columns
 
 #: Part of the friction force from which on a summary shows the force across the motion.
@@ -21,11 +19,6 @@ _ACROSS = 0.05
 _BESIDE = {
     "contact_fraction",
     "friction_force_across",
-    *GRID_ERROR.values(),
-}
-_COSTS = {
-    "convolutions": "convolutions",
-    "iterations": "solver iterations",
 }
 
 
@@ -34,21 +27,20 @@ def result_table(dataset: xr.Dataset) -> Group:
     axis = AXES[axis_of(dataset)]
     row = dataset.isel({axis.name: axis.telling_row(dataset)})
     where = f"at {axis.place(float(row[axis.name]), 3)}" if axis.telling else "at the end"
-    grid_errors = [*GRID_ERROR.values(), *([] if "grid_error_pressure" in dataset else ["grid_error"])]
-    shown = [name for name in axis.in_table("last") if name in row and name != axis.name and name not in _BESIDE]
+    shown = [name for name in variables_in_table("last") if name in row and name != axis.name and name not in _BESIDE]
     rows = [
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
         (axis.rows.capitalize(), _extent(dataset, axis)),
-        *((f"{axis.variables[name].label} {where}", _value(dataset, row, name, axis)) for name in shown),
+        *((f"{VARIABLES[name].label} {where}", _value(dataset, row, name, axis)) for name in shown),
         *_across(row, where),
         *accuracy_rows([dataset], dataset.attrs.get("tolerance")),
         *(
-            (f"Accuracy: worst {axis.variables[name].short}", number(dataset[name]))
-            for name in grid_errors
+            (f"Accuracy: worst {VARIABLES[name].long_name}", number(dataset[name]))
+            for name in dict.fromkeys(GRID_ERROR.values())
             if name in dataset and (dataset[name] != 0).any()
         ),
         # a file that another program has written may not state its cost
-        *((f"Cost: {label}", f"{int(dataset[name].sum())}") for name, label in _COSTS.items() if name in dataset),
+        *([("Cost: convolutions", f"{int(dataset['convolutions'].sum())}")] if "convolutions" in dataset else []),
         *([("Cost: wall time", readable(float(dataset["wall_time"].max()), "s"))] if "wall_time" in dataset else []),
     ]
     return two_columns(rows, dataset.attrs.get("title"))
@@ -64,7 +56,7 @@ def _extent(dataset: xr.Dataset, axis: Axis) -> str:
 
 def _value(dataset: xr.Dataset, row: xr.Dataset, name: str, axis: Axis) -> str:
     """Value of a variable in the row that stands for the result, and what belongs to it."""
-    value, variable = float(row[name]), axis.variables[name]
+    value, variable = float(row[name]), VARIABLES[name]
     text = "infinite: full contact" if math.isinf(value) else readable(value, variable.units)
     if name == axis.telling:
         ordered = dataset[name].sortby(axis.name)

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 #: What is stated of accuracy, and its parts, each at its worst.
 _ERRORS = {
     "stated_error": "worst stated error",
-    "pressure_residual": "worst residual of pressure",
-    "friction_residual": "worst residual of friction",
     "time_error": "worst error of time steps",
     "residual": "contact solver (estimate)",
 }

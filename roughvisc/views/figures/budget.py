@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.units import unit_for
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.rows import RowAxis
 

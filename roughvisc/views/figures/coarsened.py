@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.topography.grid import axis_step
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import axis_of
 
 #: Cells along the longer side up to which a map is drawn as it is.
 MOST_DRAWN = 1024

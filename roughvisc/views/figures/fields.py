@@ -25,8 +25,7 @@ from roughvisc.observables import asked, leakage
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Unit, in_si, unit_for
-from roughvisc.variables import FIELDS, VARIABLES
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import note, present, touching
 from roughvisc.views.figures.rows import RowAxis, frames_at, require, rows_of, telling_frames
@@ -198,7 +197,7 @@ def _chosen_frames(dataset: xr.Dataset, times) -> list[int]:
         return sorted(chosen, key=lambda row: float(rows[row]))
     if times is None:
         return telling_frames(dataset, 4)
-    asked = in_si(times, AXES[over].variables[over].units, "times")
+    asked = in_si(times, VARIABLES[over].units, "times")
     return frames_at(rows, asked, _MOST_MAPS, "map", ", or use animate for all of them")
 
 

@@ -13,7 +13,6 @@ from roughvisc.errors import InputError
 from roughvisc.observables import history
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.sliding import SLIDING
 from roughvisc.views.figures import style
 from roughvisc.views.figures.rows import require
 
@@ -135,7 +134,7 @@ def friction(dataset: xr.Dataset) -> Figure:
         figure.set_figheight(3.0 + 0.18 * len(known))
         style.legend_above(figure, {_TOLD[name]: told[name] for name in known})
     ax.set_xscale("log")
-    ax.set_xlabel(across.label(SLIDING["speed"].label))
+    ax.set_xlabel(across.label(VARIABLES["speed"].label))
     ax.grid(color="0.9", lw=0.5)
     return figure
 
@@ -149,17 +148,17 @@ def _draw(
     values = ordered[solved].values
     told: dict[str, Line2D | Patch] = {}
     most = [values]
-    axes.plot(speed, values, "o-", ms=3, color=colour, label=SLIDING[solved].label)
+    axes.plot(speed, values, "o-", ms=3, color=colour, label=VARIABLES[solved].label)
     if grid in ordered and np.isfinite(ordered[grid]).any():
         error = ordered[grid].values * values
         axes.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
         told["grid"] = Patch(color="0.3", alpha=0.25, lw=0)
         most.append((values + error)[np.isfinite(error)])
     if theory in ordered:
-        axes.plot(speed, ordered[theory].values, ":", color=colour, label=SLIDING[theory].label)
+        axes.plot(speed, ordered[theory].values, ":", color=colour, label=VARIABLES[theory].label)
         told["theory"] = Line2D([], [], color="0.3", ls=":")
         most.append(ordered[theory].values)
-    axes.set_ylabel(SLIDING[solved].label, color=colour)
+    axes.set_ylabel(VARIABLES[solved].label, color=colour)
     axes.tick_params(axis="y", colors=colour)
     axes.set_ylim(0, 1.08 * float(np.nanmax(np.concatenate(most), initial=0.0)) or 1.0)
     return told

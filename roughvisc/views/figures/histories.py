@@ -20,8 +20,7 @@ from roughvisc.observables.area_theories import asperity_fraction, nominal_area_
 from roughvisc.observables.derived import material_of
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities, unit_for
-from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import AXES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.rows import RowAxis, require, rows_of, spans_decades
 

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike
 from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units, expect_history
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables import OTHER_DIMS
-from roughvisc.variables.axes import AXES, ROW, axis_of
+from roughvisc.variables import AXES, OTHER_DIMS, ROW, VARIABLES, axis_of
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:
@@ -81,7 +80,7 @@ class RowAxis:
         """Axis for increasing places on the axis of a name; by default that of the coordinate given, or times [s]."""
         name = name or getattr(rows, "name", "time")
         name = name if name in AXES else "time"
-        known = AXES[name].variables[name]
+        known = VARIABLES[name]
         places = np.sort(np.asarray(rows, dtype=float).ravel())
         positive = places[places > 0]
         label = "Time" if name == "time" else known.label

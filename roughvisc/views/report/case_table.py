@@ -10,8 +10,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.units import unit_for
-from roughvisc.variables import NOT_CONVERGED, VARIABLES
-from roughvisc.variables.axes import AXES, Axis, axis_of
+from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, Axis, axis_of
 from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
 
@@ -35,7 +34,7 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "count": dataset.sizes[axis.name],
         "rows": axis.rows.capitalize(),
         "telling": _telling(last, axis) if axis.telling else "",
-        "telling_label": axis.variables[axis.telling].label.lower() if axis.telling else "",
+        "telling_label": VARIABLES[axis.telling].label.lower() if axis.telling else "",
         "force": _largest(dataset, "force"),
         "nominal_pressure": _largest(dataset, "nominal_pressure"),
         "approach": _largest(last, "approach"),
@@ -43,7 +42,7 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
         "fraction": f"{100 * float(last['contact_fraction']):.3g} %" if "contact_fraction" in last else "",
         "stated_error": _worst(dataset, "stated_error"),
         "time_error": _worst(dataset, "time_error"),
-        "residual": _worst(dataset, axis.residual),
+        "residual": _worst(dataset, "residual"),
         "missed": _missed(dataset),
         "status": f"{bad} of {len(status)} {axis.rows} not converged" if bad else "converged" if len(status) else "",
         "bad": bool(bad),
@@ -56,7 +55,7 @@ def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:
 def _telling(row: xr.Dataset, axis: Axis) -> str:
     """Value by which a row stands for the result, and where that is."""
     value = float(row[axis.telling])
-    text = unit_for([value], axis.variables[axis.telling].units).text(value)
+    text = unit_for([value], VARIABLES[axis.telling].units).text(value)
     return f"{text} at {axis.place(float(row[axis.name]), 3).partition(' = ')[2]}"
 
 

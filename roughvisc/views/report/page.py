@@ -29,7 +29,7 @@ from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
 from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.figures.coarsened import drawn
 from roughvisc.views.figures.fields import draw_map, label_plane, measured_part, plane_unit

@@ -18,9 +18,7 @@ from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.study.statement.variation import DRAWN, REALISATION
 from roughvisc.study.storage.parameters import combinations, identifier
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables import VARIABLES
-from roughvisc.variables.axes import AXES, ROW, ROWS, axis_of
-from roughvisc.variables.spots import CONDUCTANCES
+from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 from roughvisc.views.figures import style
 from roughvisc.views.sweep_figures.case_text import ENDLESS, names_of, readable_setting, setting_unit
 from roughvisc.views.sweep_figures.ensembles import Band, pooled

@@ -13,8 +13,7 @@ from matplotlib.lines import Line2D
 
 from roughvisc.errors import InputError
 from roughvisc.units import Unit, unit_for
-from roughvisc.variables.axes import AXES
-from roughvisc.variables.sliding import SLIDING
+from roughvisc.variables import AXES, VARIABLES
 from roughvisc.views.figures import style
 from roughvisc.views.figures.histories import steps_of
 from roughvisc.views.figures.rows import RowAxis, rows_of
@@ -214,8 +213,8 @@ def friction_of_cases(results: Any, *, reduced: bool = False) -> Figure:
     for ax, name in zip(panels, _FRICTION, strict=True):
         ax.set_xscale("log")
         ax.set_ylim(bottom=0)
-        ax.set_xlabel(across.label("Reduced speed $a_T V$" if reduced else SLIDING["speed"].label))
-        ax.set_ylabel(SLIDING[name].label)
+        ax.set_xlabel(across.label("Reduced speed $a_T V$" if reduced else VARIABLES["speed"].label))
+        ax.set_ylabel(VARIABLES[name].label)
         ax.grid(color="0.9", lw=0.5)
     style.letter_panels(list(panels))
     title = colouring.parameter.name if named else ""

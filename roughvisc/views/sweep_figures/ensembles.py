@@ -14,8 +14,7 @@ from matplotlib.patches import Patch
 
 from roughvisc.study.ensembles import statistics
 from roughvisc.study.statement.variation import ITSELF
-from roughvisc.variables import NOT_CONVERGED
-from roughvisc.variables.axes import axis_of
+from roughvisc.variables import NOT_CONVERGED, axis_of
 
 #: How the measured surface itself is drawn.
 ITSELF_STYLE = {"ls": (0, (4, 1.5)), "lw": 1.1}

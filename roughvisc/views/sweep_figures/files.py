@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result
-from roughvisc.variables.axes import AXES
-from roughvisc.variables.spots import CONDUCTANCES
+from roughvisc.variables import AXES, CONDUCTANCES
 from roughvisc.views.figures.files import write_figure
 from roughvisc.views.sweep_figures.case_text import case_words, file_stems
 from roughvisc.views.sweep_figures.cases import Cases, cases_of

@@ -75,7 +75,6 @@ def test_run__gives_what_the_function_gives(case, tmp_path):
     assert ds.attrs["case_key"] == one.key
     assert json.loads(ds.attrs["case"])["friction"]["speeds"] == [2e-3, 2e-2, 0.2, 2.0]
     assert ds.attrs["title"] == "Sliding"
-    assert "without shear or adhesion" in ds.attrs["comment"]
     stamp = (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns
     rv.run(one, tmp_path / "out", progress=False)
     assert (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns == stamp, "finished, and not computed again"

@@ -11,7 +11,6 @@ from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.experiments import FrictionSection
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES
-from roughvisc.variables.sliding import SLIDING
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 SWEEP = """
@@ -84,7 +83,7 @@ def test_open_results__names_each_parameter_once(folder):
 
 def test_labels__are_apart_from_all_variables():
     tables = {f"{name}_" for name in Study.model_fields if name != "friction"}
-    names = {*VARIABLES, *SLIDING}
+    names = {*VARIABLES}
     assert not [name for name in names if any(name.startswith(table) for table in tables)]
     assert not names & {f"friction_{key}" for key in FrictionSection.model_fields}
     assert not {*VARIABLES} & {*Study.model_fields}

@@ -13,7 +13,7 @@ from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade import recommend
 from roughvisc.study.trade.files import open_trade
 from roughvisc.study.trade.ladder import Setting, changed, ladder, shape_of
-from roughvisc.variables import VARIABLES
+from roughvisc.study.trade.trade import VARIABLES
 
 WAVE = """
 [surface]

@@ -6,7 +6,7 @@ import xarray as xr
 from support import lines
 
 import roughvisc as rv
-from roughvisc.labels import annotate
+from roughvisc.labels import label
 from roughvisc.views import plot
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
@@ -21,19 +21,19 @@ def curve():
         "persson_contact_fraction": [0.01, 0.18, 0.09],
         "status": [0, 0, 0],
     }
-    return annotate(xr.Dataset({n: ("speed", v) for n, v in values.items()}, coords={"speed": SPEEDS}))
+    return label(xr.Dataset({n: ("speed", v) for n, v in values.items()}, coords={"speed": SPEEDS}))
 
 
 def test_friction__draws_both_in_the_order_of_the_speed():
     left, right = rv.plot.friction(curve()).axes
-    for ax, label, expected in (
+    for ax, name, expected in (
         (left, "Friction coefficient", [0.01, 0.2, 0.3]),
         (right, "Contact fraction", [0.2, 0.1, 0.02]),
     ):
-        speed, drawn = lines(ax)[label].get_data()
+        speed, drawn = lines(ax)[name].get_data()
         np.testing.assert_allclose(speed, [0.02, 0.2, 2.0])
         assert drawn.tolist() == expected
-        assert ax.get_ylabel() == label
+        assert ax.get_ylabel() == name
         assert ax.get_ylim()[0] == 0
         assert ax.get_ylim()[1] > max(expected)
     assert left.get_xlabel() == "Speed [mm/s]"
@@ -63,7 +63,7 @@ def test_friction__refuses_what_is_no_friction_result(other):
 
 def test_friction__draws_the_error_of_the_grid_as_a_band():
     errors = {"grid_error_friction": [0.1, 0.5, np.nan], "grid_error_area": [0.1, 0.1, 0.1]}
-    left, _ = rv.plot.friction(annotate(curve().assign({name: ("speed", one) for name, one in errors.items()}))).axes
+    left, _ = rv.plot.friction(label(curve().assign({name: ("speed", one) for name, one in errors.items()}))).axes
     (band,) = left.collections
     points = np.concatenate([path.vertices for path in band.get_paths()])
     assert points[:, 1].max() == pytest.approx(0.3 * 1.1)
@@ -78,7 +78,7 @@ def sliding(direction="x"):
     axes = {"x": (np.arange(8) + 0.5) * 1e-4, "y": (np.arange(4) + 0.5) * 1e-4}
     found = curve().assign(friction_coefficient=("speed", [0.1, 0.01, 0.2]))
     found = found.assign(pressure=(("speed", "x", "y"), fields), height=(("x", "y"), np.zeros((8, 4))))
-    found = annotate(found.assign_coords(axes))
+    found = label(found.assign_coords(axes))
     return found.assign_attrs(direction=direction)
 
 
@@ -118,7 +118,7 @@ def several(shift=(1.0, 100.0)):
         reduced_speed=(("case", "speed"), np.outer(shift, SPEEDS)),
         contact_area=2.0 * xr.DataArray(stacked["contact_fraction"][1], dims=("case", "speed")),
     )
-    found = annotate(found)
+    found = label(found)
     kelvin = {"long_name": "material.temperature", "units": "K"}
     return found.assign_coords(material_temperature=("case", np.array([293.0, 313.0]), kelvin))
 
@@ -174,7 +174,7 @@ def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
     series = {"friction_coefficient": np.array(FRICTION), "sliding_distance": 1e-6 * np.array(DISTANCE)}
     series |= {"force": np.ones(9), "approach": np.ones(9)}
     coords = {"time": np.arange(9.0)}
-    slid = annotate(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
+    slid = label(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
     (ax,) = rv.plot.friction_against_distance(slid).axes
     drawn = [line.get_xydata().tolist() for line in ax.lines if len(line.get_xdata()) and line.get_color() != "0.3"]
     assert drawn[0] == [[0, 0.0], [10, 0.2], [20, 0.3], [30, 0.3]]

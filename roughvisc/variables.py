@@ -1,0 +1,542 @@
+"""All variables that a result may hold or that is derived from one, each declared once, and the axes of their rows.
+
+:func:`roughvisc.labels.label` writes units and names on a Dataset. The rows of a result lie over ``time`` or over
+``speed``: a variable over rows is declared once for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from roughvisc.units import unit_for
+
+#: Number of the format of result files, stated in their attribute ``result_format``.
+RESULT_FORMAT = 1
+
+#: How an accepted step ended; the values of ``status``, in order.
+STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
+NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
+#: Whether fluid flows at a time, and whether its rate is known; the values of ``leak_status``, in order.
+LEAK_MEANINGS = ("flows", "closed", "not_certified")
+
+#: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
+ROW, ROWS = "row", "rows"
+#: Dimension of all accepted steps.
+STEP = "step"
+#: Dimensions that a result of one case may have beside the dimension of its rows.
+OTHER_DIMS = ("x", "y", "bnds")
+
+_GRID = ("x", "y")
+_FRAME = (ROW, "x", "y")
+_SERIES = (ROW,)
+_STEPS = (STEP,)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Declaration of a variable.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        ``row`` stands for the axis of the rows. ``step`` does too, of a history that is also known at all accepted
+        steps between the rows.
+    units, long_name, comment, dtype : str
+        As in the file of a result.
+    meanings : tuple of str
+        Meanings of the values 0, 1, ... of a flag.
+    in_table : {"", "last", "largest"}
+        Column in the table of a sweep: the value in the last row, or the largest one.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    comment: str = ""
+    dtype: str = "float64"
+    meanings: tuple[str, ...] = ()
+    in_table: Literal["", "last", "largest"] = ""
+
+    @property
+    def label(self) -> str:
+        """Name on an axis of a figure or in a table."""
+        return self.long_name[:1].upper() + self.long_name[1:]
+
+    def over(self, axis: str) -> tuple[str, ...]:
+        """Return the dimensions in a result whose rows lie over an axis."""
+        return tuple(axis if dim in (ROW, STEP) else dim for dim in self.dims)
+
+    def attributes(self) -> dict[str, Any]:
+        """Return the CF attributes."""
+        names = ("long_name", "units", "comment")
+        found: dict[str, Any] = {name: value for name in names if (value := getattr(self, name))}
+        if self.meanings:
+            found["flag_values"] = np.arange(len(self.meanings), dtype=self.dtype)
+            found["flag_meanings"] = " ".join(self.meanings)
+        return found
+
+
+#: Comments of several variables.
+_COARSER = (
+    "bound in practice, over the largest value of all rows, at a speed over the value there: from the same on cells "
+    "twice and four times as long (grid convergence index); of a scan it includes the roughness that coarser cells lose"
+)
+_SPOTS = (
+    "of the contact spots; constriction on both sides, each body a half-space, without the gap and without films; "
+    "infinite in full contact; with periodic boundaries of one period, without the bulk"
+)
+_FLUX = "of the fluid, over the height of the gap: mean of the two faces of the cell; zero in contact and without flow"
+_GRID_AND_SOLVER = "of the grid and of the solver"
+_PERSSON = "by Persson's theory of the same waves"
+
+VARIABLES: dict[str, Variable] = {
+    # coordinates; no standard_name "time", which in CF is a date
+    "time": Variable(
+        _STEPS, "s", "time", "since the start of the program; at a jump the right-hand state is kept", in_table="last"
+    ),
+    "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding", in_table="last"),
+    "x": Variable(("x",), "m", "x", "of the cell centre"),
+    "y": Variable(("y",), "m", "y", "of the cell centre"),
+    "x_bounds": Variable(("x", "bnds"), "", "borders of the cells along x", "in files alone"),
+    "y_bounds": Variable(("y", "bnds"), "", "borders of the cells along y", "in files alone"),
+    "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
+    # surface
+    "height": Variable(
+        _GRID,
+        "m",
+        "height",
+        "of the rigid profile, peaks up; as conditioned; missing where absent; attribute `highest`: its highest point "
+        "[m], between cells or in one",
+    ),
+    "filled": Variable(
+        _GRID, "", "filled points", "missing heights that were filled in", dtype="int8", meanings=("measured", "filled")
+    ),
+    # fields
+    "pressure": Variable(
+        _FRAME,
+        "Pa",
+        "pressure",
+        "of the contact, mean over the cell; zero outside the contact and where the profile is absent",
+    ),
+    "gap": Variable(
+        _FRAME,
+        "m",
+        "gap",
+        "between the surfaces, at the cell centre; zero inside the contact; missing where the profile is absent",
+    ),
+    "displacement": Variable(
+        _FRAME,
+        "m",
+        "displacement",
+        "of the half-space's surface at the cell centre; positive into the half-space; its mean is zero unless space "
+        "is free",
+    ),
+    # histories
+    "force": Variable(
+        _STEPS,
+        "N",
+        "force",
+        "normal force; prescribed under load control, found under approach control",
+        in_table="last",
+    ),
+    "approach": Variable(
+        _STEPS,
+        "m",
+        "approach",
+        "of the rigid body from first touch; "
+        "free space: against the undeformed plane; periodic and mirror: against the mean plane of the half-space's "
+        "surface, which is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells "
+        "if any are absent; while the contact is open: the value at which it would just close; first touch is at the "
+        "highest cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while "
+        "mean_gap (periodic and mirror) does",
+        in_table="last",
+    ),
+    "nominal_pressure": Variable(
+        _SERIES,
+        "Pa",
+        "nominal pressure",
+        "force over the nominal area, the area of the surface as given, absent cells included",
+        in_table="last",
+    ),
+    "work": Variable(
+        _STEPS,
+        "J",
+        "work",
+        "of the force on the approach since the start; "
+        "over every accepted step, kept or not, as the work of the pressure on the displacement, stored and "
+        "dissipated, with the work of the friction force in a slide; a jump is quasi-static; with periodic boundaries "
+        "without the uniform displacement",
+    ),
+    "contact_area": Variable(
+        _STEPS,
+        "m^2",
+        "contact area",
+        "real, corrected for the grid: "
+        "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is between cells in "
+        "contact and present cells out of contact: where the material ends the count is exact",
+        in_table="last",
+    ),
+    "contact_area_counted": Variable(
+        _STEPS,
+        "m^2",
+        "contact area, counted",
+        "cells that carry pressure; larger than contact_area, since cells at the edge count as a whole",
+    ),
+    "contact_fraction": Variable(
+        _STEPS,
+        "1",
+        "contact fraction",
+        "contact_area over the area of the whole grid, absent cells included",
+        in_table="last",
+    ),
+    "mean_gap": Variable(
+        _STEPS,
+        "m",
+        "mean gap",
+        "over the present cells; with periodic boundaries and no cells absent: the separation of the mean planes of "
+        "both surfaces",
+        in_table="last",
+    ),
+    # sliding
+    "sliding_distance": Variable(
+        _STEPS,
+        "m",
+        "sliding distance",
+        "since the start, along the path, whatever its direction; in whole cells of the grid",
+        in_table="last",
+    ),
+    "reduced_speed": Variable(
+        _SERIES,
+        "m/s",
+        "reduced speed a_T V",
+        "speed times the shift factor of the material: curves of several temperatures fall on one over it",
+    ),
+    "friction_coefficient": Variable(
+        _STEPS,
+        "1",
+        "friction coefficient",
+        "friction_force over force: without shear at the interface; missing while the surfaces are apart",
+        in_table="last",
+    ),
+    "friction_force": Variable(
+        _STEPS,
+        "N",
+        "friction force",
+        "against the motion, of pressure on inclined faces alone; in a slide by the slope of the body's surface, in "
+        "steady sliding the power that the material dissipates over the speed; in a hold against the last slide, "
+        "before the first slide against the first",
+        in_table="last",
+    ),
+    "friction_force_across": Variable(
+        _STEPS,
+        "N",
+        "force across the motion",
+        "keeps the profile on its path; positive to the left of the motion, 90 degrees counter-clockwise from it with "
+        "x to the right and y upwards: towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force "
+        "is its component forwards; in a hold by the same slide as friction_force",
+        in_table="last",
+    ),
+    "friction_force_error": Variable(
+        _SERIES,
+        "N",
+        "stated error of the friction force",
+        "of steps of one cell, by a coarse solution in steps of two; the rest of the grid error is not included",
+    ),
+    # accuracy and cost
+    "stated_error": Variable(
+        _SERIES,
+        "1",
+        "numerical error",
+        "relative; the largest of pressure (L1), force and approach: sum of the errors of time steps, contact solver "
+        "and series, over the largest force and approach of the kept rows so far; in steady sliding the larger one of "
+        "pressure (L1) and friction, left by the iteration; comparable to the tolerance; without the grid error",
+        in_table="largest",
+    ),
+    "time_error": Variable(
+        _STEPS,
+        "1",
+        "error of the time steps",
+        "part of stated_error, from the difference to a coarse solution, which takes one step for every two; over the "
+        "largest values of the kept rows so far",
+        in_table="largest",
+    ),
+    "residual": Variable(
+        _SERIES,
+        "1",
+        "error of the contact solver",
+        "part of stated_error: estimated error of the pressure (L1), over its sum",
+        in_table="largest",
+    ),
+    "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
+    "contact_area_error": Variable(
+        _SERIES,
+        "m^2",
+        "stated error of the contact area",
+        "area of the cells whose contact is uncertain by time steps and contact solver, in contact or out of it, "
+        "whichever is larger; the grid error is not included",
+    ),
+    "grid_error": Variable(
+        _SERIES,
+        "1",
+        "grid error",
+        f"the largest of pressure (L1), force and approach, like stated_error; {_COARSER}; of the pressure also from "
+        "the force on cells at the edge of the contact; zero of a prescribed quantity",
+        in_table="largest",
+    ),
+    "grid_error_approach": Variable(
+        _SERIES,
+        "1",
+        "grid error of the approach",
+        f"{_COARSER}; zero if the approach is prescribed; it counts from the highest point",
+        in_table="largest",
+    ),
+    "grid_error_gap": Variable(
+        _SERIES,
+        "1",
+        "grid error of the gap",
+        f"mean gap; {_COARSER}; and from an opening that full contact may hide",
+        in_table="largest",
+    ),
+    "grid_error_area": Variable(
+        _SERIES,
+        "1",
+        "grid error of the area",
+        f"contact area; {_COARSER}; and from the number of faces at the edge of the contact, or an opening that full "
+        "contact may hide",
+        in_table="largest",
+    ),
+    "grid_error_friction": Variable(
+        _SERIES,
+        "1",
+        "grid error of friction",
+        f"{_COARSER}; in steady sliding at least the difference from pressure times slope, if at most 10 %",
+        in_table="largest",
+    ),
+    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
+    "convolutions": Variable(
+        _SERIES,
+        "1",
+        "convolutions",
+        "since the previous kept time: displacements and preconditioner applications, each one forward and one inverse "
+        "transform",
+        dtype="int32",
+    ),
+    "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run"),
+    # observables: contact and gap
+    "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
+    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
+    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
+    "cluster_area": Variable(
+        (ROW, "cluster"),
+        "m^2",
+        "area of a contact cluster",
+        "its cells, counted: all clusters together are contact_area_counted; largest first; missing beyond the number "
+        "of clusters",
+    ),
+    "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
+    "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
+    "pressure_density": Variable(
+        (ROW, "pressure_bin"),
+        "1/Pa",
+        "probability density of the pressure",
+        "over the cells in contact: its integral is 1",
+    ),
+    "gap_density": Variable(
+        (ROW, "gap_bin"),
+        "1/m",
+        "probability density of the gap",
+        "over the present cells out of contact: its integral is 1",
+    ),
+    "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
+    "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
+    "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
+    # observables: leakage
+    "leak_rate": Variable(
+        _SERIES,
+        "m^3/s",
+        "leak rate",
+        "volume of fluid that flows through the gap in unit time, with the pressure drop over the length of the map "
+        "along the flow; zero where leak_status is closed",
+        in_table="last",
+    ),
+    "leak_rate_solver_lower": Variable(
+        _SERIES,
+        "m^3/s",
+        "lower bound on this grid's leak rate",
+        "of the solution of these equations alone (Thomson): without the errors of the grid and of the gap",
+    ),
+    "leak_rate_solver_upper": Variable(
+        _SERIES,
+        "m^3/s",
+        "upper bound on this grid's leak rate",
+        "of the solution of these equations alone (Dirichlet): without the errors of the grid and of the gap",
+    ),
+    "leak_status": Variable(
+        _SERIES,
+        "",
+        "whether fluid flows",
+        "closed: no path through the gap connects the two sides; cells that share only a corner are apart. "
+        "not_certified: the bounds are more than 1e-6 of the leak rate apart",
+        dtype="int8",
+        meanings=LEAK_MEANINGS,
+    ),
+    "transmissivity": Variable(
+        _SERIES,
+        "m^3",
+        "transmissivity",
+        "hydraulic, of the gap: leak rate times viscosity over the pressure gradient and the width across the flow: "
+        "the cube of a parallel gap over 12; independent of the fluid",
+        in_table="last",
+    ),
+    "hydraulic_aperture": Variable(
+        _SERIES,
+        "m",
+        "hydraulic aperture",
+        "the parallel gap that leaks as much: the cube root of 12 times the transmissivity; independent of the fluid",
+        in_table="last",
+    ),
+    "flux": Variable(
+        _FRAME, "m^2/s", "flux", "volume flux, its size, of the fluid, over the height of the gap; missing in contact"
+    ),
+    "flux_x": Variable(_FRAME, "m^2/s", "flux along x", f"volume flux {_FLUX}"),
+    "flux_y": Variable(_FRAME, "m^2/s", "flux along y", f"volume flux {_FLUX}"),
+    # observables: contact spots
+    "incremental_stiffness": Variable(
+        _SERIES,
+        "N/m",
+        "incremental stiffness",
+        "against a fast increment, the contact frozen: frozen_stiffness times the instantaneous contact modulus, "
+        "unless another is given; missing if the material has none",
+    ),
+    "incremental_stiffness_error": Variable(
+        _SERIES, "N/m", "stated error of the incremental stiffness", _GRID_AND_SOLVER
+    ),
+    "frozen_stiffness": Variable(
+        _SERIES,
+        "m",
+        "frozen stiffness",
+        "of the frozen contact, over the contact modulus: of a disc, twice its radius; infinite in full contact where "
+        "uniform pressure displaces nothing",
+    ),
+    "frozen_stiffness_error": Variable(_SERIES, "m", "stated error of the frozen stiffness", _GRID_AND_SOLVER),
+    "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS, in_table="last"),
+    "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _GRID_AND_SOLVER),
+    "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS, in_table="last"),
+    "electrical_conductance_error": Variable(
+        _SERIES, "S", "stated error of the electrical conductance", _GRID_AND_SOLVER
+    ),
+    # theories
+    "persson_contact_area": Variable(
+        _SERIES,
+        "m^2",
+        "contact area, Persson",
+        "by Persson's theory, at the rms slope of the surface; missing once the load has fallen",
+    ),
+    "asperity_contact_area": Variable(
+        _SERIES,
+        "m^2",
+        "contact area, Bush, Gibson and Thomas",
+        "at low loads, at the rms slope of the surface; missing once the load has fallen",
+    ),
+    "persson_friction_coefficient": Variable(_SERIES, "1", "friction coefficient, Persson", _PERSSON),
+    "persson_contact_fraction": Variable(
+        _SERIES, "1", "contact fraction, Persson", f"contact area over nominal area, {_PERSSON}"
+    ),
+}
+
+#: Fields that the user may ask for in ``fields``: those that the solver finds.
+FIELDS = ("pressure", "gap", "displacement")
+#: Histories that are known at all accepted steps.
+STEPPED = tuple(name for name, one in VARIABLES.items() if one.dims == _STEPS and name != "time")
+#: Conductances of the contact spots.
+CONDUCTANCES = ("thermal_conductance", "electrical_conductance")
+#: Quantity -> variable with its grid error.
+GRID_ERROR = {
+    "pressure": "grid_error",
+    "force": "grid_error",
+    "approach": "grid_error_approach",
+    "mean_gap": "grid_error_gap",
+    "contact_area": "grid_error_area",
+    "friction_force": "grid_error_friction",
+}
+
+
+def errors_of(name: str) -> tuple[str, ...]:
+    """Return the names of the variables that may state the error of a variable.
+
+    Examples
+    --------
+    >>> errors_of("contact_area"), errors_of("leak_rate")
+    (('contact_area_error', 'grid_error_area'), ('leak_rate_solver_lower', 'leak_rate_solver_upper'))
+    """
+    found = (f"{name}_error", f"{name}_solver_lower", f"{name}_solver_upper", GRID_ERROR.get(name, ""))
+    return tuple(one for one in found if one in VARIABLES)
+
+
+def variables_in_table(which: Literal["last", "largest"]) -> list[str]:
+    """Return the variables whose value in the last row, or largest value, is a column in the table of a sweep."""
+    return [name for name, one in VARIABLES.items() if one.in_table == which]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Axis of the rows of a result.
+
+    Attributes
+    ----------
+    name : str
+        Coordinate of the rows.
+    rows : str
+        Plural name of the rows.
+    symbol : str
+        Symbol of a value, as ``t`` in ``t = 50 ms``.
+    needed : tuple of str
+        Variables without which a file is not a result.
+    telling : str
+        Variable whose largest value marks the row that represents the result in a table; empty: the last row does.
+    """
+
+    name: str
+    rows: str
+    symbol: str
+    needed: tuple[str, ...]
+    telling: str = ""
+
+    def place(self, value: float, digits: int = 6) -> str:
+        """Return a value on the axis as text.
+
+        Examples
+        --------
+        >>> AXES["time"].place(0.05), AXES["speed"].place(2e-3)
+        ('t = 50 ms', 'V = 2 mm/s')
+        """
+        return f"{self.symbol} = {unit_for([value], VARIABLES[self.name].units).text(value, digits)}"
+
+    def telling_row(self, histories: Mapping[str, Any]) -> int:
+        """Return the number of the row that represents a result in a table."""
+        found = np.asarray(histories[self.telling]) if self.telling else np.zeros(0)
+        return int(np.nanargmax(found)) if np.isfinite(found).any() else -1
+
+
+#: Name of an axis -> the axis.
+AXES: dict[str, Axis] = {
+    "time": Axis("time", "kept times", "t", needed=("time", "force", "approach")),
+    "speed": Axis(
+        "speed", "speeds", "V", needed=("speed", "force", "friction_coefficient"), telling="friction_coefficient"
+    ),
+}
+
+
+def axis_of(names: Container[str]) -> str:
+    """Return the name of the axis of the rows of a result, by the names that it holds.
+
+    Examples
+    --------
+    >>> axis_of({"time", "force"}), axis_of({"speed", "force"})
+    ('time', 'speed')
+    """
+    return next((name for name in AXES if name != "time" and name in names), "time")
