@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from roughvisc.experiment.domain import Domain
 from roughvisc.mechanics.contact.neighbours import area_bounds, staircase
 from roughvisc.mechanics.stepping import Scene, Step
-from roughvisc.mechanics.tangential import force_across, tangential_force
+from roughvisc.mechanics.tangential import tangential_force
 
 Array = NDArray[np.float64]
 
@@ -110,7 +110,7 @@ def friction_columns(step: Step, scene: Scene, displacement: Array) -> dict[str,
         "sliding_distance": step.distance,
         "friction_force": friction,
         "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
-        "friction_force_across": force_across(scene.grid, point.pressure, displacement, slide),
+        "friction_force_across": tangential_force(scene.grid, point.pressure, displacement, slide, across=True),
         "friction_force_error": step.difference.friction,
     }
 

@@ -8,7 +8,7 @@ known: see :meth:`Program.on_area`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,7 +18,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.notebook import table
-from roughvisc.units import Quantity, number, quantities, said, shown
+from roughvisc.units import Quantity, number, quantities, said
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
@@ -43,9 +43,8 @@ class Slide:
 
     def __post_init__(self) -> None:
         if not 0 < self.distance < math.inf:
-            raise InputError(f"distance of a slide is {self.distance!r}: expected a positive number [m]")
-        if self.direction not in get_args(Direction):
-            raise InputError(f"direction of a slide is {self.direction!r}: expected {DIRECTIONS}")
+            raise InputError(key="distance", found=self.distance, expected="a positive number [m]")
+        one_of(self.direction, Direction, DIRECTIONS, "direction")
 
     @property
     def axis(self) -> int:
@@ -73,28 +72,9 @@ class Slide:
         side = spacing[self.axis]
         number = math.floor(self.distance / side * (1 + 1e-12) + 0.5)
         if number < 1:
-            raise InputError(
-                f"a slide of {said(self.distance, 'm')} is less than half a cell of {said(side, 'm')}: the profile "
-                "moves by whole cells; expected a longer distance, or a finer grid"
-            )
+            least = f"at least half a cell of {said(side, 'm')}, or a finer grid"
+            raise InputError(key="slide", found=self.distance, expected=least)
         return number
-
-
-@dataclass(frozen=True)
-class Slid:
-    """How far a profile has slid.
-
-    Attributes
-    ----------
-    distance : float
-        Along the path, whatever the direction. [m]
-    work : float
-        Work of the tangential force: what the body has taken up in slides, stored or dissipated, less the work of the
-        normal force. [J]
-    """
-
-    distance: float = 0.0
-    work: float = 0.0
 
 
 def instant(began: float, end: float, taken: int, cells: int) -> float:
@@ -113,7 +93,7 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
 def one_of(value: Any, words: Any, expected: str, key: str) -> Any:
     """A value that is one of a few words: a direction, or what is controlled."""
     if value not in get_args(words):
-        raise InputError(f"{key}: found {shown(value)}: expected {expected}")
+        raise InputError(key=key, found=value, expected=expected)
     return value
 
 
@@ -197,16 +177,13 @@ class Segment:
             return self.end
         return start + (self.end - start) * (elapsed / self.duration)
 
-    def turns(self, after: float, before: float) -> Iterator[float]:
-        """Instants strictly between two others at which a cycle turns back, from the start of the segment. [s]"""
+    def turns(self, after: float, before: float) -> list[float]:
+        """Return the instants strictly between two others at which a cycle turns back, from its start. [s]"""
         if not self.amplitude:
-            return
+            return []
         quarter = self.period / 4
-        number = 2 * max(math.floor((after / quarter - 1) / 2), 0) + 1
-        while number * quarter < before:
-            if number * quarter > after:
-                yield number * quarter
-            number += 2
+        first, last = (math.floor(time / quarter) for time in (after, before))
+        return [n * quarter for n in range(first, last + 1) if n % 2 and after < n * quarter < before]
 
     def highest(self, start: float) -> float:
         """The largest value prescribed anywhere in the segment, which began at ``start``. [N or m]"""
@@ -219,7 +196,7 @@ class Segment:
         return not self.amplitude and start == 0 and not self.end
 
     def on_area(self, area: float) -> Segment:
-        """A segment of nominal pressure as one of load on an area [m2]; any other as it is."""
+        """Return a segment of nominal pressure as one of load on an area [m2]; any other unchanged."""
         if self.control != "pressure":
             return self
         end = None if self.end is None else float(f"{self.end * area:.15g}")
@@ -228,18 +205,8 @@ class Segment:
 
 #: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
-#: Segments that a program tells one by one.
-TOLD = 8
-
-
-def in_words(segments: Sequence[Segment]) -> list[str]:
-    """The first segments, one by one."""
-    first = segments[:TOLD]
-    words = [str(segment) for segment in first]
-    for place, (before, segment) in enumerate(pairwise(first), 1):
-        if segment.holds and segment.control == before.control:
-            words[place] = f"hold {said(segment.duration, 's')}"  # what else
-    return words
+# Segments that the text of a program lists.
+_LISTED = 8
 
 
 @dataclass(frozen=True)
@@ -271,19 +238,25 @@ class Program:
     note: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        """In words; of a long table its first segments."""
-        words, more = in_words(self.segments), len(self.segments) - TOLD
-        words += [f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else []
-        return f"Program: {', '.join(words or ['nothing'])}"
+        """Return the first segments in words."""
+        return f"Program: {', '.join(self._words() or ['nothing'])}"
 
     def _repr_html_(self) -> str:
+        words, ends = self._words(), [*self.corners[1 : _LISTED + 1], self.duration]
         rows = [
-            (str(number), words, f"until {said(end, 's')}" if end else "")
-            for number, (words, end) in enumerate(zip(in_words(self.segments), self.corners[1:], strict=False))
+            (str(place), text, f"until {said(end, 's')}" if end else "")
+            for place, (text, end) in enumerate(zip(words, ends, strict=False))
         ]
-        more = len(self.segments) - TOLD
-        rows += [("...", f"{more} more segments", f"until {said(self.duration, 's')}")] if more > 0 else []
         return table("Program" if rows else "Program: nothing", rows)
+
+    def _words(self) -> list[str]:
+        """Return the first segments in words, and the number of others."""
+        words = [str(segment) for segment in self.segments[:_LISTED]]
+        for place, (before, segment) in enumerate(pairwise(self.segments[:_LISTED]), 1):
+            if segment.holds and segment.control == before.control:
+                words[place] = f"hold {said(segment.duration, 's')}"
+        more = len(self.segments) - _LISTED
+        return words + ([f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else [])
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)
@@ -440,10 +413,11 @@ class Program:
         far = number(distance, "m", f"{here}.slide", above=0)
         if (speed is None) == (over is None):
             raise InputError(f"{here}: speed is {speed!r} and over is {over!r}: expected one of them")
-        if speed is None:
-            lasting = number(over, "s", f"{here}.over", above=0)
-        else:
-            lasting = far / number(speed, "m/s", f"{here}.speed", above=0)
+        lasting = (
+            number(over, "s", f"{here}.over", above=0)
+            if speed is None
+            else far / number(speed, "m/s", f"{here}.speed", above=0)
+        )
         control = self.segments[-1].control if self.segments else "load"
         towards = one_of(direction, Direction, DIRECTIONS, f"{here}.direction")
         return self._then(Segment(control, lasting, slide=Slide(far, towards)))
@@ -473,20 +447,15 @@ class Program:
         unit = UNITS[one_of(control, Control, CONTROLS, "control")]
         if len(times) != len(values) or not len(times):
             raise InputError(f"table has {len(times)} times and {len(values)} values: expected as many, at least one")
-        if times[0] != 0 and number(times[0], "s", "table.times.0"):
-            raise InputError(f"table starts at time {times[0]!r} s: expected 0")
-        segments = []
-        before = 0.0
-        for row, (time, value) in enumerate(zip(times, values, strict=True)):
-            now, end = (
-                number(time, "s", f"table.times.{row}"),
-                number(value, unit, f"table.values.{row}"),
-            )
+        instants = [number(time, "s", f"table.times.{row}") for row, time in enumerate(times)]
+        ends = [number(value, unit, f"table.values.{row}") for row, value in enumerate(values)]
+        if instants[0] != 0:
+            raise InputError(key="table.times.0", found=times[0], expected="zero")
+        segments = [Segment(control, 0.0, ends[0])] if ends[0] else []
+        for row, (before, now) in enumerate(pairwise(instants), 1):
             if not now >= before:
-                raise InputError(f"table row {row}: time {time!r} s after {before!r} s: expected increasing times")
-            if row or end:
-                segments.append(Segment(control, now - before, end))
-            before = now
+                raise InputError(key=f"table.times.{row}", found=times[row], expected=f"at least {before!r} s")
+            segments.append(Segment(control, now - before, ends[row]))
         return cls(tuple(segments), note)
 
     @classmethod
@@ -570,16 +539,12 @@ class Program:
     @property
     def duration(self) -> float:
         """Length of the program. [s]"""
-        return self._corners[-1]
-
-    @property
-    def corners(self) -> list[float]:
-        """Start of the program and end of each segment. [s]"""
-        return list(self._corners)
+        return self.corners[-1]
 
     @cached_property
-    def _corners(self) -> tuple[float, ...]:
-        return (0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist())
+    def corners(self) -> list[float]:
+        """Start of the program and end of each segment. [s]"""
+        return [0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist()]
 
     @property
     def largest_load(self) -> float:

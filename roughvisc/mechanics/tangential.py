@@ -1,4 +1,4 @@
-r"""Tangential force of a contact without shear: that of the pressure on the inclined surface.
+r"""Tangential force of a contact without shear: the force of the pressure on the inclined surface.
 
 A profile that moves along +x is driven by ``-int p du/dx dA``, and kept on its path by ``-int p du/dy dA`` towards +y,
 with the displacement ``u`` of the body, which in contact has the slope of the profile. The part ``K p`` of ``u`` adds
@@ -21,7 +21,7 @@ Array = Any  # an array of NumPy or CuPy
 
 
 def slope(field: Array, side: float, axis: int) -> Array:
-    """Slope of a periodic field along an axis, by its Fourier series.
+    """Return the slope of a periodic field along an axis, by its Fourier series.
 
     Parameters
     ----------
@@ -46,32 +46,24 @@ def slope(field: Array, side: float, axis: int) -> Array:
     return fft.irfft(spectrum, n=count, axis=axis, overwrite_x=True)
 
 
-def tangential_force(operator: Grid, pressure: Array, displacement: Array, slide: Slide) -> float:
-    """Friction force, against the motion of a profile, by the slope of the body under it. [N]
+def tangential_force(grid: Grid, pressure: Array, displacement: Array, slide: Slide, across: bool = False) -> float:
+    """Return the friction force, against the motion of a profile, by the slope of the body under it. [N]
 
     Parameters
     ----------
-    operator : Grid
+    grid : Grid
         The body, periodic.
     pressure, displacement : array, shape (nx, ny)
         [Pa], [m]
     slide : Slide
         The motion.
+    across : bool
+        Whether to return the force to the left of the motion instead, which keeps the profile on its path. Left is 90
+        degrees counter-clockwise from the motion, with x to the right and y upwards: y for a motion along x, -x for a
+        motion along y.
     """
-    return slide.sense * _force_along(operator, pressure, displacement, slide.axis)
-
-
-def force_across(operator: Grid, pressure: Array, displacement: Array, slide: Slide) -> float:
-    """Force to the left of the motion that keeps a profile on its path, of the same fields. [N]
-
-    Left is 90 degrees counter-clockwise from the motion, with x to the right and y upwards: of a motion along x it is
-    y, and of one along y it is -x.
-    """
-    left = slide.sense if slide.axis == 0 else -slide.sense
-    return left * _force_along(operator, pressure, displacement, 1 - slide.axis)
-
-
-def _force_along(operator: Grid, pressure: Array, displacement: Array, axis: int) -> float:
-    """Component along an axis of the force that holds the profile. [N]"""
-    inclined = slope(displacement, operator.spacing[axis], axis)
-    return -float((pressure * inclined).sum()) * operator.cell_area
+    axis, sense = slide.axis, slide.sense
+    if across:
+        axis, sense = 1 - axis, sense if axis == 0 else -sense
+    inclined = slope(displacement, grid.spacing[axis], axis)
+    return -sense * float((pressure * inclined).sum()) * grid.cell_area

@@ -16,7 +16,7 @@ from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 from roughvisc.mechanics.stepping import Scene, march
-from roughvisc.mechanics.tangential import force_across, tangential_force
+from roughvisc.mechanics.tangential import tangential_force
 
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
 SHAPE, SPACING = (23, 18), (1.0, 1.2)
@@ -171,8 +171,8 @@ def test_slide__is_the_same_on_a_device(xp):
         motion = scene.motions[step.segment]
         one, two = (
             [
-                force(place.grid, row.point.pressure, support.displaced(place, row), motion)
-                for force in (tangential_force, force_across)
+                tangential_force(place.grid, row.point.pressure, support.displaced(place, row), motion, across)
+                for across in (False, True)
             ]
             for place, row in ((scene, step), (other, there))
         )
