@@ -95,12 +95,41 @@ SLIDING = (
     .replace("[solve]", 'direction = "-y"\n[solve]')
     .replace('times = "all"', "times = 9")
 )
+# Presses in, pulls out and presses again, with little compliance at once.
+PULLED = (
+    SOFT.replace('model = "kelvin_voigt"\nshear_modulus = "1 MPa"', 'model = "zener"\nshear_modulus = "300 MPa"')
+    .replace('viscosity = "0.1 MPa s"', 'kelvin_modulus = "1 MPa"\nkelvin_viscosity = "0.1 MPa s"')
+    .replace('load = "20 mN"', 'approach = "8 um"')
+    .replace('load = "5 mN"\nover = "1 ms"', 'approach = "2 um"\nover = "50 ms"')
+    .replace('hold = "0.2 s"\ncontrol = "approach"', 'approach = "9 um"\nover = "50 ms"')
+)
+# Two materials that creep in different times: a memory of the waves.
+LAYER = (
+    MODES.replace("[40, 33]", "[20, 15]")
+    .replace("[[program]]", 'thickness = "0.1 mm"\n[material.on]\nmodel = "maxwell"\nshear_modulus = "2 MPa"\n'
+             'viscosity = "1 MPa s"\n[[program]]', 1)
+    .replace("[keep]", '[keep]\nfields = ["gap"]')
+)  # fmt: skip
+# Steady sliding: a row is a speed.
+CURVE = (
+    MODES[: MODES.index("[[program]]")].replace("[40, 33]", "[20, 15]")
+    + """
+[friction]
+pressure = "20 kPa"
+speeds = { from = "0.1 mm/s", to = "1 m/s", count = 13 }
+[solve]
+boundary = "periodic"
+"""
+)
 CASES = {
     "following": FOLLOWING,
     "modes": MODES,
     "soft": SOFT,
     "growing": GROWING,
     "sliding": SLIDING,
+    "pulled": PULLED,
+    "layer": LAYER,
+    "curve": CURVE,
 }
 
 
@@ -275,6 +304,7 @@ def killed(folder, kills, seed):
     ("name", "kills"),
     [
         ("modes", 3),
+        *(pytest.param(name, 3, marks=pytest.mark.thorough) for name in ("sliding", "pulled", "layer", "curve")),
         *(pytest.param(name, 24, marks=pytest.mark.long) for name in CASES),
     ],
 )
