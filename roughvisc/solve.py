@@ -232,7 +232,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     dataset.attrs = {
         "Conventions": "CF-1.11",
         "result_format": RESULT_FORMAT,
-        **settings.to_attributes(),
+        "boundary": settings.boundary,
+        "tolerance": settings.tolerance,
         "history": str(height.attrs.get("history", "")),
     }
     dataset = label(in_order(rows.finish(dataset)))

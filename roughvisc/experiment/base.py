@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, separability_error
 from roughvisc.mechanics.materials.creep import complete
-from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.settings import OPEN_BOUNDARY, OVER_TIME, Settings, known_boundary
 from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing
 
@@ -198,7 +198,7 @@ class Experiment(ABC):
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that have no meaning here: their names, their values, and what is expected."""
-        for name, entry in ENTRIES.items():
+        for name in OVER_TIME if self.axis != "time" else ():
             found = getattr(settings, name)
-            if entry.only_over not in ("", self.axis) and found != getattr(Settings, name):
+            if found != getattr(Settings, name):
                 yield name, found, f"a result over {self.axis} has none: expected the usual"

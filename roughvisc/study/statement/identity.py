@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.schema import Study
 from roughvisc.study.statement.schema.surface import FromFile, Raw, SecondFace, SurfaceSection
 from roughvisc.topography.cards import read_toml
@@ -34,7 +33,7 @@ _PROSE = {
 }
 #: Keys of ``[solve]`` and ``[keep]`` that count at their defaults too. No new key does, so that the keys of former
 #: cases stay. The precision of the file is a key of ``[keep]`` and no setting of a solve.
-_ALWAYS = {name for name, entry in ENTRIES.items() if entry.always_in_key} | {"precision"}
+_ALWAYS = {"boundary", "tolerance", "times", "fields", "edge", "time_step", "precision"}
 
 
 def identity(settings: Study) -> tuple[str, str]:

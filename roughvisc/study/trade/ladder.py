@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.settings import ENTRIES, Settings
+from roughvisc.settings import Settings
 from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.statement.schema.surface import FileSurface
 
+#: Tables of the settings that are not in ``[solve]``.
+_TABLES = {"times": "keep", "fields": "keep", "missing": "surface"}
 #: Recipes that give the same surface on any grid: only there is the grid a setting and no data.
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Fewest cells a side of a coarser grid that is worth a try.
@@ -105,8 +107,8 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
 def changed_keys(before: Settings, after: Settings) -> dict[str, Any]:
     """Keys of a study, and values, that turn settings into others."""
     return {
-        f"{one.table}.{name}": list(value) if isinstance(value, tuple) else value
-        for name, one in ENTRIES.items()
+        f"{_TABLES.get(name, 'solve')}.{name}": list(value) if isinstance(value, tuple) else value
+        for name in (one.name for one in fields(Settings))
         if (value := getattr(after, name)) != getattr(before, name)
     }
 
@@ -125,7 +127,7 @@ def grid_change(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[
 
 def has_steps(case: Case) -> bool:
     """Whether what the case does takes steps in time, with a memory of those before."""
-    return ENTRIES["time_step"].only_over in ("", case.experiment().axis)
+    return case.experiment().axis == "time"
 
 
 def ladder(case: Case, shape: tuple[int, int]) -> list[Setting]:

@@ -10,7 +10,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.program import Program
-from roughvisc.settings import ENTRIES, OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.statement.schema.evaluation import AuditSection, ObserveSection
 from roughvisc.study.statement.schema.experiments import FrictionSection
 from roughvisc.study.statement.schema.material import AnyMaterial
@@ -21,6 +21,8 @@ from roughvisc.study.statement.schema.surface import AnySurface
 
 #: Part of a program's duration by which a kept time may exceed it.
 _ROUNDING = 1e-12
+#: Tables of the settings that are not in ``[solve]``.
+_TABLES = {"times": "keep", "fields": "keep", "missing": "surface"}
 _SEGMENTS = "a list of [[program]] tables, at least one"
 
 
@@ -107,7 +109,7 @@ class Study(Section):
             problem = f"found {late[0]:g} s: expected at least one time up to the end of the program, {end:g} s"
             raise refuse("keep.times", problem)
         for name, found, why in self.experiment().unsupported(self.solving()):
-            raise refuse(f"{ENTRIES[name].table}.{name}", f"found {shown(found)}: {why}")
+            raise refuse(f"{_TABLES.get(name, 'solve')}.{name}", f"found {shown(found)}: {why}")
         found = self.observe.problem(self.keep.fields, self.solve.boundary) if self.observe else None
         if found:
             raise refuse(f"observe.{found[0]}", found[1])

@@ -10,7 +10,6 @@ from importlib.resources import files
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from roughvisc.settings import ENTRIES
 from roughvisc.study.statement.schema import Study, StudyFile
 from roughvisc.study.statement.schema.material import SECTIONS, MaterialSection
 from roughvisc.study.statement.schema.program import KINDS, TABLES
@@ -41,12 +40,8 @@ _TABLES = {
 
 @cache
 def meanings() -> dict[str, dict[str, Any]]:
-    """Table -> key -> meaning and example; those of settings come from their entries."""
-    found = tomllib.loads(files(__package__).joinpath("keys.toml").read_text(encoding="utf-8"))
-    for name, entry in ENTRIES.items():
-        table = {"surface": _STEPS[1]}.get(entry.table, entry.table)
-        found.setdefault(table, {})[name] = [entry.about, entry.example]
-    return found
+    """Table -> key -> meaning and example."""
+    return tomllib.loads(files(__package__).joinpath("keys.toml").read_text(encoding="utf-8"))
 
 
 def meaning(tables: Sequence[str], key: str) -> list[str]:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import create_model
-
 from roughvisc.errors import InputError
-from roughvisc.settings import ENTRIES, MOST_TIMES, WORD_OR_NUMBER, WORDS, Settings
+from roughvisc.settings import FINEST_TOLERANCE, MOST_TIMES, WORDS, Settings
 from roughvisc.study.statement.schema.section import (
     Flag,
     Section,
@@ -21,7 +19,6 @@ from roughvisc.study.statement.schema.section import (
     validate,
     whole,
 )
-from roughvisc.units import range_in_words
 from roughvisc.variables import FIELDS
 
 _INSTANT = measured("s", least=0)
@@ -48,27 +45,14 @@ def _fields(value: Any) -> Any:
     return tuple(name for name in FIELDS if name in names)
 
 
-def _kind(name: str) -> Any:
-    """Kind of a setting, as a study file has it."""
-    entry = ENTRIES[name]
-    if name in WORDS:
-        return choice(*WORDS[name])
-    if isinstance(getattr(Settings, name), bool):
-        return Flag
-    number = measured(entry.unit, **entry.bounds)
-    if name not in WORD_OR_NUMBER:
-        return number
-    word = WORD_OR_NUMBER[name]
-    return literal_or(word, number, f"{word!r}, or {entry.noun} in {entry.unit}{range_in_words(**entry.bounds)}")
+class SolveSection(Section):
+    """How it is computed."""
 
-
-SolveSection = create_model(
-    "SolveSection",
-    __base__=Section,
-    __doc__="How it is computed.",
-    __module__=__name__,
-    **{name: (_kind(name), getattr(Settings, name)) for name, entry in ENTRIES.items() if entry.table == "solve"},
-)
+    boundary: choice(*WORDS["boundary"]) = Settings.boundary
+    tolerance: measured("1", least=FINEST_TOLERANCE, below=1) = Settings.tolerance
+    edge: choice(*WORDS["edge"]) = Settings.edge
+    grid_error: Flag = Settings.grid_error
+    time_step: literal_or("auto", measured("s", above=0), "'auto', or a time in s above 0") = Settings.time_step
 
 
 class KeepSection(Section):
