@@ -6,6 +6,7 @@ The displacement under a point force is ``1 / (pi r)``.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -62,7 +63,7 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
 
     near = distance <= _GAUSS[0][0]
     rows, columns = np.nonzero(near)
-    kernel[near] = _corner_sum(x[rows, 0], y[0, columns], dx, dy)
+    kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
     bounds = [start for start, _ in _GAUSS[1:]] + [math.inf]
     for (start, points), end in zip(_GAUSS, bounds, strict=True):
         ring = (distance > start) & (distance <= end)
@@ -72,11 +73,55 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     return kernel * (longer / math.pi)
 
 
-def _corner_sum(x: Array, y: Array, dx: float, dy: float) -> Array:
+def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> Array:
+    """Return the integral of ``1 / sqrt(r^2 + depth^2)`` over a cell, in closed form.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Positions relative to the centre of the cell; none may lie on the lines of the edges. [m]
+    dx, dy : float
+        Cell sides. [m]
+    depth : float
+        [m]
+
+    Returns
+    -------
+    ndarray
+        [m]
+    """
     total = np.zeros_like(x)
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
-        total += sx * sy * (a * np.arcsinh(b / np.abs(a)) + b * np.arcsinh(a / np.abs(b)))
+        corner = a * np.arcsinh(b / np.hypot(a, depth)) + b * np.arcsinh(a / np.hypot(b, depth))
+        if depth:
+            corner -= depth * np.arctan(a * b / (depth * np.sqrt(a**2 + b**2 + depth**2)))
+        total += sx * sy * corner
+    return total
+
+
+def cell_mean(
+    function: Callable[[Array], Array], x: NDArray, y: NDArray, sides: tuple[float, float], points: tuple[int, int]
+) -> Array:
+    """Return the mean of a function of the distance over a cell, by Gauss quadrature.
+
+    Parameters
+    ----------
+    function : callable
+        Takes distances. [m]
+    x, y : ndarray
+        Positions relative to the centre of the cell, which broadcast. [m]
+    sides : tuple of float
+        Cell sides. [m]
+    points : tuple of int
+        Gauss points along each side.
+    """
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+    (along_x, share_x), (along_y, share_y) = (_gauss_rule(count) for count in points)
+    for a, part_a in zip(along_x * sides[0] / 2, share_x / 2, strict=True):
+        square = (x + a) ** 2
+        for b, part_b in zip(along_y * sides[1] / 2, share_y / 2, strict=True):
+            total += part_a * part_b * function(np.sqrt(square + (y + b) ** 2))
     return total
 
 

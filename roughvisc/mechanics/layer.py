@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, separability_error
-from roughvisc.mechanics.half_space import check_grid, love_kernel
+from roughvisc.mechanics.half_space import cell_mean, check_grid, corner_sum, love_kernel
 from roughvisc.mechanics.materials.creep import Creep, Material, complete
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
@@ -267,10 +267,14 @@ class LayerKernel(Kernel):
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel and the images, for cells of any length. [m]"""
-        depths, q, scale, (u, s, v) = _image_fit(self.q, self.scale)
-        short = self.compliance[-1]
+        shallowest, deepest = _SHALLOWEST * _SHORT / self.q[-1], 1 / self.q[0]
+        depths = np.geomspace(shallowest, deepest, math.ceil(_IMAGES_PER_DECADE * math.log10(deepest / shallowest)))
+        q, short = np.geomspace(self.q[0], self.q[-1], 3 * depths.size), self.compliance[-1]
+        # the last equation is the limit of long waves
+        scale = np.append(np.interp(np.log(q), np.log(self.q), self.scale), self.scale[0])
         wanted = (np.append(self._along(np.log(q)), self.compliance[0]) - short) / scale
-        weights = v.T @ ((u.T @ wanted) / s)  # a product with the pseudo-inverse would lose digits
+        rows = np.vstack([np.exp(-np.outer(q, depths)), np.ones(depths.size)]) / scale[:, None]
+        weights = np.linalg.lstsq(rows, wanted, rcond=1e-13)[0]
         return short * love_kernel(shape, spacing) + image_influence(shape, spacing, depths, weights)
 
     def contrast(self, longest: float, shortest: float) -> float:
@@ -286,27 +290,6 @@ class LayerKernel(Kernel):
         from scipy.interpolate import CubicSpline  # slow to import
 
         return CubicSpline(np.log(self.q), self.compliance)
-
-
-@lru_cache(maxsize=8)
-def _image_fit(waves: tuple[float, ...], scale: tuple[float, ...]) -> tuple[Array, Array, Array, Any]:
-    """Return the least-squares fit of images to a function of the wave number, relative to a scale.
-
-    Returns
-    -------
-    depths, q, scale : ndarray
-        Depths of the images [m], wave numbers of the fit [1/m], and the scale there and at the limit of long waves.
-    factors : tuple of ndarray
-        Singular value decomposition of the equations.
-    """
-    first, last = _SHALLOWEST * _SHORT / waves[-1], 1 / waves[0]
-    depths = np.geomspace(first, last, math.ceil(_IMAGES_PER_DECADE * math.log10(last / first)))
-    q = np.geomspace(waves[0], waves[-1], 3 * depths.size)
-    relative_to = np.append(np.interp(np.log(q), np.log(waves), scale), scale[0])
-    rows = np.vstack([np.exp(-np.outer(q, depths)), np.ones(depths.size)]) / relative_to[:, None]
-    u, s, v = np.linalg.svd(rows, full_matrices=False)
-    kept = s > 1e-13 * s[0]
-    return depths, q, relative_to, (u[:, kept], s[kept], v[kept])
 
 
 def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths: Array, weights: Array) -> Array:
@@ -333,29 +316,14 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
     rows, columns = np.nonzero(near)
     found = np.zeros(shape)
     for depth, weight in zip(depths, weights, strict=True):
-        found[rows, columns] += weight * _image_of_cell(x[rows, 0], y[0, columns], (dx, dy), depth)
+        found[near] += weight / math.pi * corner_sum(x[rows, 0], y[0, columns], dx, dy, depth)
     if near.all():
         return found
     farthest = math.hypot(shape[0] * dx, shape[1] * dy)
     at = unit * np.geomspace(1, 1 + farthest / unit, math.ceil(_DISTANCES * math.log10(1 + farthest / unit)) + 8) - unit
     along = CubicSpline(np.log1p(at / unit), (weights / np.sqrt(at[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi)
-    nodes, parts = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
-    mean = np.zeros(shape)
-    for a, part_a in zip(nodes * dx / 2, parts / 2, strict=True):
-        for b, part_b in zip(nodes * dy / 2, parts / 2, strict=True):
-            mean += part_a * part_b * along(np.log1p(np.hypot(x + a, y + b) / unit))
+    mean = cell_mean(lambda r: along(np.log1p(r / unit)), x, y, spacing, (_GAUSS_POINTS, _GAUSS_POINTS))
     return np.where(near, found, mean * (dx * dy))
-
-
-def _image_of_cell(x: Array, y: Array, sides: tuple[float, float], depth: float) -> Array:
-    """Return ``1 / (pi sqrt(r^2 + depth^2))`` integrated over a cell, at positions relative to its centre. [m]"""
-    total = np.zeros_like(x)
-    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        a, b = x + sx * sides[0] / 2, y + sy * sides[1] / 2
-        distance = np.sqrt(a**2 + b**2 + depth**2)
-        total += sx * sy * (a * np.arcsinh(b / np.hypot(a, depth)) + b * np.arcsinh(a / np.hypot(b, depth)))
-        total -= sx * sy * depth * np.arctan(a * b / (depth * distance))
-    return total / math.pi
 
 
 @dataclass(frozen=True, eq=False)

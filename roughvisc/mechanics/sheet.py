@@ -17,7 +17,7 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel, separability_error
-from roughvisc.mechanics.half_space import check_grid, love_kernel
+from roughvisc.mechanics.half_space import cell_mean, check_grid, love_kernel
 from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.units import Quantity, quantities
 
@@ -167,13 +167,9 @@ class Sheet(Kernel):
         near = np.hypot(x[:, None], y) <= _REACH - math.hypot(dx, dy) / 2
         kernel[~near] = 0
         rows, columns = np.nonzero(near)
-        mean = np.zeros(rows.size)
         correction = _correction(self.poisson if self.base == "bonded" else 0.5, self.base)
-        along_x, along_y = _gauss(dx), _gauss(dy)
-        for a, weight_a in zip(*along_x, strict=True):
-            square = (x[rows] + a) ** 2
-            for b, weight_b in zip(*along_y, strict=True):
-                mean += weight_a * weight_b * correction(np.sqrt(square + (y[columns] + b) ** 2))
+        points = [next(count for longest, count in _GAUSS if side <= longest) for side in (dx, dy)]
+        mean = cell_mean(correction, x[rows], y[columns], (dx, dy), (points[0], points[1]))
         kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
         return kernel
 
@@ -275,10 +271,3 @@ def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
     powers = np.linalg.solve(np.vander((nodes + 1) / 2, increasing=False), values.T)
     correction: Callable[[Array], Array] = PPoly(powers / side ** np.arange(_NODES - 1, -1, -1)[:, None], ends)
     return correction
-
-
-def _gauss(side: float) -> tuple[Array, Array]:
-    """Return Gauss nodes about the centre of a side, in thicknesses, and weights that add up to one."""
-    points = next(count for longest, count in _GAUSS if side <= longest)
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return nodes * side / 2, weights / 2
