@@ -24,11 +24,13 @@ from roughvisc.mechanics.grid import transform_library
 from roughvisc.steps import TITLE, with_steps
 from roughvisc.topography.grid import checked, nominal_area
 from roughvisc.topography.indenters import highest
-from roughvisc.variables import RESULT_FORMAT, STEPPED
+from roughvisc.variables import STEPPED
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
 Progress = Callable[[float, float], None]
+#: Attributes of a surface that stay with its heights: the source, and how missing points were filled.
+_ORIGIN = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
 #: Between two libraries in the account of what a solve was computed with.
 _THEN = "; then "
 
@@ -225,13 +227,13 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
         dataset[name] = (axis, "x", "y"), field
-    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)}
+    origin = {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
+    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
     if "filled" in height.coords:
         dataset["filled"] = ("x", "y"), height["filled"].values
     dataset = dataset.assign_coords(x=height["x"].values, y=height["y"].values)
     dataset.attrs = {
         "Conventions": "CF-1.11",
-        "result_format": RESULT_FORMAT,
         "boundary": settings.boundary,
         "tolerance": settings.tolerance,
         "history": str(height.attrs.get("history", "")),

@@ -62,6 +62,28 @@ def test_attributes__are_plain(stored):
     )
 
 
+def test_result__has_few_variables_and_attributes(stored):
+    rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    material = rv.sheet(RUBBER, 1e-3)
+    press = rv.Program().pressure(1e4, over=0.1)
+    shared = {"grid_error": True, "progress": False}
+    curve = rv.friction(rough, material, speeds=[1e-3, 1e-2], load=0.02, fields=("pressure", "gap"), **shared)
+    scan = rv.simulate(rough, material, press, boundary="periodic", times=2, **shared)
+    for ds in (stored, curve, scan):
+        assert len(ds.variables) <= 26
+        assert len(ds.attrs) <= 14
+    assert stored.stated_error.attrs["long_name"] == "numerical error"
+    slide = rv.simulate(rough, RUBBER, press.slide(1e-4, over=0.1), boundary="periodic", times=2, **shared)
+    assert set(slide.variables) - set(scan.variables) == {
+        "sliding_distance",
+        "friction_force",
+        "friction_force_across",
+        "friction_force_error",
+        "friction_coefficient",
+        "grid_error_friction",
+    }
+
+
 def test_steps__hold_every_accepted_step_and_the_rows_among_them(ball, stored):
     for ds in (ball, stored):
         steps = ds.roughvisc.steps

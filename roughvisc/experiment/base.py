@@ -60,25 +60,28 @@ class Problem:
             self.body.kernel.check_cells(spacing(self.height, "height"))
         return replace(self, settings=replace(self.settings, boundary=found))
 
-    def attributes(self, end: float, time_scale: float) -> dict[str, Any]:
-        """Return the facts of the body and the surface that an audit of a result without its study needs.
 
-        Parameters
-        ----------
-        end : float
-            Time till which the material creeps. [s]
-        time_scale : float
-            Shortest time in which the load or the approach changes; infinite in a steady state. [s]
-        """
-        material = complete(self.body.material)
-        return {
-            **self.body.attributes(),
-            "compliance_at_once": float(material.contact_compliance(0.0)),
-            "compliance_at_end": float(material.contact_compliance(end)),
-            "poisson": "" if separability_error(self.body.material) else material.poisson,
-            "time_scale": time_scale,
-            "recipe": str(self.height.attrs.get("recipe", "")),
-        }
+def facts_of(body: Body, end: float, time_scale: float) -> dict[str, Any]:
+    """Return the facts that an audit needs beside the variables: attributes of a result, unless its case states them.
+
+    Parameters
+    ----------
+    body : Body
+        The body under the surface.
+    end : float
+        Time till which the material creeps. [s]
+    time_scale : float
+        Shortest time in which the load or the approach changes; infinite in a steady state. [s]
+    """
+    material = complete(body.material)
+    poisson = {} if separability_error(body.material) else {"poisson": material.poisson}
+    return {
+        **body.attributes(),
+        "compliance_at_once": float(material.contact_compliance(0.0)),
+        "compliance_at_end": float(material.contact_compliance(end)),
+        **poisson,
+        "time_scale": time_scale,
+    }
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError
-from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
+from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows, facts_of
 from roughvisc.experiment.domain import enlarged_indenter, estimated
 from roughvisc.experiment.notes import (
     accuracy_note,
@@ -319,7 +319,7 @@ class LoadingRows(Rows):
             log.warning("%s", note)
         stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
         stated["material"] = table_note(self.problem.body.materials)
-        attributes = self._given.attributes(self.end, scene.program.time_scale)
+        attributes = facts_of(self._given.body, self.end, scene.program.time_scale)
         if self.problem.body.separates:  # of what was pressed, a series or not; of layers those of the top one
             attributes |= {
                 "compliance_at_once": scene.compliance(0.0),

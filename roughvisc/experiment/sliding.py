@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.base import Experiment, Problem, Row, Rows
+from roughvisc.experiment.base import Experiment, Problem, Row, Rows, facts_of
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
 from roughvisc.experiment.notes import (
@@ -317,7 +317,7 @@ class SlidingRows(Rows):
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
-        attributes = self.problem.attributes(longest / min(self._curve.asked), math.inf) | {
+        attributes = facts_of(self.problem.body, longest / min(self._curve.asked), math.inf) | {
             "direction": self._curve.direction,
             "warnings": warnings_text(stated | warnings),
         }

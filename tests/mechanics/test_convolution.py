@@ -213,8 +213,8 @@ def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
     fast = rv.run(rv.read_study(study), tmp_path / "fast", progress=False)
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     plain = rv.run(rv.read_study(study), tmp_path / "plain", progress=False)
-    assert fast.attrs["transforms"].startswith("ducc0 ")
-    assert plain.attrs["transforms"].startswith("scipy.fft ")
+    assert "; ducc0 " in fast.attrs["source"]
+    assert "; scipy.fft " in plain.attrs["source"]
     np.testing.assert_allclose(fast.pressure, plain.pressure, rtol=0, atol=1e-9 * float(plain.pressure.max()))
 
 

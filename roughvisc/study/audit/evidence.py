@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy import fft, ndimage
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import facts_of
+from roughvisc.experiment.loading import Loading
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.body import separability_error
 from roughvisc.mechanics.materials.creep import complete
@@ -200,13 +202,13 @@ def of_result(dataset: xr.Dataset) -> Evidence:
     _check(dataset)
     case = Case.from_json(dataset.attrs["case"]) if "case" in dataset.attrs else None
     longest = _longest(dataset["height"]) if "height" in dataset else math.inf
-    attrs = dataset.attrs
+    attrs = _facts(dataset, case, longest)
     row = dataset.isel({axis_of(dataset): _fullest(dataset)})
     area = float(row.get("contact_area", math.nan))
     texture, size, slope = None, (math.nan, math.nan), math.nan
     if "height" in dataset:
         height = dataset["height"].load()
-        texture = texture_of(height, attrs["boundary"], str(attrs.get("recipe", "")))
+        texture = texture_of(height, attrs["boundary"], str(height.attrs.get("recipe", "")))
         size, slope = texture.size, loaded_slope(height, attrs["boundary"], float(dataset["approach"].max()))
     speed, friction_power = _sliding(dataset)
     has_pressure = {"pressure", "height"} <= set(dataset.data_vars)
@@ -294,6 +296,15 @@ def _check(dataset: Any) -> None:
     if not dataset.sizes.get(axis):
         raise InputError(key="audit", found=[], expected=f"a {axis} at least")
     expect_declared_units(dataset)
+
+
+def _facts(dataset: xr.Dataset, case: Case | None, longest: float) -> Mapping[str, Any]:
+    """Return the attributes of a result, with the facts that only the case of a stored one states."""
+    if case is None or "time_scale" in dataset.attrs:
+        return dataset.attrs
+    experiment = case.experiment()
+    time_scale = experiment.program.time_scale if isinstance(experiment, Loading) else math.inf
+    return facts_of(case.body(), creep_time(experiment, longest), time_scale) | dataset.attrs
 
 
 def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[Body, ...]:

@@ -22,7 +22,7 @@ from roughvisc.labels import label, warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
 from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import NUMERICS_REVISION, program
+from roughvisc.study.statement.identity import program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
 from roughvisc.study.storage.lock import lock_case, lock_path
@@ -35,15 +35,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
-REFERENCES = (
-    "A robust algorithm for the contact of viscoelastic materials (the method started from); "
-    "K. L. Johnson, Contact Mechanics, Cambridge University Press, 1985"
-)
-
 Progress = Callable[[float, float], None]
-
-#: Attributes of a surface that stay with the result: whence it came, and what was made up where it was missing.
-SCAN_ATTRIBUTES = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
+#: Facts that the attribute ``case`` of a stored result states.
+_IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale")
 
 
 def study_folder(study: Path, out: str | Path | None = None) -> Path:
@@ -100,10 +94,9 @@ def compute(
     if "speed" in dataset:
         reduced = case.settings.material.shift * dataset["speed"].values
         dataset = label(dataset.assign(reduced_speed=("speed", reduced)))
-    scan = {name: height.attrs[name] for name in SCAN_ATTRIBUTES if name in height.attrs}
     transforms = transform_library() if keeper is None else keeper.latest.transforms
     provenance = _provenance(case, dataset.attrs.pop("history", ""), transforms)
-    dataset.attrs = provenance | dataset.attrs | scan
+    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
     return dataset.assign_coords(labels_of_case(json.loads(case.to_json())))
 
 
@@ -120,7 +113,7 @@ def _named(case: Case) -> Iterator[None]:
         raise ConvergenceError(f"{case.origin}: {error}") from error
 
 
-def _provenance(case: Case, before: str, transforms: str) -> dict[str, str | int]:
+def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
     """Attributes that say what this is, whence it came, and how to have it again."""
     now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     named = f"run of {case.origin.name}" if case.origin else "run of a case"
@@ -128,14 +121,8 @@ def _provenance(case: Case, before: str, transforms: str) -> dict[str, str | int
     return {
         "Conventions": "CF-1.11",
         "title": case.title + varied,
-        "source": program(),
-        "numerics_revision": NUMERICS_REVISION,
-        "transforms": transforms,
+        "source": f"{program_version()}; {transforms}",
         "history": "\n".join(filter(None, [before, f"{now} {program()}: {named}"])),
-        "references": REFERENCES,
-        "comment": "Attribute 'case' states the whole computation (JSON, SI units); "
-        "'stated_error' how accurate it is; "
-        "'surface_sha256' is the checksum of the scan's file, or of the recipe of a generated surface.",
         "case": case.to_json(),
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,

@@ -30,8 +30,6 @@ _SHARED = (
     "Conventions",
     "result_format",
     "source",
-    "references",
-    "comment",
     "boundary",
     "tolerance",
     "direction",

@@ -60,7 +60,6 @@ _SETTINGS = (
     "tolerance",
     "memory",
     "series_error",
-    "transforms",
     "case_key",
 )
 _ORIGIN = ("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points")
@@ -245,8 +244,10 @@ def _study(dataset: xr.Dataset) -> dict[str, Any]:
     """What was run and whence it came, for one case."""
     case = json.loads(dataset.attrs.get("case", "{}"))
 
+    attributes = {**(dataset["height"].attrs if "height" in dataset else {}), **dataset.attrs}
+
     def told(names: Sequence[str]) -> list[list[str]]:
-        return [[name.replace("_", " "), str(dataset.attrs[name])] for name in names if name in dataset.attrs]
+        return [[name.replace("_", " "), str(attributes[name])] for name in names if name in attributes]
 
     return {
         "material": case_text.material_words(case["material"]) if "material" in case else "",
@@ -288,10 +289,10 @@ def _surface(dataset: xr.Dataset) -> dict[str, Any]:
     steps = found.steps
     del found  # of a big surface no more is held than the next figure needs
     return {
-        "name": str(dataset.attrs.get("source_file") or dataset.attrs.get("title", "surface")),
+        "name": str(dataset["height"].attrs.get("source_file") or dataset.attrs.get("title", "surface")),
         "steps": steps,
         "filled": filled,
-        "method": str(dataset.attrs.get("fill_method", "")),
+        "method": str(dataset["height"].attrs.get("fill_method", "")),
         "measured": before is not None,
         "unchanged": unchanged,
         "parameters": rows,

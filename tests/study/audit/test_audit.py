@@ -302,7 +302,7 @@ def generated(shortcut, shape=(48, 40), **settings):
 
 def test_resolution__is_what_the_last_octave_adds_to_the_slope(rough):
     """Of heights that no recipe states."""
-    found = rv.audit(rough.assign_attrs(recipe=""))["resolution"]
+    found = rv.audit(rough.assign(height=rough.height.assign_attrs(recipe="")))["resolution"]
     q = 2 * np.pi * np.hypot(np.fft.fftfreq(40, 2.5e-5)[:, None], np.fft.fftfreq(36, 2.5e-5))
     squares = q**2 * np.abs(np.fft.fft2(rough.height.values)) ** 2
     order = np.argsort(q, axis=None)

@@ -92,7 +92,7 @@ def test_page__escapes_what_users_write_and_needs_no_other_file(page):
 def test_page__of_a_result_without_a_study(within, tmp_path):
     ds = made.one_frame().drop_vars(["height", "gap", "displacement"])
     ds["stated_error"][:] = 3e-3
-    ds.attrs |= {"tolerance": 4e-3 if within else 1e-3, "source_file": "<b>a.sur</b>", "history": "<i>read</i>"}
+    ds.attrs |= {"tolerance": 4e-3 if within else 1e-3, "memory": "<b>a.sur</b>", "history": "<i>read</i>"}
     text = report(ds, tmp_path / "one.html").read_text()
     assert not re.findall(r"<(b|i|u)\b", text)
     assert "&lt;b&gt;a.sur" in text
