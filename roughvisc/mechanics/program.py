@@ -1,8 +1,8 @@
 """Loading programs: chains of segments that prescribe load, nominal pressure or approach over time.
 
-A program knows values at corners only. What a hold keeps, or where a ramp starts after a change of control, is
-found during the run and handed to :meth:`Segment.value`. A nominal pressure becomes a load where the surface is
-known: see :meth:`Program.on_area`.
+A program states values at corners only. The value that a hold keeps, or from which a ramp starts after a change of
+control, follows during the run and is an argument of :meth:`Segment.value`. :meth:`Program.on_area`
+converts nominal pressures to loads on a known area.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Slide:
     Parameters
     ----------
     distance : float
-        As asked for; what is slid is the nearest whole number of cells. [m]
+        Requested distance; the profile slides by the nearest whole number of cells. [m]
     direction : {"x", "-x", "y", "-y"}
         In which the profile moves.
     """
@@ -78,20 +78,20 @@ class Slide:
 
 
 def instant(began: float, end: float, taken: int, cells: int) -> float:
-    """Time at which so many cells of a slide are behind. [s]
+    """Return the time at which a slide has taken a number of cells. [s]
 
     Parameters
     ----------
     began, end : float
         Of the slide. [s]
     taken, cells : int
-        Cells that are behind, and those of the whole slide.
+        Cells taken, and cells of the whole slide.
     """
     return end if taken >= cells else began + (end - began) * (taken / cells)
 
 
 def one_of(value: Any, words: Any, expected: str, key: str) -> Any:
-    """A value that is one of a few words: a direction, or what is controlled."""
+    """Return a value if it is one of the words of a literal type, and refuse it otherwise."""
     if value not in get_args(words):
         raise InputError(key=key, found=value, expected=expected)
     return value
@@ -113,7 +113,7 @@ class Segment:
     Parameters
     ----------
     control : {"load", "approach", "pressure"}
-        What is prescribed; the pressure is a nominal one.
+        Prescribed quantity; the pressure is the nominal one.
     duration : float
         Length of the segment; zero is a jump. [s]
     end : float or None
@@ -121,7 +121,7 @@ class Segment:
     amplitude, period : float
         A sine wave about the value ``end``, which must also be the value at the start. [N, m or Pa], [s]
     slide : Slide or None
-        How the profile moves along the surface meanwhile, while what is controlled keeps its value.
+        Motion of the profile along the surface, during which the controlled quantity keeps its value.
     """
 
     control: Control
@@ -163,7 +163,7 @@ class Segment:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing moves: what is controlled keeps its value, and the profile its place."""
+        """Whether the controlled quantity and the position of the profile are constant."""
         return self.end is None and not self.amplitude and self.slide is None
 
     def value(self, elapsed: float, start: float) -> float:
@@ -262,7 +262,7 @@ class Program:
         return replace(self, segments=self.segments + segments)
 
     def _to(self, control: Control, value: Any, over: Any) -> Program:
-        """Go to a value of what is controlled, linearly."""
+        """Ramp linearly to a value of a controlled quantity."""
         here = f"program.{len(self.segments)}"
         least = 0.0 if control in PUSHING else None
         end = number(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
