@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -13,42 +14,24 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows, facts_of
-from roughvisc.experiment.domain import enlarged_indenter, estimated
-from roughvisc.experiment.notes import (
-    accuracy_note,
-    border_note,
-    contact_stands_alone,
-    creep_left,
-    edge_note,
-    slope_note,
-    surface_stands_alone,
-    table_note,
-    tolerance_note,
-    wake_note,
+from roughvisc.experiment.notes import loading_warnings, table_note
+from roughvisc.experiment.profile import (
+    BEYOND,
+    GROWTH,
+    Profile,
+    choose_domain,
+    enlarged_indenter,
+    expected_contact,
 )
-from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import require_loading
-from roughvisc.experiment.scene import (
-    build_scene,
-    check_program,
-    domain_of,
-    slide_note,
-)
-from roughvisc.experiment.stated import (
-    Fields,
-    area_columns,
-    error_columns,
-    fields_of,
-    friction_columns,
-    meets_tolerance,
-    staircase_area,
-    time_error,
-)
+from roughvisc.experiment.scene import build_scene, check_program
+from roughvisc.experiment.stated import area_error, error_columns, meets_tolerance
 from roughvisc.labels import warnings_text
-from roughvisc.mechanics.materials.creep import complete
+from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, State, Step, at_rest, march
+from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
@@ -121,7 +104,7 @@ STATES = (LoadingState, State, Point, History, Difference)
 
 
 class LoadingRows(Rows):
-    """Accepted steps of one march, in order: histories of all of them, fields of those that are kept.
+    """Accepted steps of a run, in order: histories of all of them, fields of those that are kept.
 
     Parameters
     ----------
@@ -130,7 +113,7 @@ class LoadingRows(Rows):
     program : Program
         The loading program.
     state : LoadingState, optional
-        From which the march continues. Default: from rest.
+        From which the run continues. Default: from rest.
     in_memory : bool
         Whether the kept fields stay in memory.
     """
@@ -139,33 +122,32 @@ class LoadingRows(Rows):
         self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
     ) -> None:
         height, body, settings = problem.height, problem.body, problem.settings
-        self._given, self._settings = problem, settings
         shape = height.sizes["x"], height.sizes["y"]
-        require_loading(shape, nominal_area(height), program, settings, body, in_memory=in_memory)
-        check_program(Profile(height, settings.missing, body.kernel), body, program, settings)
-        self._start = state or LoadingState(enlarged=enlargements(problem, program))
-        larger = enlarged_indenter(height, self._start.enlarged)
-        assert larger is not None, "it was made before"
-        self.problem = replace(problem, height=larger)
-        self.profile = Profile(larger, settings.missing, body.kernel)
-        self.profile.nominal_area = nominal_area(height)
-        self._domain = domain_of(self.profile, body, program, settings, self._start.outgrown)
-        self._scene, self._choice = build_scene(self.profile, body, program, settings, self._domain)
+        self._area, self.end = nominal_area(height), program.duration
+        program = program.on_area(self._area)
+        require_loading(shape, program, settings, body, in_memory=in_memory)
+        profile = Profile(height, settings.missing, body.kernel)
+        check_program(profile, body, program, settings)
+        expected = expected_contact(problem, program, None if state is None else state.enlarged)
+        self._start = state or LoadingState(enlarged=expected.enlarged)
+        if expected.enlarged:
+            profile = Profile(expected.height, settings.missing, body.kernel)
+        self._domain = choose_domain(profile, body, expected.approach * GROWTH**self._start.outgrown)
+        self._scene, self._choice = build_scene(profile, self._domain, body, program, settings)
+        self.problem, self._profile = replace(problem, height=profile.height), profile
         log.info("memory: %s", self._choice.note)
-        self.end = program.duration
         self._border = self._start.border
 
     def __iter__(self) -> Iterator[Row]:
-        """March to the end of the program.
+        """Compute the steps to the end of the program.
 
         Raises
         ------
         Outgrown
-            If contact outgrows the domain: the march must begin anew.
+            If contact outgrows the domain: the run must begin again.
         """
         scene, start = self._scene, self._start
-        every = scene.kept is None
-        to_keep = set(scene.corners if scene.kept is None else scene.kept)
+        every, ends = scene.kept is None, set(scene.corners)
         largest, reached = start.largest, start.march or at_rest(scene)
         for step in march(scene, start.march):
             point, before = step.point, largest
@@ -174,32 +156,39 @@ class LoadingRows(Rows):
             reached = step.state or reached
             of_all = max(reached.largest_force, point.force), max(reached.largest_approach, abs(point.approach))
             stated = error_columns(step, scene, self._choice.series_error, largest, of_all)
-            kept = point.time in to_keep or (every and meets_tolerance(step, scene, stated["stated_error"]))
+            if every:
+                kept = point.time in ends or meets_tolerance(step, scene, stated["stated_error"])
+            else:
+                kept = scene.keeps(point.time)
+            # with hardly any instantaneous compliance a pressure that is not kept belongs to the whole step; a given
+            # load is right all the same
+            began = point.before[0] if point.before else scene.corners[step.segment]
+            by_load = scene.program.segments[step.segment].control == "load"
+            is_end_value = by_load or not scene.is_soft(point.time - began)
+            largest = largest if kept else before
             state = None
             if step.state is not None:
-                told = largest if kept else before
-                state = LoadingState(step.state, told, start.enlarged, start.outgrown, self._border)
-            if kept or (not every and self._is_end_value(step)):
-                yield self._row(step, largest, stated, kept, state)
+                state = LoadingState(step.state, largest, start.enlarged, start.outgrown, self._border)
+            if kept or (not every and is_end_value):
+                values, fields = self._row(step, stated, kept)
+                yield Row(point.time, values, fields, kept, state=state, done=point.time)
             else:
                 yield Row(point.time, state=state, done=point.time)
-            largest = largest if kept else before
 
     def _check_border(self, step: Step) -> None:
-        """Take note of contact at the border of a free surface, or refuse it; find out if the domain is outgrown."""
-        scene, start, point = self._scene, self._start, step.point
+        """Record contact at the border of a free surface, or refuse it; find out if the domain is outgrown."""
+        scene, start, point, domain = self._scene, self._start, step.point, self._domain
         if scene.grid.boundary != "free" or point.force == 0:
             return
-        if self._domain.is_outgrown(point.approach):
+        if BEYOND * point.approach >= domain.outside:
             raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
         touches = point.pressure > 0
-        lines = [line for i in (0, -1) for line in (touches[i], touches[:, i])]
-        if not self._domain.is_whole or not any(bool(line.any()) for line in lines):
+        if not domain.is_whole or not (touches[[0, -1]].any() or touches[:, [0, -1]].any()):
             return
-        if self._settings.edge == "accept":
+        if self.problem.settings.edge == "accept":
             self._border = point.time if self._border is None else self._border
             return
-        if enlarged_indenter(self.profile.height, 1) is not None:
+        if enlarged_indenter(self._profile.height) is not None:
             raise Outgrown(LoadingState(enlarged=start.enlarged + 1, outgrown=start.outgrown))
         nx, ny = scene.gap.shape
         raise EdgeContactError(
@@ -208,162 +197,102 @@ class LoadingRows(Rows):
             "edge='accept' to treat the scan outline as a punch"
         )
 
-    def _is_end_value(self, step: Step) -> bool:
-        """Return whether pressure and force of a step that is not kept are those at its end.
-
-        With hardly any instantaneous compliance they belong to the whole step; a given load is right all the same.
-        """
-        before = step.point.before
-        length = step.point.time - (before[0] if before else self._scene.corners[step.segment])
-        by_load = self._scene.program.segments[step.segment].control == "load"
-        return by_load or not self._scene.is_soft(length)
-
-    def _row(
-        self, step: Step, largest: tuple[float, float], stated: dict[str, float], kept: bool, state: LoadingState | None
-    ) -> Row:
-        """Return the row of a step.
+    def _row(self, step: Step, stated: dict[str, float], kept: bool) -> tuple[dict[str, Any], dict[str, Array]]:
+        """Return the variables of a step, and its fields on the whole surface.
 
         Parameters
         ----------
         step : Step
             An accepted step.
-        largest : tuple of float
-            Largest force [N] and approach [m] of the kept rows so far, this one included.
         stated : dict
             Its stated errors.
         kept : bool
             Whether it is a row of the result, or of the histories of all steps only.
-        state : LoadingState or None
-            From which an interrupted run continues.
         """
-        scene, point, domain = self._scene, step.point, self._domain
-        fields = fields_of(step, scene)
-        count = int(np.count_nonzero(fields.contact))
-        touching = count * scene.grid.cell_area
-        area = max(touching - staircase_area(fields.contact, scene, domain), 0.0)
+        scene, profile, domain, point = self._scene, self._profile, self._domain, step.point
+        contact, grid = point.pressure > 0, scene.grid
+        present = scene.memory.present(point.history)
+        displacement, effective = present[0], present[-1]
+        gap = np.maximum(scene.gap + displacement - point.approach, 0.0)
+        gap[contact] = 0.0
+
+        # The count is too large by a part of the strip along the perimeter, where contact ends although the material
+        # goes on. Where the material itself ends, at an absent cell or at the border of a scan in free space, the edge
+        # of the contact is known, and the count exact. A cell at a mirror neighbours its own image: no edge either.
+        free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not domain.is_whole
+        count = int(np.count_nonzero(contact))
+        counted = count * grid.cell_area
+        strip = staircase(contact, free, grid.cell_area, grid.boundary == "periodic", before=goes_on, beyond=goes_on)
+        area = max(counted - strip, 0.0)
+
+        if domain.is_whole:
+            mean_gap = float(np.mean(gap, where=profile.present))
+        else:
+            mean_gap = profile.mean_gap + domain.mean_displacement(effective) - point.approach
+        is_full = domain.is_whole and count == np.count_nonzero(profile.present)
+        status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
         row: dict[str, Any] = {
             "force": point.force,
             "approach": point.approach,
             "work": step.work,
-            "time_error": time_error(step, largest),
+            "time_error": stated["time_error"],
             "convolutions": step.convolutions,
-            "status": self._status(step, count),
+            "status": STATUS_MEANINGS.index(status),
             "contact_area": area,
-            "contact_area_counted": touching,
-            "contact_fraction": self.profile.contact_fraction(area),
-            "mean_gap": self._mean_gap(step, fields),
-            **friction_columns(step, scene, fields.displacement),
+            "contact_area_counted": counted,
+            "contact_fraction": area / profile.area,
+            "mean_gap": mean_gap,
         }
-        arrays: dict[str, Array] = {}
-        if kept:
-            row |= stated | area_columns(step, scene, fields, touching, area)
-            arrays = self._stored(step, fields)
-        return Row(point.time, row, arrays, kept, 0, state, point.time)
+        if scene.motions:
+            slide = scene.motions[step.segment]
+            friction = tangential_force(grid, point.pressure, displacement, slide)
+            row |= {
+                "sliding_distance": step.distance,
+                "friction_force": friction,
+                "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
+                "friction_force_across": tangential_force(grid, point.pressure, displacement, slide, across=True),
+                "friction_force_error": step.difference.friction,
+            }
+        if not kept:
+            return row, {}
+        row |= stated | {"contact_area_error": area_error(step, scene, gap, counted, area)}
 
-    def _stored(self, step: Step, fields: Fields) -> dict[str, Array]:
-        """Return the fields that are stored, on the whole surface."""
-        domain, names = self._domain, self._settings.fields
-        stored = {"pressure": step.point.pressure, "displacement": fields.displacement, "gap": fields.gap}
+        names = self.problem.settings.fields
+        fields = {"pressure": point.pressure, "displacement": displacement, "gap": gap}
         if domain.is_whole:
-            stored["gap"] = np.where(self.profile.present, fields.gap, np.nan)
+            fields["gap"] = np.where(profile.present, gap, np.nan)
         else:
-            stored["pressure"] = domain.padded(step.point.pressure)
+            fields["pressure"] = domain.padded(point.pressure)
             if "displacement" in names or "gap" in names:
-                displacement = domain.displacement(self._scene.memory.present(step.point.history)[1])
-                displacement[domain.cells] = fields.displacement
-                stored["displacement"] = displacement
-                gap = np.maximum(self.profile.gap + displacement - step.point.approach, 0.0)
-                gap[domain.cells] = fields.gap
-                stored["gap"] = gap
-        return {name: stored[name] for name in names}
-
-    def _mean_gap(self, step: Step, fields: Fields) -> float:
-        """Return the mean gap of the whole surface. [m]"""
-        if self._domain.is_whole:
-            return float(np.mean(fields.gap, where=self.profile.present))
-        effective = self._scene.memory.present(step.point.history)[1]
-        return self.profile.mean_gap + self._domain.mean_displacement(effective) - step.point.approach
-
-    def _status(self, step: Step, count: int) -> int:
-        if step.point.force == 0:
-            meaning = "open"
-        elif self._domain.is_whole and count == np.count_nonzero(self.profile.present):
-            meaning = "full_contact"
-        else:
-            meaning = "converged"
-        return STATUS_MEANINGS.index(meaning)
+                whole = domain.displacement(effective)
+                whole[domain.cells] = displacement
+                opening = np.maximum(profile.gap + whole - point.approach, 0.0)
+                opening[domain.cells] = gap
+                fields |= {"displacement": whole, "gap": opening}
+        return row, {name: fields[name] for name in names}
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result: costs of each row from the sums till then, nominal pressure, attributes.
 
         The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
         """
+        scene, choice, body = self._scene, self._choice, self.problem.body
         dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
-        dataset["nominal_pressure"] = dataset["force"] / self.profile.nominal_area
-        scene, choice, profile, settings = self._scene, self._choice, self.profile, self._settings
-        approach = float(np.fmax.reduce(dataset["approach"].values))
-        repeats = settings.boundary == "periodic"
-        warnings = {
-            "slope": slope_note(
-                profile.height[self._domain.cells],
-                settings.boundary,
-                approach - profile.least_gap,  # below the highest cell
-            ),
-            "border": border_note(profile.height, dataset) if repeats else "",
-            "edge": "" if self._border is None else edge_note(self._border),
-            "wake": self._wake_note(dataset),
-            "slide": slide_note(scene.program, profile.spacing),
-            "series": choice.warning(settings.tolerance),
-        }
-        for note in filter(None, warnings.values()):
-            log.warning("%s", note)
-        stated = {"accuracy": accuracy_note(scene), "tolerance": tolerance_note(scene, dataset)}
-        stated["material"] = table_note(self.problem.body.materials)
-        attributes = facts_of(self._given.body, self.end, scene.program.time_scale)
-        if self.problem.body.separates:  # of what was pressed, a series or not; of layers those of the top one
-            attributes |= {
-                "compliance_at_once": scene.compliance(0.0),
-                "compliance_at_end": scene.compliance(self.end),
-            }
+        dataset["nominal_pressure"] = dataset["force"] / self._area
+        loaded = self._profile.height[self._domain.cells]
+        warnings = loading_warnings(scene, self._profile, dataset, loaded=loaded, border=self._border)
+        warnings["series"] = choice.warning(scene.tolerance)
+        for subject, note in warnings.items():
+            if note and subject not in ("accuracy", "tolerance"):
+                log.warning("%s", note)
+        warnings["material"] = table_note(body.materials)
+        attributes = facts_of(body, self.end, scene.program.time_scale)
+        if body.separates:  # of what was pressed, a series or not; of layers those of the top one
+            attributes["compliance_at_once"] = scene.compliance(0.0)
+            attributes["compliance_at_end"] = scene.compliance(self.end)
         attributes |= {
             "memory": choice.note,
             "series_error": choice.series_error,
-            "warnings": warnings_text(stated | warnings),
+            "warnings": warnings_text(warnings),
         }
         return dataset.assign_attrs({name: value for name, value in attributes.items() if value != ""})
-
-    def _wake_note(self, dataset: xr.Dataset) -> str:
-        """What to say of a contact that stands alone and slides into the wake of the one before."""
-        scene, profile = self._scene, self.profile
-        segments = [(one, one.slide) for one in scene.program.segments if one.slide is not None]
-        if not segments:
-            return ""
-        notes, alone = [], surface_stands_alone(profile.height)
-        for axis, side in enumerate(profile.spacing):
-            period = profile.height.shape[axis] * side
-            strokes = [(slide.distance, slide.distance / one.duration) for one, slide in segments if slide.axis == axis]
-            if sum(distance for distance, _ in strokes) < period / 2:  # it does not come as far as the next wake
-                continue
-            single = alone
-            if single is None and "pressure" in dataset:
-                single = contact_stands_alone(dataset["pressure"][-1].values, axis)
-            if single:
-                left = {
-                    speed: creep_left(scene.compliance(min(period / speed, self.end)), scene.compliance(self.end))
-                    for _, speed in strokes
-                }
-                notes.append(wake_note(left, period))
-        return " ".join(filter(None, notes))
-
-
-def enlargements(problem: Problem, program: Program) -> int:
-    """Return how many times the surface of an indenter must be made larger for the contact that is expected."""
-    height, settings = problem.height, problem.settings
-    if settings.boundary != "free" or settings.edge != "error" or enlarged_indenter(height, 1) is None:
-        return 0
-    program, times = program.on_area(nominal_area(height)), 0
-    compliance = float(complete(problem.body.material).contact_compliance(program.duration))
-    larger: xr.DataArray | None = height
-    while larger is not None and estimated(larger, problem.body.kernel, compliance, program)[1]:
-        larger, times = enlarged_indenter(height, times + 1), times + 1
-    return times if larger is not None else times - 1

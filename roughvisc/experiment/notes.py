@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.materials.creep import Creep
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping import Scene
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 #: period of 6 to 11 contact radii, with 1 and 9 times the instantaneous compliance retarded: 0.4 to 0.6 % off where
 #: 1e-6 of the creep is left, 5 to 6 % where 1 to 2 % are left, 26 % where 7 to 12 % are left.
 _LEFT = 0.01
+#: The distance of a slide differs from the requested one by more than this part of it if a result says so.
+_SAME_DISTANCE = 1e-9
 #: Part of the period over which nothing touches, in one piece along the motion, from which on a contact stands alone.
 _FREE = 0.25
 
@@ -93,47 +96,12 @@ def wake_note(left: Mapping[float, float], period: float) -> str:
     )
 
 
-#: What a result says of a material without instantaneous compliance.
-NO_JUMP = (
-    "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each cell that "
-    "makes contact. The approach meets the tolerance; each row states its own error of pressure, force and work."
-)
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
 #: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
 #: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
 LARGEST_SLOPE = 0.3
 #: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
 _AT_ONCE = 0.1
-
-
-def accuracy_note(scene: Scene) -> str:
-    """Return a warning if the instantaneous compliance is so small that errors may exceed the tolerance, else ''."""
-    at_once, final = scene.compliance(0.0), scene.compliance(scene.program.duration)
-    if at_once == 0:
-        return NO_JUMP
-    if at_once < _AT_ONCE * final:
-        return (
-            f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
-            "approach, nearly jump in each cell that makes contact. The approach meets the tolerance; each row "
-            "states its own error of pressure, force and work."
-        )
-    return ""
-
-
-def tolerance_note(scene: Scene, dataset: xr.Dataset) -> str:
-    """Count the rows whose stated error exceeds the tolerance; empty if there are none."""
-    errors = dataset["stated_error"].values
-    missed = np.flatnonzero(errors > scene.tolerance)
-    if not missed.size:
-        return ""
-    fixed = "" if scene.time_step is None else " The time step is fixed, and not chosen by the tolerance."
-    if scene.motions:
-        fixed += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
-    says = "states" if missed.size == 1 else "state"
-    return (
-        f"{missed.size} of {errors.size} rows {says} an error above the tolerance {scene.tolerance:g}, "
-        f"{errors[missed].max():.2g} at worst (stated_error).{fixed}"
-    )
 
 
 def table_note(materials: Sequence[Prony | Creep]) -> str:
@@ -179,20 +147,6 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
     return note + " Use boundary = 'mirror'."
 
 
-def edge_note(time: float) -> str:
-    """What to say of contact that came to the border of a free-space domain, as ``edge = "accept"`` allows.
-
-    Parameters
-    ----------
-    time : float
-        End of the first step in which it was there. [s]
-    """
-    return (
-        f"Contact reached the border of the surface, first in the step to {time:.3g} s: there the surface acts as "
-        'a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "accept").'
-    )
-
-
 def percent(share: float) -> str:
     """A share to two digits, as 100 and not 1e+02."""
     return f"{float(f'{100 * share:.2g}'):g} %"
@@ -217,3 +171,91 @@ def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
         f"The rms slope of the loaded surface is {slope:.2g}: the method assumes small slopes, with an error of the "
         f"order of the squared slope. Beyond {LARGEST_SLOPE:g} the results are a rough estimate."
     )
+
+
+def loading_warnings(
+    scene: Scene,
+    profile: Profile,
+    dataset: xr.Dataset,
+    *,
+    loaded: xr.DataArray,
+    border: float | None,
+) -> dict[str, str]:
+    """Return the warnings about a loading by subject; a text is empty if there is nothing to say.
+
+    Parameters
+    ----------
+    scene, profile : Scene, Profile
+        As they were computed.
+    dataset : Dataset
+        The result.
+    loaded : DataArray
+        Heights of the part of the surface that was solved on. [m]
+    border : float or None
+        End of the first step in which contact reached the border of a free surface. [s]
+    """
+    boundary, end = scene.grid.boundary, scene.program.duration
+    at_once, final = scene.compliance(0.0), scene.compliance(end)
+    each_row = "The approach meets the tolerance; each row states its own error of pressure, force and work."
+    accuracy = edge = ""
+    if at_once == 0:
+        accuracy = (
+            "The material has no instantaneous compliance: pressure, and force under a given approach, jump in each "
+            f"cell that makes contact. {each_row}"
+        )
+    elif at_once < _AT_ONCE * final:
+        accuracy = (
+            f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
+            f"approach, nearly jump in each cell that makes contact. {each_row}"
+        )
+
+    errors = dataset["stated_error"].values
+    missed, tolerance = errors[errors > scene.tolerance], ""
+    if missed.size:
+        tolerance = (
+            f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
+            f"tolerance {scene.tolerance:g}, {missed.max():.2g} at worst (stated_error)."
+        )
+        if scene.time_step is not None:
+            tolerance += " The time step is fixed, and not chosen by the tolerance."
+        if scene.motions:
+            tolerance += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
+
+    if border is not None:
+        edge = (
+            f"Contact reached the border of the surface, first in the step to {border:.3g} s: there the surface acts "
+            "as a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "
+            '"accept").'
+        )
+
+    slides, strokes = [], dict[int, list[tuple[float, float]]]()
+    for number, segment in enumerate(scene.program.segments):
+        if segment.slide is not None:
+            slide, cells = segment.slide, segment.slide.cells(profile.spacing)
+            strokes.setdefault(slide.axis, []).append((slide.distance, slide.distance / segment.duration))
+            real = cells * profile.spacing[slide.axis]
+            if abs(real - slide.distance) > _SAME_DISTANCE * slide.distance:
+                distances = f"{said(real, 'm')}, {cells} whole cells, of {said(slide.distance, 'm')}"
+                slides.append(f"program.{number} slides {distances}")
+    wakes = []
+    for axis, runs in sorted(strokes.items()):
+        period = profile.height.shape[axis] * profile.spacing[axis]
+        if sum(distance for distance, _ in runs) < period / 2:  # it does not come as far as the next wake
+            continue
+        alone = surface_stands_alone(profile.height)
+        if alone is None and "pressure" in dataset:
+            alone = contact_stands_alone(dataset["pressure"][-1].values, axis)
+        if alone:
+            left = {speed: creep_left(scene.compliance(min(period / speed, end)), final) for _, speed in runs}
+            wakes.append(wake_note(left, period))
+
+    approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
+    return {
+        "accuracy": accuracy,
+        "tolerance": tolerance,
+        "slope": slope_note(loaded, boundary, approach),
+        "border": border_note(profile.height, dataset) if boundary == "periodic" else "",
+        "edge": edge,
+        "wake": " ".join(filter(None, wakes)),
+        "slide": "; ".join(slides),
+    }

@@ -1,23 +1,50 @@
-"""The surface that is pressed, as plain arrays."""
+"""The surface that is pressed, as plain arrays, and the part of it that is solved on.
+
+In free space nothing outside the contact matters. An elastic estimate with the final compliance and the largest load
+says how far the surfaces approach. Only cells whose undeformed gap is smaller can touch. A run uses the rectangle
+around them; the surface of an indenter is made larger if the estimated contact reaches its border. A run whose contact
+outgrows its domain is started again on a larger one.
+"""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Kernel
-from roughvisc.mechanics.grid import Boundary, Grid
+from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.base import Problem
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
+from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.materials.creep import complete
+from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Settings
-from roughvisc.topography.grid import checked, nominal_area, spacing
-from roughvisc.topography.indenters import highest
+from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.indenters import grown, highest
 
 Array = NDArray[np.float64]
+#: Cells of the longer side of the estimate, and its tolerance.
+ESTIMATED_ON, ESTIMATE_TOLERANCE = 64, 1e-2
+#: Estimated approach, and approach of a run, over which cells must be apart: estimate and end of a step have errors.
+MARGIN, BEYOND = 1.2, 1.05
+#: Cells around the domain.
+RIM = 2
+#: Cells of the shorter side from which a part of a surface pays, and largest part of the cells.
+WORTH_CROPPING, LARGEST_PART = 96, 0.8
+#: Factor by which an outgrown domain becomes larger.
+GROWTH = 1.5
+#: An indenter's surface gets no more cells than these.
+MOST_CELLS = 4096**2
 
 
 class Profile:
-    """The labelled surface of a solve, and the arrays that the mechanics needs.
+    """Labelled surface of a solve, and the arrays that the mechanics needs.
 
     Parameters
     ----------
@@ -26,7 +53,7 @@ class Profile:
     missing : {"refuse", "absent"}
         What missing heights mean.
     kernel : Kernel
-        Of the body that it is pressed on.
+        Kernel of the body under it.
 
     Attributes
     ----------
@@ -38,46 +65,222 @@ class Profile:
         Undeformed gap at first touch, zero at absent cells. [m]
     least_gap, mean_gap : float
         Least gap, which is positive if the highest point lies between the cells, and mean gap of the present cells. [m]
-    nominal_area : float
-        Area that nominal pressures refer to. [m2]
+    spacing : tuple of float
+        Cell sides. [m]
+    area : float
+        Area of all cells, absent ones included. [m2]
+
+    Raises
+    ------
+    InputError
+        If heights are infinite, all missing, or missing where neither the settings nor the surface say what that means.
     """
 
     def __init__(self, height: xr.DataArray, missing: Missing = Settings.missing, kernel: Kernel = HALF_SPACE) -> None:
-        self.height, self.kernel = _checked(height, missing), kernel
-        values = self.height.values
+        height = checked(height, "height", least=1)
+        values = height.values
+        if np.isinf(values).any():
+            raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
         self.present: NDArray[np.bool_] = np.isfinite(values)
+        if not self.present.any():
+            raise InputError("height is missing everywhere: expected at least one finite height")
         self.all_present = bool(self.present.all())
-        self.highest = highest(self.height)
+        if not self.all_present and "absent" not in (missing, height.attrs.get("missing")):
+            row, column = np.argwhere(~self.present)[0]
+            raise InputError(
+                f"height is missing at {np.count_nonzero(~self.present)} of {values.size} points, the first at cell "
+                f"({row}, {column}): fill it (fill = true in a study, rv.fill in Python), or say missing='absent' "
+                "if there is no material"
+            )
+        self.height, self.kernel = height, kernel
+        self.highest = highest(height)
         self.gap = self.highest - values
         self.least_gap = float(np.nanmin(self.gap))
         self.gap[~self.present] = 0.0
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
-        self.spacing = spacing(self.height, "height")
-        self.nominal_area = nominal_area(self.height)
-
-    def operator(self, boundary: Boundary, workers: int | None = None) -> Grid:
-        """Return the body under all cells of the surface."""
-        return Grid((self.gap.shape[0], self.gap.shape[1]), self.spacing, boundary, workers, kernel=self.kernel)
-
-    def contact_fraction(self, area: float) -> float:
-        """Return the ratio of a contact area to the area of the surface. [-]"""
-        dx, dy = self.spacing
-        return area / (dx * dy * self.height.size)
+        self.spacing = spacing(height, "height")
+        self.area = math.prod(self.spacing) * values.size
 
 
-def _checked(height: xr.DataArray, missing: Missing) -> xr.DataArray:
-    """Return the surface, if it can be pressed: missing heights are absent if the settings or the surface say so."""
-    height = checked(height, "height", least=1)
-    if np.isinf(height.values).any():
-        raise InputError("height holds infinite values: expected finite heights, or NaN where missing")
-    present = np.isfinite(height.values)
+@dataclass(frozen=True)
+class Domain:
+    """Rectangle of a surface that is solved on.
+
+    Attributes
+    ----------
+    cells : tuple of slice
+        Cells of the rectangle along x and y.
+    shape : tuple of int
+        Cells of the whole surface.
+    spacing : tuple of float
+        Cell sides. [m]
+    outside : float
+        Least undeformed gap of the surface beyond the rectangle; infinite if there is none. [m]
+    kernel : Kernel
+        Kernel of the body.
+    """
+
+    cells: tuple[slice, slice]
+    shape: tuple[int, int]
+    spacing: tuple[float, float]
+    outside: float
+    kernel: Kernel
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is all of the surface."""
+        return math.isinf(self.outside)
+
+    def padded(self, field: Array) -> Array:
+        """Return a field of the rectangle on the whole surface, zero beyond it."""
+        whole = np.zeros(self.shape)
+        whole[self.cells] = field
+        return whole
+
+    def displacement(self, effective: Array) -> Array:
+        """Return the displacement of the whole surface under an effective pressure [-] on the rectangle. [m]"""
+        return self._whole.displacement(self.padded(effective))
+
+    def mean_displacement(self, effective: Array) -> float:
+        """Return the mean displacement of the whole surface. [m]"""
+        return float((effective * self._mean_influence).sum())
+
+    @cached_property
+    def _whole(self) -> Grid:
+        return Grid(self.shape, self.spacing, "free", kernel=self.kernel)
+
+    @cached_property
+    def _mean_influence(self) -> Array:
+        """Mean displacement of the surface under unit pressure on each cell: the kernel is symmetric. [m]"""
+        return self._whole.displacement(np.full(self.shape, 1 / math.prod(self.shape)))[self.cells]
+
+
+def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> Domain:
+    """Return the part of a surface that may touch before a given approach is reached.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    body : Body
+        Body under it. The domain is all of the surface unless the body separates space and time and does not raise the
+        surface next to a load.
+    approach : float
+        Estimated largest approach. Default: the domain is all of the surface. [m]
+    """
+    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
+    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    may_crop = body.separates and profile.all_present and not body.kernel.raises_surface
+    if not may_crop or min(shape) < WORTH_CROPPING or math.isinf(approach):
+        return whole
+    near = np.argwhere(gap <= MARGIN * approach)
+    if not near.size:
+        return whole
+    first, last = np.maximum(near.min(axis=0) - RIM, 0), np.minimum(near.max(axis=0) + RIM + 1, shape)
+    cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
+    inside = np.zeros(shape, bool)
+    inside[cells] = True
+    return whole if inside.mean() > LARGEST_PART else replace(whole, cells=cells, outside=float(gap[~inside].min()))
+
+
+class Expected(NamedTuple):
+    """Surface of a run, and the contact that is expected on it.
+
+    Attributes
+    ----------
+    height : DataArray
+        Surface; of an indenter, enlarged until the expected contact does not reach its border. [m]
+    enlarged : int
+        How many times it was enlarged.
+    approach : float
+        Estimated largest approach; infinite if it is not known. [m]
+    reaches_border : bool
+        Whether contact is expected at the border of a free surface.
+    """
+
+    height: xr.DataArray
+    enlarged: int = 0
+    approach: float = math.inf
+    reaches_border: bool = False
+
+
+def expected_contact(problem: Problem, program: Program, enlarged: int | None = None) -> Expected:
+    """Return the surface of a run, enlarged if necessary, and its expected contact in free space.
+
+    Parameters
+    ----------
+    problem : Problem
+        Surface, body and settings.
+    program : Program
+        Loads and approaches, no nominal pressures.
+    enlarged : int, optional
+        Number of times to enlarge the surface. Default: as often as the estimate requires.
+    """
+    height, body, settings = problem.height, problem.body, problem.settings
+    if settings.boundary != "free" or settings.edge != "error":
+        return Expected(height)
+    larger = enlarged_indenter(height)
+    if larger is None and not (body.separates and not body.kernel.raises_surface):
+        return Expected(height)  # neither larger nor a part of it
+    times = enlarged or 0
+    for _ in range(times):
+        assert larger is not None, "it was enlarged before"
+        height, larger = larger, enlarged_indenter(larger)
+    compliance = float(complete(body.material).contact_compliance(program.duration))
+    approach, at_border = estimated(height, body.kernel, compliance, program)
+    while enlarged is None and at_border and larger is not None:
+        height, larger, times = larger, enlarged_indenter(larger), times + 1
+        approach, at_border = estimated(height, body.kernel, compliance, program)
+    return Expected(height, times, approach, at_border)
+
+
+def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
+    """Return an indenter on a grid that is 1.5 times as large; None if no recipe gives it, or it has too many cells."""
+    larger = grown(height, GROWTH)
+    return None if larger is None or larger.size > MOST_CELLS else larger
+
+
+def estimated(height: xr.DataArray, kernel: Kernel, compliance: float, program: Program) -> tuple[float, bool]:
+    """Return the largest approach of a program [m], and whether contact reaches the border then.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The surface. [m]
+    kernel : Kernel
+        Kernel of the body.
+    compliance : float
+        Contact compliance after all of the program. [1/Pa]
+    program : Program
+        Loads and approaches.
+
+    Notes
+    -----
+    Infinite for a load that is found in the run and held.
+    """
+    stride = math.ceil(max(height.shape) / ESTIMATED_ON)
+    gap = highest(height) - height.values[::stride, ::stride]
+    present = np.isfinite(gap)
     if not present.any():
-        raise InputError("height is missing everywhere: expected at least one finite height")
-    if not present.all() and "absent" not in (missing, height.attrs.get("missing")):
-        row, column = np.argwhere(~present)[0]
-        raise InputError(
-            f"height is missing at {np.count_nonzero(~present)} of {present.size} points, the first at cell "
-            f"({row}, {column}): fill it (fill = true in a study, rv.fill in Python), or say missing='absent' "
-            "if there is no material"
-        )
-    return height
+        return math.inf, False
+    least, gap = float(gap[present].min()), np.where(present, gap, 0.0)
+    dx, dy = spacing(height, "height")
+    grid = Grid((gap.shape[0], gap.shape[1]), (stride * dx, stride * dy), "free", kernel=kernel)
+    approach, at_border = 0.0, False
+    for number, segment in enumerate(program.segments):
+        if segment.control == "approach":
+            approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
+        elif not program.gives(number):
+            return math.inf, False
+    pushes = [{"approach": approach}] if approach > least else []
+    if program.largest_load * compliance > 0:
+        pushes.append({"load": program.largest_load * compliance / grid.cell_area})
+    for push in pushes:
+        try:
+            found = solve_contact(grid, gap, tolerance=ESTIMATE_TOLERANCE, present=present, **push)
+        except ConvergenceError:
+            return math.inf, False
+        approach = max(approach, found.approach)
+        touches = found.pressure > 0
+        at_border = at_border or bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
+    return approach, at_border

@@ -191,9 +191,9 @@ def curve_bytes(settings: Settings, cells: float) -> float:
 
 
 def require_loading(
-    shape: tuple[int, int], area: float, program: Program, settings: Settings, body: Body, *, in_memory: bool
+    shape: tuple[int, int], program: Program, settings: Settings, body: Body, *, in_memory: bool
 ) -> None:
-    """Refuse a loading on so many cells, on a nominal area [m2], that does not fit even if its contact stays sparse.
+    """Refuse a loading on so many cells that does not fit in memory even if its contact stays sparse.
 
     Raises
     ------
@@ -202,7 +202,6 @@ def require_loading(
     """
     if math.prod(shape) < WORTH_ASKING:
         return
-    program = program.on_area(area)
     memory, rows = choose_memory(body, **memory_options(program, settings)).memory, least_rows(settings, program)
     free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if free and body.separates and not body.kernel.raises_surface else 1.0  # the domain is not known yet

@@ -240,7 +240,7 @@ class SlidingRows(Rows):
         if not self._profile.present.all():  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
         self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.asked))
-        self._force = curve.force(self._profile.nominal_area)
+        self._force = curve.force(self._profile.area)
         self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
         self._alone = surface_stands_alone(self._profile.height)
         self._coarser: list[SlidingGrid] = []
@@ -280,7 +280,7 @@ class SlidingRows(Rows):
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the numbers of a state, and its fields in the frame of the surface."""
-        force, area, quarters = self._force, self._profile.nominal_area, _QUARTERS[self._curve.direction]
+        force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
         counted, contact_area = self._grid.areas(found.pressure > 0)
         gap = self._grid.opening(found)
         whole = "full_contact" if (found.pressure > 0).all() else "converged"
@@ -290,7 +290,7 @@ class SlidingRows(Rows):
             "approach": found.approach,
             "contact_area": contact_area,
             "contact_area_counted": counted,
-            "contact_fraction": self._profile.contact_fraction(contact_area),
+            "contact_fraction": contact_area / area,
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,

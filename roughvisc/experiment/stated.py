@@ -1,17 +1,12 @@
-"""Columns of a row that follow from a step: area and friction, and the errors of these and all others."""
+"""Stated errors of a step: of pressure, force, approach and contact area."""
 
 from __future__ import annotations
-
-import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.experiment.domain import Domain
-from roughvisc.mechanics.contact.neighbours import area_bounds, staircase
+from roughvisc.mechanics.contact.neighbours import area_bounds
 from roughvisc.mechanics.stepping import Scene, Step
-from roughvisc.mechanics.tangential import tangential_force
 
 Array = NDArray[np.float64]
 
@@ -26,115 +21,10 @@ AT_MOST = 3.0
 SOLVER_AT_EDGE = 3.0
 
 
-class Fields(NamedTuple):
-    """Fields of a step on the domain.
-
-    Attributes
-    ----------
-    contact : ndarray of bool, shape (nx, ny)
-        Cells in contact.
-    displacement : ndarray, shape (nx, ny)
-        Displacement of the body. [m]
-    gap : ndarray, shape (nx, ny)
-        Gap between the surfaces; zero in contact, any number at absent cells. [m]
-    """
-
-    contact: NDArray[np.bool_]
-    displacement: Array
-    gap: Array
-
-
-def fields_of(step: Step, scene: Scene) -> Fields:
-    """Return the fields of a step."""
-    contact = step.point.pressure > 0
-    displacement = scene.memory.present(step.point.history)[0]
-    gap = np.maximum(scene.gap + displacement - step.point.approach, 0.0)
-    gap[contact] = 0.0
-    return Fields(contact, displacement, gap)
-
-
-def staircase_area(contact: NDArray[np.bool_], scene: Scene, domain: Domain) -> float:
-    """Return the area by which counting cells is too large: a part of the perimeter's strip. [m2]
-
-    The perimeter is where contact ends although the material goes on. Where the material itself ends, at an absent
-    cell or at the border of a scan in free space, the edge of the contact is known, and the count exact. Under the
-    mirror boundary a cell's neighbour beyond the border is its own image, so there is no edge either.
-    """
-    free = ~contact if scene.present is None else scene.present & ~contact
-    goes_on = not domain.is_whole
-    periodic = scene.grid.boundary == "periodic"
-    return staircase(contact, free, scene.grid.cell_area, periodic, before=goes_on, beyond=goes_on)
-
-
-def uncertain_cells(step: Step, scene: Scene, fields: Fields) -> tuple[float, float]:
-    """Return the area in contact and the area out of it that the contact solver's error may put on the other side. [m2]
-
-    Cells whose pressure is below the error of the mean one, and cells whose gap such a pressure in them would close.
-    """
-    point, contact = step.point, fields.contact
-    if not contact.any() or not point.solver_error > 0:
-        return 0.0, 0.0
-    pressure = SOLVER_AT_EDGE * point.solver_error * float(point.pressure[contact].mean())
-    began = point.before[0] if point.before else scene.corners[step.segment]
-    closed = pressure * scene.grid.self_influence * scene.compliance(max(point.time - began, 0.0))
-    outside = ~contact & (fields.gap <= closed)
-    if scene.present is not None:
-        outside &= scene.present
-    inside = contact & (point.pressure <= pressure)
-    area = scene.grid.cell_area
-    return area * float(np.count_nonzero(inside)), area * float(np.count_nonzero(outside))
-
-
-def area_columns(step: Step, scene: Scene, fields: Fields, counted: float, area: float) -> dict[str, float]:
-    """Return the error of the contact area, by the cells that time steps and contact solver leave uncertain. [m2]
-
-    Parameters
-    ----------
-    step, scene, fields : Step, Scene, Fields
-        An accepted step.
-    counted, area : float
-        Contact area, counted and corrected for the grid. [m2]
-    """
-    (inside, outside), apart = uncertain_cells(step, scene, fields), step.difference
-    lower, upper = area_bounds(counted, area, apart.inside + inside, apart.outside + outside)
-    return {"contact_area_error": float(max(area - lower, upper - area))}
-
-
-def friction_columns(step: Step, scene: Scene, displacement: Array) -> dict[str, float]:
-    """Return distance and forces of a step; empty for a program without slides."""
-    if not scene.motions:
-        return {}
-    slide, point = scene.motions[step.segment], step.point
-    friction = tangential_force(scene.grid, point.pressure, displacement, slide)
-    return {
-        "sliding_distance": step.distance,
-        "friction_force": friction,
-        "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
-        "friction_force_across": tangential_force(scene.grid, point.pressure, displacement, slide, across=True),
-        "friction_force_error": step.difference.friction,
-    }
-
-
-def time_error(step: Step, largest: tuple[float, float]) -> float:
-    """Return the relative error of the time steps.
-
-    Parameters
-    ----------
-    step : Step
-        An accepted step.
-    largest : tuple of float
-        Largest force [N] and approach [m] of the kept rows so far.
-    """
-    force, approach = largest
-    apart = step.difference
-    by_force = max(apart.pressure, apart.force) / force if force > 0 else 0.0
-    return max(by_force, apart.approach / approach if approach > 0 else 0.0)
-
-
 def error_columns(
     step: Step, scene: Scene, series_error: float, largest: tuple[float, float], of_all: tuple[float, float]
 ) -> dict[str, float]:
-    """Return what is stated of the accuracy of a step.
+    """Return the stated errors of a step.
 
     Parameters
     ----------
@@ -145,47 +35,74 @@ def error_columns(
     largest, of_all : tuple of float
         Largest force [N] and approach [m] so far: of the kept rows, to which errors are relative, and of all steps.
 
+    Returns
+    -------
+    dict
+        ``time_error``, of the time steps alone, ``stated_error`` and ``residual``, relative; ``approach_error`` [m].
+
     Notes
     -----
     The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
     under a given load is of second order in that of the pressure: the duality gap over the load. The series' error is
     one of the largest values of all steps: what is left after unloading is a difference of such values.
     """
-    point, control = step.point, scene.program.segments[step.segment].control
-    given = scene.program.gives(step.segment)
+    point, apart, control = step.point, step.difference, scene.program.segments[step.segment].control
+    given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
     largest_force, largest_approach = largest
-    apart = step.difference
     of_force, of_approach = series_error * of_all[0], series_error * of_all[1]
-    remembers = not scene.memory.is_elastic
     unit = scene.tolerance if largest_force > 0 else 0.0
-    solved = _solver_error(step, scene, largest_force)
-    force = approach = 0.0
+    solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
+    time_error, pressure, force, approach = 0.0, solved, 0.0, 0.0
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + of_approach
         approach += INHERITED_APPROACH * unit * of_all[1] if remembers else 0.0
-    pressure = solved
+    relative = 0.0
     if largest_force > 0:
+        time_error = max(apart.pressure, apart.force) / largest_force
         pressure = (apart.pressure + solved * point.force + of_force) / largest_force
-    relative = max(
-        pressure,
-        force / largest_force if largest_force > 0 else 0.0,
-        approach / largest_approach if largest_approach > 0 else 0.0,
-    )
+        relative = force / largest_force
+    if largest_approach > 0:
+        time_error = max(time_error, apart.approach / largest_approach)
+        relative = max(relative, approach / largest_approach)
     return {
-        "stated_error": relative,
+        "time_error": time_error,
+        "stated_error": max(pressure, relative),
         "residual": point.solver_error,
         "approach_error": approach,
     }
 
 
-def _solver_error(step: Step, scene: Scene, largest_force: float) -> float:
-    """Return the relative error of the pressure by the contact solver, in this step and in those before."""
-    unit = scene.tolerance if largest_force > 0 else 0.0
-    if not scene.memory.is_elastic:
-        return step.point.solver_error + INHERITED * unit
-    return max(step.point.solver_error, LEAST * unit)
+def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float) -> float:
+    """Return the error of the contact area, by the cells that time steps and contact solver leave uncertain. [m2]
+
+    The solver's error may put a cell on the other side if its pressure is below the error of the mean one, or if such a
+    pressure in it would close its gap.
+
+    Parameters
+    ----------
+    step, scene : Step, Scene
+        An accepted step.
+    gap : ndarray, shape (nx, ny)
+        Gap between the surfaces. [m]
+    counted, area : float
+        Contact area, counted and corrected for the grid. [m2]
+    """
+    point, apart, contact = step.point, step.difference, step.point.pressure > 0
+    inside, outside = apart.inside, apart.outside
+    if contact.any() and point.solver_error > 0:
+        pressure = SOLVER_AT_EDGE * point.solver_error * float(point.pressure[contact].mean())
+        began = point.before[0] if point.before else scene.corners[step.segment]
+        closed = pressure * scene.grid.self_influence * scene.compliance(max(point.time - began, 0.0))
+        closing = ~contact & (gap <= closed)
+        if scene.present is not None:
+            closing &= scene.present
+        opening = contact & (point.pressure <= pressure)
+        inside += scene.grid.cell_area * float(np.count_nonzero(opening))
+        outside += scene.grid.cell_area * float(np.count_nonzero(closing))
+    lower, upper = area_bounds(counted, area, inside, outside)
+    return float(max(area - lower, upper - area))
 
 
 def meets_tolerance(step: Step, scene: Scene, stated: float) -> bool:

@@ -10,6 +10,7 @@ from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.models import zener
 from roughvisc.study.statement.starter import (
     CONTACT,
@@ -53,16 +54,16 @@ def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTA
     factor = max(few.shape) / MOST_PRESSED
     few = few if factor <= 1 else coarser(few, factor, "free")
     slope, profile = rms_slope(few), Profile(few, "absent")
-    grid, present = profile.operator(found.boundary), profile.present
+    grid, present = Grid(profile.gap.shape, profile.spacing, found.boundary), profile.present
     rubber = zener(SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY)
     early, late = (float(rubber.contact_compliance(time)) for time in (0.0, math.inf))
     share = slope / found.rms_slope if found.rms_slope > 0 else 1.0
 
     def touching(pressure: float, compliance: float) -> float:
-        load = share * pressure * profile.nominal_area * compliance / grid.cell_area
+        load = share * pressure * profile.area * compliance / grid.cell_area
         pressed = solve_contact(grid, profile.gap, load=load, tolerance=_TOLERANCE, present=present).pressure > 0
         beyond = staircase(pressed, present & ~pressed, grid.cell_area, found.boundary == "periodic")
-        return profile.contact_fraction(max(float(pressed.sum()) * grid.cell_area - beyond, 0.0))
+        return max(float(pressed.sum()) * grid.cell_area - beyond, 0.0) / profile.area
 
     guess = pressure = pressure_for(contact, 1 / late, found.rms_slope) or _ON_FLAT
     for _ in range(_PRESSES if found.rms_slope > 0 else 0):

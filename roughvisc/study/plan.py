@@ -26,9 +26,9 @@ from scipy.special import erf, erfinv
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Experiment, Problem
 from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
-from roughvisc.experiment.domain import Domain, enlarged_indenter, estimated, whole_domain
-from roughvisc.experiment.loading import Loading, enlargements
-from roughvisc.experiment.profile import Profile
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.profile import Domain, Profile, choose_domain, expected_contact
 from roughvisc.experiment.resources import (
     PART,
     PROCESS,
@@ -40,7 +40,7 @@ from roughvisc.experiment.resources import (
     memory_available,
     too_large,
 )
-from roughvisc.experiment.scene import check_program, domain_of, kept_times, memory_options, snap_to_cells
+from roughvisc.experiment.scene import check_program, memory_options
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
@@ -311,24 +311,19 @@ class _Setups:
         settings = problem.settings
         profile = Profile(height, settings.missing, body.kernel)
         if not isinstance(experiment, Loading):
-            domain = whole_domain(profile.gap, profile.spacing, body.kernel)
-            return Setup(problem, experiment, domain, area, slope, slope)
+            return Setup(problem, experiment, choose_domain(profile, body), area, slope, slope)
         program = experiment.program
         check_program(profile, body, program, settings)
-        times = enlargements(problem, program)
-        if times:
-            larger = enlarged_indenter(height, times)
-            assert larger is not None, "the number of enlargements is a possible one"
-            problem = replace(problem, height=larger)
-            profile = Profile(larger, settings.missing, body.kernel)
-        domain = domain_of(profile, body, program, settings, 0)
-        reaches_border = False
-        if settings.boundary == "free" and settings.edge == "error" and body.separates:
-            compliance = float(complete(body.material).contact_compliance(program.duration))
-            reaches_border = estimated(problem.height, body.kernel, compliance, program)[1]
+        expected = expected_contact(problem, program)
+        if expected.enlarged:
+            problem = replace(problem, height=expected.height)
+            profile = Profile(expected.height, settings.missing, body.kernel)
+        domain = choose_domain(profile, body, expected.approach)
         rows, columns = domain.cells
-        local = slope if domain.is_whole and not times else rms_slope(problem.height.isel(x=rows, y=columns))
-        return Setup(problem, experiment, domain, area, slope, local, reaches_border)
+        local = (
+            slope if domain.is_whole and not expected.enlarged else rms_slope(problem.height.isel(x=rows, y=columns))
+        )
+        return Setup(problem, experiment, domain, area, slope, local, expected.reaches_border)
 
     def choice(self, case: Case, program: Program) -> Choice:
         """Return the memory of a material, which may take a fit."""
@@ -489,7 +484,8 @@ def elastic_contact(problem: Problem, program: Program) -> float:
         ages = np.maximum(times[last] - middles[:last], 0.0)
         effective = max(effective, float(complete(material).contact_compliance(ages) @ changes[:last]))
     profile = Profile(problem.height, "absent", problem.body.kernel)
-    grid, found = profile.operator(problem.settings.boundary), 0.0  # type: ignore[arg-type]
+    boundary, found = problem.settings.boundary, 0.0
+    grid = Grid(profile.gap.shape, profile.spacing, boundary, kernel=profile.kernel)
     pushes: list[dict[str, Any]] = [{"load": effective / grid.cell_area}] if effective > 0 else []
     pushes += [{"approach": approach}] if approach > profile.least_gap else []
     for push in pushes:
@@ -650,7 +646,7 @@ def _planned(
         history = choice.memory
         cells = sum(one.slide.cells(spacing(whole)) for one in program.segments if one.slide is not None)
         steps, work = steps + cells, work + cells * run.slid_convolutions / max(run.slid_steps, 1.0)
-        kept = snap_to_cells(program, kept_times(program, settings.times), spacing(whole))
+        kept = kept_times(program, settings.times, spacing(whole))
         rows = run.rows * steps if kept is None else float(len(kept))
         kind, passes = "slide" if cells else "load", steps * (_PASSES + _MORE_PASSES * history.times.size)
         if any(one.control == "load" and one.end is not None for one in program.segments):

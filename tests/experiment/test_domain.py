@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment import domain
-from roughvisc.experiment.domain import choose_domain
-from roughvisc.mechanics.body import HALF_SPACE
+from roughvisc.experiment import profile as domain
+from roughvisc.experiment.profile import BEYOND, Profile, choose_domain
+from roughvisc.mechanics.body import body_of
 
 ZENER, TOLERANCE = rv.zener(1e6, 5e5, 1e5), 3e-3
 PRESS = rv.Program().load(2e-5, over=0.2).hold(0.5)
@@ -41,14 +41,14 @@ def test_domain__holds_every_cell_that_an_approach_can_touch():
     gap = np.hypot(*np.meshgrid(np.linspace(-1, 2, 130), np.linspace(-2, 1, 117), indexing="ij")) + 0.1 * rng.random(
         (130, 117)
     )
-    found = choose_domain(gap, (1.0, 1.2), HALF_SPACE, 0.3)
+    profile, body = Profile(rv.from_array(-gap, spacing=(1.0, 1.2))), body_of(ZENER)
+    gap = profile.gap
+    found = choose_domain(profile, body, 0.3)
     inside = np.zeros(gap.shape, bool)
     inside[found.cells] = True
     assert inside.mean() < 0.5
-    assert gap[~inside].min() == found.outside > 0.3
-    assert not found.is_outgrown(0.3)
-    assert found.is_outgrown(found.outside)
-    assert choose_domain(gap, (1.0, 1.2), HALF_SPACE, 10.0).is_whole
+    assert gap[~inside].min() == found.outside > BEYOND * 0.3
+    assert choose_domain(profile, body, 10.0).is_whole
 
 
 @pytest.mark.thorough

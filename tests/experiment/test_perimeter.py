@@ -32,7 +32,7 @@ def test_scan_pressed_as_a_punch__has_its_whole_area():
 
 def test_ball_on_a_part_of_the_surface__is_corrected_as_on_the_whole(monkeypatch):
     ball, program = rv.sphere(1.0, 12.0, (121, 120)), rv.Program().load(1.0, over=0)
-    monkeypatch.setattr("roughvisc.experiment.domain.WORTH_CROPPING", 10**9)
+    monkeypatch.setattr("roughvisc.experiment.profile.WORTH_CROPPING", 10**9)
     whole = rv.simulate(ball, UNIT, program, progress=False)
     monkeypatch.undo()
     followed = rv.simulate(ball, UNIT, program, progress=False)

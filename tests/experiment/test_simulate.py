@@ -7,8 +7,8 @@ from scipy import fft
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment import domain
-from roughvisc.experiment.scene import kept_times
+from roughvisc.experiment import profile as domain
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.mechanics import threads as threads_module
 from roughvisc.variables import FIELDS, VARIABLES
 

@@ -8,7 +8,7 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
-from roughvisc.experiment.scene import kept_times, snap_to_cells
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.statement.schema.keys import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words
@@ -84,7 +84,7 @@ def test_kept_times__come_to_whole_cells():
     asked = [1e-3, 2e-3, 2.1e-3, 2.55e-3, 2.56e-3, program.duration]
     cell = 0.01 / 24
     expected = [1e-3, 2e-3, 2e-3 + cell, program.duration]
-    np.testing.assert_allclose(snap_to_cells(program, asked, (SIDE / 24, 1.0)), expected, rtol=1e-12)
+    np.testing.assert_allclose(kept_times(program, asked, (SIDE / 24, 1.0)), expected, rtol=1e-12)
     ds = slid(program, times=asked)
     np.testing.assert_allclose(ds.time, expected, rtol=1e-12)
     np.testing.assert_allclose(ds.sliding_distance, [0, 0, SIDE / 24, SIDE], rtol=1e-12)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.experiment.scene import spread_times
+from roughvisc.experiment.kept_times import spread_times
 
 RADIUS, LOAD = 1e-3, 1e-4
 CELL = 2e-4 / 33

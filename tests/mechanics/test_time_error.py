@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.stated import error_columns, meets_tolerance, time_error
+from roughvisc.experiment.stated import error_columns, meets_tolerance
 from roughvisc.mechanics import stepping
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import Memory
@@ -104,7 +104,7 @@ def matrix():
 @pytest.mark.thorough
 def test_time_error__covers_the_true_one_and_not_by_far(matrix):
     true = np.concatenate([true_errors(*rows) for rows in matrix.values()])
-    said = np.array([time_error(*row) for _, found, _ in matrix.values() for row in found.values()])
+    said = np.array([stated(scene, row)["time_error"] for scene, found, _ in matrix.values() for row in found.values()])
     seen = true > 1e-3 * TOLERANCE
     assert np.count_nonzero(seen) > 150
     assert np.mean(said[seen] >= 0.8 * true[seen]) >= 0.97, np.sort(said[seen] / true[seen])[:10]

@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.scene import kept_times, snap_to_cells
 from roughvisc.labels import label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.progress import reporting
@@ -150,7 +150,7 @@ def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], deri
     if isinstance(experiment, Loading):  # all accepted steps differ from setting to setting
         program, times = experiment.program, settings.times or _FEW
         if program.slides:
-            times = snap_to_cells(program, kept_times(program, times), *cells) or ()
+            times = kept_times(program, times, *cells) or ()
         changes |= changed_keys(settings, replace(settings, times=times))
     return vary(case, changes)
 

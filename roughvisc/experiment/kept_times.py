@@ -1,0 +1,113 @@
+"""Times of the rows that a result keeps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.program import Program, instant
+
+Array = NDArray[np.float64]
+#: Times that differ by at most this many units in the last place are one: sums and logarithms of times err by a few.
+_ROUNDING = 64
+#: The first kept time of a hold lies no later than this part of it. [-]
+_FIRST = 1e-3
+#: Relative numbers of kept times of a ramp or a slide, a hold, and a period of a cycle.
+_RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
+
+
+def kept_times(
+    program: Program, times: int | Sequence[float] | None, *spacings: tuple[float, float]
+) -> tuple[float, ...] | None:
+    """Return the times to keep, ascending. [s]
+
+    Times within rounding of a corner of the program become the corner. In a slide they become the nearest time after a
+    whole number of cells.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    times : int, sequence of float or None
+        A count, see :func:`spread_times`; a list; None for every accepted step.
+    *spacings : tuple of float
+        Cell sides of each grid that slides. [m]
+
+    Raises
+    ------
+    InputError
+        If a time lies outside the program.
+    """
+    if times is None:
+        return None
+    corners, duration = np.array(program.corners), program.duration
+    kept: list[float] = []
+    for value in spread_times(program, times) if isinstance(times, int) else np.unique(np.asarray(times, dtype=float)):
+        nearest = float(corners[np.argmin(np.abs(corners - value))])
+        snapped = nearest if abs(nearest - value) <= _ROUNDING * math.ulp(nearest) else float(value)
+        if not 0 <= snapped <= duration:
+            raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
+        if not kept or snapped - kept[-1] > _ROUNDING * math.ulp(snapped):
+            kept.append(snapped)
+    if not (spacings and program.slides):
+        return tuple(kept)
+    found = np.array(kept)
+    for segment, began, end in zip(program.segments, program.corners, program.corners[1:], strict=False):
+        if segment.slide is not None:
+            cells = math.gcd(*map(segment.slide.cells, spacings))
+            for place in np.flatnonzero((found > began) & (found < end)):
+                taken = round((found[place] - began) / (end - began) * cells)
+                found[place] = instant(began, end, taken, cells)
+    return tuple(np.unique(found).tolist())
+
+
+def spread_times(program: Program, count: int) -> Array:
+    """Return as many times as requested, where the result changes most.
+
+    Parameters
+    ----------
+    program : Program
+        The loading program.
+    count : int
+        Number of times. If the program has more corners, some of them, evenly, the end of the program among them.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Ascending; fewer than `count` if the program has no duration. [s]
+
+    Notes
+    -----
+    Kept are all corners of the program, and between them in proportion two times in a ramp or a slide, three in a hold
+    and sixteen in a period of a cycle. In a hold they lie evenly in the logarithm of the time since its start, from a
+    third of the segment before it or a thousandth of its own length, whichever is less; elsewhere evenly in time.
+    """
+    corners = np.unique(program.corners)
+    further = count - len(corners)
+    if further <= 0:
+        return corners[np.linspace(len(corners) - 1, 0, count).round().astype(int)[::-1]]
+    weights = np.zeros(len(program.segments))
+    for number, segment in enumerate(program.segments):
+        if segment.duration > 0:
+            periods = segment.duration / segment.period if segment.amplitude else 0.0
+            weights[number] = _PERIOD * periods if periods else _HOLD if segment.holds else _RAMP
+    if not weights.any():
+        return corners
+    exact = weights * further / weights.sum()
+    numbers = np.floor(exact).astype(int)
+    largest_remainders = np.argsort(numbers - exact, kind="stable")[: further - int(numbers.sum())]
+    numbers[largest_remainders] += 1
+
+    found, before = [corners], math.inf
+    for began, segment, number in zip(program.corners, program.segments, numbers, strict=False):
+        if segment.duration > 0:
+            parts = np.arange(1, number + 1) / (number + 1)
+            if segment.holds and number:
+                parts = min(_FIRST, before / (3 * segment.duration)) ** (1 - parts)
+            found.append(began + parts * segment.duration)
+            before = segment.duration
+    return np.unique(np.concatenate(found))
