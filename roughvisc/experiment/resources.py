@@ -113,7 +113,7 @@ _TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
 #: Solutions at the peak, a pressure and its displacement each, and copies of each exponential: without memory; of a
 #: pair of steps with its coarse solution and first guesses; of a pair of soft steps, with the ends of its steps and
 #: the exponentials one step ago.
-_ELASTIC, _PAIR, _SOFT_PAIR = (4, 0), (9, 6), (11, 10)
+_ELASTIC, _PAIR, _SOFT_PAIR = (4, 0), (5, 4), (7, 9)
 #: Fields of an exponential if each wave has its own compliances: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
 #: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
