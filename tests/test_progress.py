@@ -2,20 +2,18 @@
 
 import io
 
-import numpy as np
 import pytest
 from rich.console import Console
 
 import roughvisc as rv
 from roughvisc import progress
-from roughvisc.progress import Bar
+from roughvisc.progress import Bars, reporting
 
 
 @pytest.fixture
 def shown(monkeypatch):
-    """A console on a terminal or not, and what is written to it; everything is shown at once."""
+    """A console on a terminal or not, and what is written to it; every line is written."""
     monkeypatch.setattr(progress, "LINE_EVERY", 0.0)
-    monkeypatch.setattr(progress, "PICTURE_EVERY", 0.0)
 
     def on(terminal, **settings):
         return Console(file=io.StringIO(), force_terminal=terminal, width=100, **settings)
@@ -25,56 +23,59 @@ def shown(monkeypatch):
 
 def test_bar__is_drawn_on_a_terminal_and_vanishes(shown):
     console = shown(True)
-    with Bar(console, "a [strange] name") as bar:
-        bar.reached(0.25, 2.0)
+    with reporting(True, "a [strange] name", console) as report:
+        report(0.25, 2.0)
         drawn = console.file.getvalue()
+        report(0.5, 2.0)
+    drawn = console.file.getvalue()
     assert "a [strange] name " in drawn
-    assert "━" in drawn
-    assert "t = 0.25 of 2 s, about 0 s left, 0 s so far" in drawn
-    assert console.file.getvalue().endswith("\x1b[2K"), "the last line is cleared"
+    assert "t = 0.5 of 2 s" in drawn
+    assert drawn.endswith("\x1b[2K"), "the last line is cleared"
 
 
 def test_bar__is_lines_elsewhere(shown, monkeypatch):
     console = shown(False)
-    with Bar(console, "pressing", lambda now, end: f"{now / end:.0%}") as bar:
-        bar.reached(0.0, 0.0)
-        bar.reached(0.5, 2.0)
+    with reporting(True, "pressing", console, lambda now, end: f"{now / end:.0%}") as report:
+        report(0.0, 0.0)
+        report(0.5, 2.0)
         monkeypatch.setattr(progress, "LINE_EVERY", 100.0)
-        bar.reached(0.6, 2.0)
-    assert console.file.getvalue().splitlines() == [
-        "pressing: starting, 0 s so far",
-        "pressing: 25%, about 0 s left, 0 s so far",
+        report(0.6, 2.0)
+    first, second = console.file.getvalue().splitlines()
+    assert first == "pressing: starting, 0 s so far"
+    assert second.startswith("pressing: 25%")
+
+
+def test_measurements_in_turn__have_one_bar_and_a_line_each(shown):
+    lines, bars = shown(False), shown(True)
+    for console in (lines, bars):
+        with reporting(True, "", console) as report:
+            for label in ("coarse", "fine"):
+                report(label, 0.0, 0.0)
+                report(label, 1.0, 2.0)
+    assert [line for line in lines.file.getvalue().splitlines() if line.startswith("measuring")] == [
+        "measuring coarse",
+        "measuring fine",
     ]
+    assert "coarse" not in bars.file.getvalue().rpartition("fine")[2]
 
 
-PACES = {  # position after some seconds, and the factor by which the remaining time may be wrong
-    "steady": (lambda spent: spent, 1.01),
-    "growing steps": (lambda spent: spent**2, 1.05),
-    "steps that grow with time": (lambda spent: 1e-3 * np.expm1(spent / 8), 1.1),
-    "slowing down": (lambda spent: spent**0.5, 2.1),
-    "resumed": (lambda spent: 300 + spent, 1.02),
-}
-
-
-@pytest.mark.parametrize("pace", PACES)
-def test_time_left__follows_the_pace(pace, shown, monkeypatch):
-    reached, factor = PACES[pace]
-    now = [1000.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    with Bar(shown(False), "creep") as bar:
-        for spent in np.arange(0.25, 50.1, 0.25):
+@pytest.mark.parametrize("pace", ["steady", "resumed"])
+def test_time_left__follows_the_pace(pace, shown):
+    console, now, start = shown(False), [1000.0], {"steady": 0.0, "resumed": 300.0}[pace]
+    with Bars(console) as bars:
+        bars._progress.get_time = lambda: now[0]
+        for spent in range(51):
             now[0] = 1000.0 + spent
-            bar.reached(reached(spent), reached(100.0))
-        left = bar._pace.left(reached(50.0), reached(100.0))
-        assert f", about {progress.clock(left)} left" in bar._line()
-    assert 1 / factor < left / 50 < factor
+            bars.reached("creep", start + spent, start + 100.0, "half")
+        bars.line("creep")
+    assert console.file.getvalue() == "creep: half, about 50 s left, 50 s so far\n"
 
 
 def test_quiet__shows_nothing(shown):
     for terminal in (False, True):
         console = shown(terminal, quiet=True)
-        with Bar(console, "pressing") as bar:
-            bar.reached(0.5, 2.0)
+        with reporting(True, "pressing", console) as report:
+            report(0.5, 2.0)
         assert console.file.getvalue() == ""
 
 

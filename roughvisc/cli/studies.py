@@ -124,7 +124,7 @@ def _run_one(
     chosen: bool = False,
 ) -> str:
     """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
-    from roughvisc.progress import Bar
+    from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
@@ -140,8 +140,8 @@ def _run_one(
     else:
         require_writable(folder, "since the case is not finished")
     end_if_interrupted()
-    with Bar(console, label, case.at) as bar:
-        path = run_case(case, folder, progress=bar.reached, threads=threads or threads_each(1))
+    with reporting(True, label, console, case.at) as report:
+        path = run_case(case, folder, progress=report, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
     with open_result(path) as dataset:
         console.print(result_table(dataset))

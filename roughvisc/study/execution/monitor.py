@@ -14,8 +14,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from roughvisc.errors import ON_SCREEN, printable, shortened
-from roughvisc.progress import Display, Pace, Row, clock
+from roughvisc.errors import printable
+from roughvisc.progress import Bars, clock
 from roughvisc.study.execution.task import IN_WORDS, Outcome
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.failures import forget_failure, record_failure
@@ -28,7 +28,7 @@ log = logging.getLogger("roughvisc")
 
 #: Seconds between two savings of the index while a sweep runs.
 _SAVE_EVERY = 60.0
-#: Running cases that are shown, and messages of cases that ended badly.
+#: Most messages on cases that ended badly.
 _SHOWN = 8
 
 
@@ -54,7 +54,7 @@ class Monitor:
 
     def message(self, text: str) -> None:
         """Something the user should know at once."""
-        print(shortened(f"roughvisc: {printable(text)}", ON_SCREEN), file=sys.stderr)
+        print(f"roughvisc: {printable(text)}", file=sys.stderr)
 
     def stopping(self) -> None:
         """The sweep is interrupted and waits for the running cases to stop."""
@@ -64,14 +64,14 @@ class Monitor:
 
 
 class LiveMonitor(Monitor):
-    """Cases done, running and failed, and the time left.
+    """A bar for the sweep and one for each running case; lines on cases that end badly.
 
     Parameters
     ----------
     console : rich.console.Console or None
-        Where to, None for the standard error; without a terminal plain lines are written every few seconds.
+        Default: the standard error. Without a terminal it has a line every few seconds.
     summary : bool
-        Whether a line says in the end how many cases are done.
+        Whether a last line states how many cases are done.
     """
 
     def __init__(self, console: Console | None, summary: bool = True) -> None:
@@ -79,12 +79,10 @@ class LiveMonitor(Monitor):
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
         self._at: dict[str, Callable[[float, float], str]] = {}
-        self._running: dict[str, tuple[float, float]] = {}
-        self._paces: dict[str, Pace] = {}
+        self._running: dict[str, float] = {}  # fraction of the program that is computed
         self._ended: dict[str, Outcome] = {}
         self._began = time.monotonic()
-        self._display = Display(console, self._rows, self._summary, below=True)
-        self._stopping = False
+        self._bars = Bars(console)
         self._complaints = 0
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
@@ -93,76 +91,59 @@ class LiveMonitor(Monitor):
         self._names = {case.key: _name(case, numbers[case.key]) for case in reversed(cases)}
         self._began = time.monotonic()
         if link:
-            self._display.say(f"Dashboard: {link}")
-        self._display.start()
+            self._bars.say(f"Dashboard: {link}")
+        self._bars.__enter__()
+        self._show()
 
     def reached(self, key: str, now: float, end: float) -> None:
         with self._lock:
-            if key not in self._ended:
-                self._running[key] = (now, end)
-                self._paces.setdefault(key, Pace()).reached(now)
+            if key in self._ended:
+                return
+            self._running[key] = now / end if end else 0.0
+            self._bars.reached(self._names[key], now, end, self._at[key](now, end) if end else "")
+        self._show()
 
     def ended(self, outcome: Outcome) -> None:
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
-            self._paces.pop(outcome.key, None)
+            self._bars.close(self._names[outcome.key])
+        self._show()
         if outcome.kind in ("failed", "hindered", "held", "unconverged") and not outcome.reused:
             self._complaints += 1
             if self._complaints <= _SHOWN:
-                self._display.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
-            else:
-                self._display.say("further cases that end so are counted here, and named in the log")
+                self._bars.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+            elif self._complaints == _SHOWN + 1:
+                self._bars.say("further cases that end so are counted here, and named in the log")
 
     def tick(self) -> None:
-        self._display.tick()
+        self._bars.line("cases")
 
     def message(self, text: str) -> None:
-        self._display.say(text)
+        self._bars.say(text)
 
     def stopping(self) -> None:
-        self._stopping = True
-        self._display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
+        self._bars.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
 
     def close(self) -> None:
-        self._display.stop()
+        self._bars.__exit__()
         if self._names and self._sums_up:
-            self._display.say(self._summary())
+            self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
+
+    def _show(self) -> None:
+        """Move the bar of the sweep."""
+        with self._lock:
+            done = sum(self._running.values()) + len(self._ended)
+        self._bars.reached("cases", done, len(self._names), self._summary())
 
     def _summary(self) -> str:
         with self._lock:
             kinds = [outcome.kind for outcome in self._ended.values()]
-            fresh = sum(not outcome.reused for outcome in self._ended.values())
-            running = dict(self._running)
-            worked = fresh + sum(self._worked(key) for key in running)
-        total, elapsed = len(self._names), time.monotonic() - self._began
-        parts = [f"{kinds.count('done')} of {total} cases done"]
+            running = len(self._running)
+        parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
         for kind in ("unconverged", "failed", "hindered", "held"):
             parts += [f"{kinds.count(kind)} {IN_WORDS[kind]}"] if kind in kinds else []
-        if running:
-            parts.append(f"{len(running)} running")
-        if worked and len(kinds) < total:
-            parts.append(f"about {clock(elapsed * (total - len(kinds) + fresh - worked) / worked)} left")
-        parts.append(f"{clock(elapsed)} so far" if len(kinds) < total else f"in {clock(elapsed)}")
-        return ", ".join(parts)
-
-    def _worked(self, key: str) -> float:
-        """Estimated fraction of the work of a running case that is complete."""
-        (now, end), pace = self._running[key], self._paces[key]
-        if not 0 < now < end:
-            return float(0 < end <= now)
-        spent = pace.spent
-        return spent / (spent + pace.left(now, end)) if spent else now / end
-
-    def _rows(self) -> list[Row]:
-        with self._lock:
-            running, ended = dict(self._running), len(self._ended)
-        rows = [("stopping" if self._stopping else "cases", ended, len(self._names), "")]
-        for key, (now, end) in list(running.items())[:_SHOWN]:
-            at = self._at[key](now, end) if end and key in self._at else "starting"
-            rows.append((self._names.get(key, key), now, end, at))
-        more = len(running) - _SHOWN
-        return [*rows, (f"and {more} more", 0.0, None, "")] if more > 0 else rows
+        return ", ".join([*parts, *([f"{running} running"] if running else [])])
 
 
 def _name(case: Case, number: int) -> str:

@@ -271,7 +271,6 @@ def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
     stream = io.StringIO()
     watch = LiveMonitor(Console(file=stream, force_terminal=terminal, width=160))
     monkeypatch.setattr("roughvisc.progress.LINE_EVERY", 0.0)
-    monkeypatch.setattr("roughvisc.progress.PICTURE_EVERY", 0.0)
     watch.begin(cases, "http://127.0.0.1:8787/status")
     watch.ended(outcome(cases[0].key))
     watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))
