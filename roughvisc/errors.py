@@ -1,18 +1,10 @@
-"""What can go wrong, as exceptions with one readable message each.
+"""Exceptions with one readable message each, and text that a terminal can show.
 
-Every error that roughvisc raises on purpose is a :class:`RoughviscError`; the command line prints its message
-without a traceback.
+The command line prints the message of a :class:`RoughviscError` without a traceback.
 """
 
 import unicodedata
 from typing import Self
-
-#: Characters of one message on the screen, at most.
-ON_SCREEN = 600
-#: The longest line of a message.
-_LONGEST = 1000
-#: No part of a line is cut below this.
-_SHORTEST = 40
 
 
 class RoughviscError(Exception):
@@ -98,80 +90,16 @@ class ConvergenceError(RoughviscError, RuntimeError):
 
 
 def printable(text: str) -> str:
-    """A text as a terminal can show it: what would steer the terminal is spelt out, and a long line is cut.
+    """Return a text with control characters spelt out, so that it cannot steer a terminal.
 
     Examples
     --------
     >>> printable("red \\x1b[31m")
     'red \\\\x1b[31m'
     """
-    return "\n".join(_cut("".join(map(_spelt, line))) for line in text.split("\n"))
-
-
-def _spelt(sign: str) -> str:
-    return sign.encode("unicode_escape").decode() if unicodedata.category(sign) in ("Cc", "Cf", "Cs") else sign
-
-
-def _cut(line: str) -> str:
-    if len(line) <= _LONGEST:
-        return line
-    half = _LONGEST // 2
-    return f"{line[:half]} ... ({len(line) - 2 * half} characters left out) ... {line[-half:]}"
-
-
-def shortened(message: str, longest: int, elsewhere: str = "") -> str:
-    """A message of so many characters at most: its first lines, and how many more there are.
-
-    Of a long line the middle of its longest parts goes, so that file, key, what was found and what was expected stay.
-
-    Parameters
-    ----------
-    message : str
-        One problem a line, below a first line that counts them; or a single line.
-    longest : int
-        Characters that are left, 150 at least.
-    elsewhere : str
-        File that holds the whole message, if there is one.
-
-    Examples
-    --------
-    >>> problems = "\\n".join(f"  key_{number}: unknown" for number in range(9))
-    >>> print(shortened(f"s.toml: 9 problems\\n{problems}", 150, "sweep.log"))
-    s.toml: 9 problems
-      key_0: unknown
-      key_1: unknown
-      key_2: unknown
-      key_3: unknown
-      key_4: unknown
-      and 4 more; all of it is in sweep.log
-    """
-    if len(message) <= longest:
-        return message
-    where = f"all of it is in {_inner(elsewhere, longest // 2)}" if elsewhere else ""
-    lines = message.split("\n")
-    first = min(2, len(lines))
-    for kept in range(min(len(lines), longest), first - 1, -1):
-        more = f"and {len(lines) - kept} more" if kept < len(lines) else ""
-        last = [f"  {'; '.join(filter(None, (more, where)))}"] if more or where else []
-        left = longest - sum(len(one) + 1 for one in last)
-        if sum(map(len, lines[:kept])) + kept - 1 <= left:
-            return "\n".join([*lines[:kept], *last])
-    head = _line_of(lines[0], left if first == 1 else left // 2)
-    return "\n".join([head, *(_line_of(one, left - len(head) - 1) for one in lines[1:first]), *last])
-
-
-def _line_of(line: str, longest: int) -> str:
-    """A line whose longest parts, between its colons, lack their middle."""
-    parts = line.split(": ")
-    for most in range(longest, _SHORTEST, -1):
-        if sum(min(len(part), most) for part in parts) + 2 * (len(parts) - 1) <= longest:
-            return ": ".join(_inner(part, most) for part in parts)
-    return _inner(line, longest)
-
-
-def _inner(text: str, longest: int) -> str:
-    """A text without its middle where it is too long."""
-    if len(text) <= longest:
-        return text
-    half = (longest - 5) // 2
-    return f"{text[:half]} ... {text[-half:]}"
+    return "".join(
+        sign.encode("unicode_escape").decode()
+        if sign != "\n" and unicodedata.category(sign) in ("Cc", "Cf", "Cs")
+        else sign
+        for sign in text
+    )

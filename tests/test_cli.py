@@ -1,6 +1,7 @@
 """The command line: what it writes, what it says, and how it ends."""
 
 import io
+import os
 import subprocess
 import sys
 import tomllib
@@ -246,9 +247,9 @@ def test_new__refuses_to_write_over_and_names_its_options(invoke, tmp_path, scan
     for arguments, words in (
         ([scan_file, "-o", "mine.toml"], "mine.toml"),
         ([scan_file, "-o", "mine.txt"], ".toml"),
-        ([scan_file, "--channel", "7"], "--channel"),
-        ([scan_file, "--contact", "5 um"], "--contact: found '5 um'"),
-        ([scan_file, "--contact", "120 %"], "--contact: found '120 %'"),
+        ([scan_file, "--channel", "7"], "channel: found 7"),
+        ([scan_file, "--contact", "5 um"], "contact: found '5 um'"),
+        ([scan_file, "--contact", "120 %"], "contact: found '120 %'"),
     ):
         status, _, err = invoke("new", *arguments)
         assert (status, words in err) == (2, True)
@@ -284,9 +285,9 @@ def test_scan__bad_input_is_status_2(invoke, tmp_path, scan_file):
     for arguments, words in (
         (["gone.sur"], "gone.sur"),
         ([scan_file, "--plot", "x.docx"], "x.docx"),
-        ([scan_file, "--spacing", "2 N"], "--spacing"),
-        ([scan_file, "--spacing", "1,2,3"], "--spacing"),
-        ([scan_file, "--channel", "7"], "channel"),
+        ([scan_file, "--spacing", "2 N"], "spacing: found '2 N'"),
+        ([scan_file, "--spacing", "1,2,3"], "spacing"),
+        ([scan_file, "--channel", "7"], "channel: found 7"),
     ):
         status, _, err = invoke("scan", *arguments)
         assert (status, words in err) == (2, True)
@@ -303,7 +304,7 @@ def test_scan__converts(invoke, tmp_path, scan_file, suffix):
 
 def test_scan__writes_a_card(invoke, tmp_path, scan_file):
     assert invoke("scan", scan_file, "--card", "cards/mine.toml")[0] == 0
-    expected = rv.open_scan(scan_file)
+    expected = rv.fill(rv.level(rv.open_scan(scan_file), 1), "harmonic")  # as scan recommends
     np.testing.assert_array_equal(rv.open_scan(tmp_path / "cards" / "mine.toml"), expected)
     assert invoke("scan", scan_file, "--card")[0] == 0
     card = tmp_path / "tilted.toml"
@@ -323,22 +324,42 @@ def test_scan__lists_channels_and_asks_for_what_a_file_does_not_state(invoke, tm
     for words in ("layer 0", "layer 1", "30 x 20 points", "Sa, ", "Ssk, ", "Sdr, "):
         assert words in out
     np.save(tmp_path / "plain.npy", z[0])
-    for given, missing in (([], "--unit"), (["--spacing", "1um"], "--unit"), (["--unit", "m"], "--spacing")):
+    for given, missing in (([], "unit"), (["--spacing", "1um"], "unit"), (["--unit", "m"], "spacing")):
         status, _, err = invoke("scan", "plain.npy", *given)
-        assert (status, missing in err) == (2, True)
+        assert (status, f"expected {missing}" in err) == (2, True)
     assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
     assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals of POSIX")
+def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers(tmp_path):
+    np.save(tmp_path / "plain.npy", np.random.default_rng(0).normal(size=(20, 30)))
+    command = [sys.executable, "-m", "roughvisc", "new", "plain.npy"]
+    person, terminal = os.openpty()
+    process = subprocess.Popen(command, cwd=tmp_path, stdin=terminal, stderr=terminal, stdout=subprocess.PIPE)
+    os.write(person, b"um\n1 um\n")
+    assert process.wait(100) == 0
+    process.stdout.close()
+    asked = os.read(person, 4096).decode()
+    os.close(person)
+    os.close(terminal)
+    assert asked.count("plain.npy: ") == 2
+    (case,) = read_cases(tmp_path / "plain-study.toml")
+    assert float(case.settings.surface.raw().x[0]) == 5e-7
+    (tmp_path / "plain-study.toml").unlink()
+    alone = subprocess.run(command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert (alone.returncode, "expected unit" in alone.stderr) == (2, True)
 
 
 def test_scan__takes_a_unit_of_heights(invoke, tmp_path):
     x, y = np.meshgrid(np.arange(17), np.arange(21), indexing="ij")
     z = 0.5 * np.sin(x) * np.sin(y)
     np.savetxt(tmp_path / "points.xyz", np.column_stack([1e-3 * x.ravel(), 1e-3 * y.ravel(), z.ravel()]))
-    assert invoke("scan", "points.xyz", "--unit", "mm,um", "--card")[0] == 0
-    height = rv.open_scan(tmp_path / "points.toml")
+    assert invoke("scan", "points.xyz", "--unit", "mm", "--height-unit", "um", "--to", "points.nc")[0] == 0
+    height = rv.open_scan(tmp_path / "points.nc")
     np.testing.assert_allclose(height, 1e-6 * z, atol=1e-15)
     np.testing.assert_allclose(height.x, (np.arange(17) + 0.5) * 1e-6)
-    assert invoke("scan", "points.xyz", "--unit", "mm,parsec per")[0] == 2
+    assert invoke("scan", "points.xyz", "--unit", "mm", "--height-unit", "parsec per")[0] == 2
 
 
 def test_scan__refuses_to_write_over_the_scan_or_in_another_format(invoke, tmp_path, scan_file):
@@ -373,6 +394,27 @@ def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures):
     assert invoke("plot", "empty")[0] == 2
     status, _, err = invoke("plot", "gone.nc")
     assert (status, err) == (2, "roughvisc: gone.nc: does not exist: expected a result of roughvisc (.nc)\n")
+
+
+def test_table__of_a_result_and_of_a_folder(invoke, tmp_path):
+    assert invoke("run", write_study(), "--out", "out", "--no-plots", "-q")[0] == 0
+    (path,) = (tmp_path / "out").glob("*.nc")
+    assert invoke("table", path) == (0, f"Table: out/{path.stem}.csv\n", "")
+    heading, *rows = path.with_suffix(".csv").read_text().splitlines()
+    assert heading.startswith("time [s],")
+    assert [float(row.split(",")[0]) for row in rows] == [0.0, 0.1, 0.2]
+    assert invoke("table", path.parent, "--out", "cases.csv") == (0, "Table: cases.csv\n", "")
+    heading, row = (tmp_path / "cases.csv").read_text().splitlines()
+    assert "contact_area [m^2]" in heading
+    assert path.name in row
+    assert invoke("table", "gone")[0] == 2
+
+
+def test_help__fits_a_terminal(invoke):
+    lines = invoke("--help")[1].splitlines()
+    assert len(lines) < 24
+    assert max(map(len, lines)) <= 80
+    assert "    roughvisc new" in lines
 
 
 def test_help__has_an_example_for_every_command(invoke):

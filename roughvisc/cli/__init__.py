@@ -1,21 +1,17 @@
 """The command line of roughvisc.
 
-Commands: ``scan | new | plan | run | trade | budget | plot | report | audit | verify | clean``.
+Commands: ``new | scan | plan | run | plot | report | table | audit | trade | budget | verify | clean``.
 
-Exit status: 0 all done, 1 a case failed, did not converge or is held by another run, 2 the input is wrong, 130
-interrupted, 143 terminated. Heavy imports are made inside the commands, so that ``--help`` is quick.
+Exit status: 0 all done, 1 a case failed, did not converge or is in use by another run, 2 the input is wrong, 130
+interrupted, 143 terminated. Heavy imports are inside the commands, so that ``--help`` is quick.
 """
 
-from roughvisc.cli.interrupts import ending_at_once
-
-with ending_at_once():
-    from roughvisc.cli.costs import budget, plan, trade
-    from roughvisc.cli.group import main
-    from roughvisc.cli.results import audit, clean, plot, report, verify
-    from roughvisc.cli.scans import new, scan
-    from roughvisc.cli.studies import run
+from roughvisc.cli.group import main
+from roughvisc.cli.results import audit, clean, plot, report, table, verify
+from roughvisc.cli.scans import new, scan
+from roughvisc.cli.studies import budget, plan, run, trade
 
 __all__ = ["main"]
 
-for _command in (run, plan, trade, budget, scan, new, plot, report, audit, verify, clean):
+for _command in (new, scan, plan, run, plot, report, table, audit, trade, budget, verify, clean):
     main.add_command(_command)

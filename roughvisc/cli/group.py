@@ -1,4 +1,4 @@
-"""The group of commands, what they put out, and how they fail: one message and an exit status."""
+"""The group of commands, their output, and their failures: one message and an exit status."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import errno
 import io
 import logging
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,21 +16,28 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.interrupts import INTERRUPTED, Terminated, ending_at_once, terminable
-from roughvisc.cli.reading import naming_keys, naming_options
-from roughvisc.errors import ON_SCREEN, InputError, RoughviscError, printable, shortened
+from roughvisc.errors import InputError, RoughviscError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 #: Type of an argument or option that names a file or a folder.
 PATH = click.Path(path_type=Path)
-#: Commands that take options for what a scan file does not state; the others take a study, which has keys for it.
-_READING = ("scan", "new")
 
 
-#: Where the context of a command says which folder its results are in.
-_RESULTS = "roughvisc.results"
+class Quantity(click.ParamType):
+    """A number in SI, or text with a unit, which the functions of the package check."""
+
+    name = "value"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            return float(value)
+        except ValueError:
+            return value
+
+
+QUANTITY = Quantity()
 
 
 class Failure(click.ClickException):
@@ -37,112 +46,100 @@ class Failure(click.ClickException):
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
         self.exit_code = status
-        self._results = _results_folder()  # the context is gone when it is shown
 
     def show(self, file: Any = None) -> None:
-        _complain(self.message, self._results)
+        complain(self.message)
 
 
 def complain(message: str) -> None:
-    """One message on the standard error stream; all of a long one is in the log of the results, if there is one."""
-    _complain(message, _results_folder())
-
-
-def _complain(message: str, results: Path | None) -> None:
-    text = f"roughvisc: {printable(message)}"
-    log = None
-    if len(text) > ON_SCREEN and results is not None:
-        from roughvisc.study.storage.failures import append
-
-        log = append(results, message)
-    click.echo(shortened(text, ON_SCREEN, str(log or "")), err=True)
-
-
-def complain_of_all(messages: Sequence[str], log: Path) -> None:
-    """Several messages that a log has whole; together they are not longer than one may be."""
-    text = "\n".join(f"roughvisc: {' '.join(printable(one).split())}" for one in messages)
-    if text:
-        click.echo(shortened(text, ON_SCREEN, str(log) if log.exists() else ""), err=True)
-
-
-def keep_long_messages(results: Path) -> None:
-    """Have what is too long for the screen written to the log of a folder of results, where that is there."""
-    click.get_current_context().meta[_RESULTS] = results
-
-
-def _results_folder() -> Path | None:
-    context = click.get_current_context(silent=True)
-    return context.meta.get(_RESULTS) if context else None
+    """Write one message to the standard error stream."""
+    click.echo(f"roughvisc: {printable(message)}", err=True)
 
 
 def counted(count: int, what: str) -> str:
-    """A count of things, in words."""
+    """Return a count of things in words."""
     return f"{count} {what}" + ("" if count == 1 else "s")
 
 
-def say(console: Console, what: str, path: Path, *, before: str = "") -> None:
-    """A path, or a command on one, on one line of its own, so that it can be copied or cut out by a program."""
+def say(console: Console, line: str) -> None:
+    """Write one line, unwrapped, so that it can be copied or cut out by a program."""
+    console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
+
+
+def say_path(console: Console, what: str, path: Path) -> None:
+    """Write a line with a path, relative to this folder if it is below it."""
     shown = os.path.relpath(path)
-    line = printable(f"{what}: {before}{path if shown.startswith('..') else shown}")
-    console.print(line, soft_wrap=True, highlight=False, markup=False)
+    say(console, f"{what}: {path if shown.startswith('..') else shown}")
 
 
 def say_figures(console: Console, written: Sequence[Path]) -> None:
-    """How many figures were written and the folder that they are in; the file itself of a single one."""
+    """Write the path of a figure, or the number of figures and their folder."""
     what, path = ("Figure", written[0]) if len(written) == 1 else (f"{len(written)} figures", written[0].parent)
-    say(console, what, path)
+    say_path(console, what, path)
 
 
 class _Screen(logging.Handler):
-    """Warnings of roughvisc that no log takes, each once."""
+    """Warnings of roughvisc, each once."""
 
-    def __init__(self, otherwise: logging.Handler | None) -> None:
+    def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._otherwise = otherwise
-        self._said: set[str] = set()
+        self._written: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
         message = record.getMessage()
-        if record.name != "roughvisc":
-            if self._otherwise is not None:
-                self._otherwise.handle(record)
-        elif message not in self._said:
-            self._said.add(message)
-            complain(naming_keys(message))
+        if record.name == "roughvisc" and message not in self._written:
+            self._written.add(message)
+            complain(message)
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, which batch systems send some time before they kill."""
+
+
+def _terminate(number: int, _: Any) -> None:
+    signal.signal(number, signal.SIG_IGN)  # another one would interrupt the writing of the checkpoint
+    raise Terminated
 
 
 @contextmanager
-def warnings_on_screen() -> Iterator[None]:
-    """Have warnings that are logged look like all other messages, where nobody has set up logging."""
-    before = logging.lastResort
-    logging.lastResort = _Screen(before)
+def _settings_of_process() -> Iterator[None]:
+    """Show logged warnings as messages, and have SIGTERM act as an interrupt; both only if nothing else is set up."""
+    otherwise = logging.lastResort
+    logging.lastResort = _Screen()
+    main_thread = threading.current_thread() is threading.main_thread()
+    usual = main_thread and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    if usual:
+        signal.signal(signal.SIGTERM, _terminate)
     try:
         yield
     finally:
-        logging.lastResort = before
+        logging.lastResort = otherwise
+        if usual:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 class Commands(click.Group):
-    """Errors made on purpose end in one message and an exit status, never in a traceback."""
+    """Commands whose known errors end in one message and an exit status, never in a traceback."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(self.commands)  # in the order of their use
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):  # letters that its encoding lacks are spelt out
                 stream.reconfigure(errors="backslashreplace")
-        with ending_at_once():
-            return super().main(*arguments, **settings)
+        return super().main(*arguments, **settings)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with terminable(), warnings_on_screen():
+            with _settings_of_process():
                 return super().invoke(ctx)
         except InputError as error:
-            named = naming_options if ctx.invoked_subcommand in _READING else naming_keys
-            raise Failure(named(str(error)), 2) from error
+            raise Failure(str(error), 2) from error
         except RoughviscError as error:
-            raise Failure(naming_keys(str(error)), 1) from error
-        except OSError as error:  # a full disk, a file taken away
-            if error.errno == errno.EPIPE:  # whoever read the output has seen enough: click ends quietly
+            raise Failure(str(error), 1) from error
+        except OSError as error:  # a full disk, a file that is gone
+            if error.errno == errno.EPIPE:  # the reader of the output has closed it: click ends quietly
                 raise
             place = f"{error.filename}: " if error.filename else ""
             raise Failure(f"{place}{error.strerror or error}", 1) from error
@@ -158,21 +155,15 @@ class Commands(click.Group):
             advice = "a file is damaged; run `roughvisc verify FOLDER` to find it"
             raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
         except KeyboardInterrupt as error:
-            status = 143 if isinstance(error, Terminated) else 130
-            raise Failure(INTERRUPTED, status) from error
+            text = "interrupted; finished work is kept; repeat the command to resume"
+            raise Failure(text, 143 if isinstance(error, Terminated) else 130) from error
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="roughvisc", message="roughvisc %(version)s")
 def main() -> None:
-    """Contact of measured rough surfaces with viscoelastic materials.
-
-    Reads a scan and a study file. Writes NetCDF results over (time, x, y) and figures.
-
-    \b
-    Example:
+    """\b
+    Contact of measured rough surfaces with viscoelastic materials. First result:
       roughvisc new
-      roughvisc scan focus_variation.x3p
       roughvisc run focus_variation-study.toml
-      roughvisc report results/focus_variation-study
     """

@@ -1,4 +1,4 @@
-"""Commands on results: ``plot``, ``report``, ``audit``, ``verify`` and ``clean``."""
+"""Commands on results: ``plot``, ``report``, ``table``, ``audit``, ``verify`` and ``clean``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from roughvisc.cli.group import PATH, Failure, complain, counted, say, say_figures
+from roughvisc.cli.group import PATH, QUANTITY, Failure, complain, counted, say_figures, say_path
 from roughvisc.errors import printable
 
 
@@ -36,25 +36,25 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     from roughvisc.views.sweep_figures.files import cases_in, results_of
 
     paths = results_at(result)
-    console = Console()
     names = cases_in(paths) if result.is_dir() else {}
     drawn: list[Path] = []
     for path in paths:
+        folder = out or path.parent
         if path.is_file() and is_trade(path):
-            drawn.append(write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png"))
+            drawn.append(write_figure(trade(open_trade(path)), folder / f"{path.stem}.png"))
             continue
         stem, title = names.get(path, (path.stem, ""))
         with open_result(path) as dataset:
-            drawn += save_figures(dataset, out or path.parent, stem, title=title, every=every)
-    together = results_of(result) if len(paths) > 1 else None
-    drawn += save_sweep_figures(together, out or result) if together is not None else ()
-    say_figures(console, drawn)
+            drawn += save_figures(dataset, folder, stem, title=title, every=every)
+    if len(paths) > 1 and (together := results_of(result)) is not None:
+        drawn += save_sweep_figures(together, out or result)
+    say_figures(Console(), drawn)
 
 
 @click.command()
 @click.argument("results", type=PATH)
-@click.option("-o", "--output", type=PATH, help="Page to write. [default: report.html in the folder]")
-def report(results: Path, output: Path | None) -> None:
+@click.option("-o", "--out", type=PATH, help="Page to write. [default: report.html in the folder]")
+def report(results: Path, out: Path | None) -> None:
     """Write an HTML report of a result or a folder of results.
 
     The report shows the accuracy and cost of each case, figures, the surface and its conditioning, assumptions, and
@@ -68,21 +68,65 @@ def report(results: Path, output: Path | None) -> None:
 
     from roughvisc.views.report.page import report as write
 
-    say(Console(), "Report", write(results, output))
+    say_path(Console(), "Report", write(results, out))
+
+
+@click.command()
+@click.argument("results", type=PATH)
+@click.option("-o", "--out", type=PATH, help="CSV file to write. [default: table.csv in the folder, or RESULT.csv]")
+def table(results: Path, out: Path | None) -> None:
+    """Write a CSV table of a result or a folder of results.
+
+    The table of a result has one row per kept time, or per speed. The table of a folder has one row per case. Headings
+    state the units.
+
+    \b
+    Example:
+      roughvisc table results/focus_variation-study -o table.csv
+    """
+    from rich.console import Console
+
+    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.storage.table import to_table
+    from roughvisc.views.export import to_csv
+
+    if results.is_dir():
+        path = out or results / "table.csv"
+        cases = to_table(results)
+        with atomic_write(path) as temporary:
+            cases.to_csv(temporary)
+    else:
+        with open_result(results) as dataset:
+            path = to_csv(dataset, out or results.with_suffix(".csv"))
+    say_path(Console(), "Table", path)
 
 
 @click.command()
 @click.argument("result", type=PATH)
-@click.option("--work-of-adhesion", metavar="W", help='Work of adhesion of the two surfaces: "50 mJ/m^2".')
-@click.option("--yield-strength", metavar="Y", help='Tensile yield strength of the softer body: "40 MPa".')
-@click.option("--thickness", metavar="H", help='Actual thickness of the body modelled as a half-space: "5 mm".')
+@click.option(
+    "--work-of-adhesion",
+    type=QUANTITY,
+    metavar="W",
+    help='Work of adhesion of the two surfaces: "50 mJ/m^2".',
+)
+@click.option(
+    "--yield-strength", type=QUANTITY, metavar="Y", help='Tensile yield strength of the softer body: "40 MPa".'
+)
+@click.option(
+    "--thickness", type=QUANTITY, metavar="H", help='Actual thickness of the body modelled as a half-space: "5 mm".'
+)
 @click.option("--base", help="Support of that body: bonded or slipping. [default: bonded]")
-@click.option("--density", metavar="RHO", help='Density of the body: "1100 kg/m^3".')
-@click.option("--linear-strain", metavar="STRAIN", help='Strain limit of linear behaviour: 0.05, or "5 %".')
-@click.option("--heat-conductivity", metavar="K", help='Heat conductivity of the body: "0.2 W/m/K".')
-@click.option("--volumetric-heat-capacity", metavar="C", help='Heat capacity of the body: "1.8 MJ/m^3/K".')
+@click.option("--density", type=QUANTITY, metavar="RHO", help='Density of the body: "1100 kg/m^3".')
+@click.option(
+    "--linear-strain", type=QUANTITY, metavar="STRAIN", help='Strain limit of linear behaviour: 0.05, or "5 %".'
+)
+@click.option("--heat-conductivity", type=QUANTITY, metavar="K", help='Heat conductivity of the body: "0.2 W/m/K".')
+@click.option(
+    "--volumetric-heat-capacity", type=QUANTITY, metavar="C", help='Heat capacity of the body: "1.8 MJ/m^3/K".'
+)
 @click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
-def audit(result: Path, study: Path | None, **stated: Any) -> None:
+def audit(result: Path, study: Path | None, **properties: Any) -> None:
     """Check the assumptions of the model for a result.
 
     Prints, for each assumption, a number, a verdict (holds, doubtful, broken, not known) and an explanation. Properties
@@ -95,16 +139,14 @@ def audit(result: Path, study: Path | None, **stated: Any) -> None:
     from rich.console import Console
 
     from roughvisc.study.audit.audit import audit as audited
-    from roughvisc.study.audit.given import from_options, of_study
+    from roughvisc.study.audit.given import AuditInputs, of_study
     from roughvisc.study.storage.store import open_result, results_at
     from roughvisc.views.console.accuracy_tables import audit_table
 
-    given = from_options(stated).over(of_study(study) if study is not None else {})
-    paths = results_at(result)
-    console = Console()
-    for path in paths:
+    given = AuditInputs(**properties).over(of_study(study) if study is not None else {})
+    for path in results_at(result):
         with open_result(path) as dataset:
-            console.print(audit_table(audited(dataset, **given.stated())))
+            Console().print(audit_table(audited(dataset, **given.stated())))
 
 
 @click.command()
@@ -126,8 +168,8 @@ def verify(results: Path) -> None:
     bare = [one for one in found if not one.flaw and not one.has_checksums]
     for one in bad:
         complain(one.flaw)
-    whole = f"{len(found) - len(bad)} of {counted(len(found), 'file')} intact"
-    click.echo(whole + (f", {len(bare)} of them without checksums, written by another program" if bare else ""))
+    intact = f"{len(found) - len(bad)} of {counted(len(found), 'file')} intact"
+    click.echo(intact + (f", {len(bare)} of them without checksums, written by another program" if bare else ""))
     if bad:
         raise Failure(f"{counted(len(bad), 'file')} damaged or not readable", 1)
 

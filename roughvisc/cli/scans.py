@@ -1,49 +1,100 @@
-"""Commands on a scan file: ``scan``, and ``new``, which begins a study of one."""
+"""Commands on a scan file: ``new``, which writes its first study, and ``scan``."""
 
 from __future__ import annotations
 
 import shutil
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import PATH, say
-from roughvisc.cli.reading import read_options, reading_options
-from roughvisc.errors import InputError, printable
+from roughvisc.cli.group import PATH, QUANTITY, say, say_path
+from roughvisc.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class _Sides(click.ParamType):
+    """One length, or two separated by a comma."""
+
+    name = "length"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        sides = tuple(QUANTITY.convert(part.strip(), param, ctx) for part in value.split(","))
+        return sides[0] if len(sides) == 1 else sides
+
+
+_READING = (
+    click.option("--unit", help="Unit of length, if the file states none: um."),
+    click.option("--height-unit", help="Unit of the heights, if it is another."),
+    click.option("--spacing", type=_Sides(), help="Distance between points, if the file states none: 1um, or 1um,2um."),
+    click.option("--channel", help="Name or number of the channel. [default: the height]"),
+    click.option("--format", help="Format, if the suffix does not tell it; auto: detect it."),
+)
+#: Question for an argument that a file lacks, and the type of the answer.
+_QUESTIONS: dict[str, tuple[str, Any]] = {
+    "unit": ("Unit of x, y and heights (such as um)", str),
+    "spacing": ("Distance between points (such as 1 um)", _Sides()),
+}
+
+
+def _reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of :func:`roughvisc.open_scan` to a command."""
+    for option in reversed(_READING):
+        command = option(command)
+    return command
+
+
+def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
+    """Open a scan; ask once for a unit and a spacing that the file lacks, if a person sits at the terminal.
+
+    The answers are added to the options, whose spacing is converted to metres.
+    """
+    from roughvisc.topography.scans import open_scan
+    from roughvisc.units import in_si
+
+    if (options["channel"] or "").isdecimal():
+        options["channel"] = int(options["channel"])
+    while True:
+        options["spacing"] = in_si(options["spacing"], "m", "spacing")
+        try:
+            return open_scan(file, **options)
+        except InputError as error:
+            lacks = error.key in _QUESTIONS and options[error.key] is None
+            if not (lacks and sys.stdin.isatty() and sys.stderr.isatty()):
+                raise
+            question, kind = _QUESTIONS[error.key]
+            options[error.key] = click.prompt(f"{file}: {question}", type=kind, err=True)
 
 
 @click.command()
 @click.argument("file", type=PATH)
 @click.option("--plot", type=PATH, help="Picture to save. [default: FILE's name.png, here]")
 @click.option("--to", type=PATH, help="Convert the heights to a .nc, .x3p or .sdf file.")
-@click.option("--force", is_flag=True, help="Overwrite an existing picture or converted file.")
 @click.option(
     "--card",
     type=PATH,
     is_flag=False,
     flag_value=Path(),
     metavar="[OUT.toml]",
-    help="Write a surface card for FILE. [name: FILE's name.toml, beside it]",
+    help="Write a surface card with these recommendations. [name: FILE's name.toml, beside it]",
 )
-@reading_options
-def scan(
-    file: Path,
-    plot: Path | None,
-    to: Path | None,
-    card: Path | None,
-    force: bool,
-    **given: str | None,
-) -> None:
-    """Summarise a scan, recommend preprocessing, save a picture.
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
+@_reading_options
+def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, force: bool, **options: Any) -> None:
+    """Summarise a scan and recommend preprocessing.
 
     Prints size, channels, missing points and areal parameters; then spikes, tilt, form, borders and noise, each with
     a recommendation; then a [surface] table to paste into a study. Parameters and picture refer to the scan without
-    its mean plane. Existing files are kept unless --force is given. FILE is an instrument file or a surface card.
+    its mean plane. FILE is an instrument file or a surface card.
 
     \b
     Example:
       roughvisc scan focus_variation.x3p --plot scan.png
-      roughvisc scan focus_variation.x3p --to scan.nc --card
+      roughvisc scan focus_variation.x3p --to scan.nc --card scan.toml
     """
     from rich.console import Console
 
@@ -52,44 +103,37 @@ def scan(
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.topography.parameters import parameters
     from roughvisc.topography.readers import list_channels
-    from roughvisc.topography.scans import open_scan
     from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
     from roughvisc.views.console.scan_advice import advice_table
     from roughvisc.views.console.tables import scan_table
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import surface
 
-    options = read_options(**given)
-    height = open_scan(file, **options)
+    height = _opened(file, options)
     channels = () if "card" in height.attrs else list_channels(file, format=options["format"])
     picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
-    text = card_text(file, card.parent, options) if card else ""
     if to:
         known_suffix(to)
     for out in filter(None, (to, card, picture if plot or force else None)):
-        if out.exists() and (not force or out == card or out.samefile(file)):
-            advice = "expected another name" + (" or --force" if out != card and not out.samefile(file) else "")
-            raise InputError(f"{out}: already exists: {advice}")
+        if out.exists() and (not force or out.samefile(file)):
+            raise InputError(f"{out}: already exists: expected another name" + ("" if force else ", or --force"))
+    levelled, found = level(height), inspect_scan(height)
+    text = card_text(file, card.parent, options, found.steps) if card else ""
     console = Console()
-    levelled = level(height)
-    console.print(scan_table(height, parameters(levelled), file.name, channels))
-    found = inspect_scan(height)
-    console.print()
-    console.print(advice_table(found))
-    console.print()
-    console.print(surface_table(file, Path(), options, found.steps), soft_wrap=True, highlight=False, markup=False)
+    console.print(scan_table(height, parameters(levelled), file.name, channels), "", advice_table(found), "", sep="\n")
+    say(console, surface_table(file, Path(), options, found.steps))
     if picture.exists() and not force and not plot:
-        say(console, "Existing picture kept (--force overwrites it)", picture)
+        say_path(console, "Existing picture kept (--force overwrites it)", picture)
     else:
-        say(console, "Picture", write_figure(surface(levelled), picture))
+        say_path(console, "Picture", write_figure(surface(levelled), picture))
     if to:
         with atomic_write(to) as temporary:
             save_scan(height, temporary)
-        say(console, "Converted", to)
+        say_path(console, "Converted", to)
     if card:
         with atomic_write(card) as temporary:
             temporary.write_text(text, encoding="utf-8")
-        say(console, "Card", card)
+        say_path(console, "Card", card)
 
 
 @click.command()
@@ -97,14 +141,15 @@ def scan(
 @click.option("-o", "--out", type=PATH, help="Study file to write. [default: FILE's name-study.toml, here]")
 @click.option(
     "--contact",
+    type=QUANTITY,
     metavar="PART",
     default="5 %",
     show_default=True,
     help="Part of the area in contact at the end, which sets the pressure.",
 )
-@reading_options
-def new(file: Path | None, out: Path | None, contact: str, **given: str | None) -> None:
-    """Write a first study for a scan.
+@_reading_options
+def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> None:
+    """Write a first study for a scan, or for an example.
 
     The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends
     and presses the scan on a rubber, at a pressure that brings the part --contact of the area into contact. FILE is an
@@ -122,48 +167,45 @@ def new(file: Path | None, out: Path | None, contact: str, **given: str | None) 
     from roughvisc.study.first_pressure import first_pressure
     from roughvisc.study.statement.starter import starter_study
     from roughvisc.study.storage.files import atomic_write
-    from roughvisc.study.trade.files import part_of_one
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan
-    from roughvisc.topography.scans import open_scan
+    from roughvisc.units import number
     from roughvisc.views.console.scan_advice import advice_table
 
-    options, part = read_options(**given), part_of_one(contact, "--contact")
-    wanted = file or Path(EXAMPLE)
-    out = out or Path(f"{wanted.stem}-study.toml")
+    part = number(contact, "1", "contact", above=0, below=1)
+    source = file or Path(EXAMPLE)
+    out = out or Path(f"{source.stem}-study.toml")
     if out.suffix.lower() != ".toml":
         raise InputError(f"{out}: has the suffix {out.suffix!r}: expected a study file, .toml")
     if out.exists():
         raise InputError(f"{out}: already exists: expected another name (--out)")
     if file is None:
-        for option in (name for name, value in given.items() if value):
-            raise InputError(f"--{option}: has no meaning without FILE: expected FILE")
-        _write_example(wanted)
-    scan = open_scan(wanted, **options)
-    found = inspect_scan(scan)
-    text = starter_study(wanted, out, options, found, first_pressure(scan, found, part))
+        for option in (name for name, value in options.items() if value is not None):
+            raise InputError(key=option, found=options[option], expected="FILE, which it belongs to")
+        _write_example(source)
+    height = _opened(source, options)
+    found = inspect_scan(height)
+    text = starter_study(source, out, options, found, first_pressure(height, found, part))
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()
-    console.print(advice_table(found))
-    console.print()
+    console.print(advice_table(found), "", sep="\n")
     if file is None:
-        say(console, "Scan", wanted)
-    say(console, "Study", out)
-    following = f"Next: roughvisc plan {out}\n      roughvisc run {out}"
-    console.print(printable(following), soft_wrap=True, highlight=False, markup=False)
+        say_path(console, "Scan", source)
+    say_path(console, "Study", out)
+    say(console, f"Next: roughvisc plan {out}\n      roughvisc run {out}")
 
 
 def _write_example(path: Path) -> None:
-    """Write the scan that ships with roughvisc; one that is there already stays, and has to be the same."""
+    """Write the scan that ships with roughvisc, unless it is there already."""
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.example import example_scan
 
-    held = example_scan()
+    shipped = example_scan()
     if not path.exists():
         with atomic_write(path) as temporary:
-            shutil.copyfile(held, temporary)
-    elif path.read_bytes() != held.read_bytes():
+            shutil.copyfile(shipped, temporary)
+    elif path.read_bytes() != shipped.read_bytes():
         raise InputError(
             f"{path}: already exists and differs from the example: expected an empty folder, or your own FILE"
         )

@@ -1,4 +1,4 @@
-"""The command that computes a study: ``run``."""
+"""Commands on a study: ``plan``, ``run``, ``trade`` and ``budget``."""
 
 from __future__ import annotations
 
@@ -9,27 +9,58 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.costs import show
-from roughvisc.cli.group import PATH, Failure, complain, complain_of_all, keep_long_messages, say, say_figures
-from roughvisc.cli.interrupts import end_if_interrupted
-from roughvisc.cli.reading import naming_keys
-from roughvisc.errors import InputError, printable
+from roughvisc.cli.group import PATH, QUANTITY, Failure, complain, say, say_figures, say_path
+from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
     from distributed import Client
     from rich.console import Console
 
+    from roughvisc.study.execution.task import Outcome
     from roughvisc.study.statement.case import Case
 
+_QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+#: Most messages on failed cases.
+_SHOWN = 5
 
-_FOR = "Wanted error of a number: '1 % friction_coefficient'; may be repeated."
+
+@click.command()
+@click.argument("study", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the results; its disk must have room.")
+@click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
+def plan(study: Path, out: Path | None, workers: int | None) -> None:
+    """Show what a study will model and what it will cost.
+
+    Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 64 x 64 cells, the time
+    by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on the disk.
+
+    \b
+    Example:
+      roughvisc plan focus_variation-study.toml
+    """
+    from rich.console import Console
+
+    from roughvisc.study.plan import plan as planned
+    from roughvisc.views.console.tables import plan_tables
+
+    costs = planned(study, out, workers=workers)
+    if not costs["refusal"].all():
+        Console().print(plan_tables(costs))
+    if why := costs.attrs["refusal"].removeprefix(f"{study}: "):
+        raise Failure(f"{study}: cannot run: {why}", 2)
 
 
 @click.command()
 @click.argument("study", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the results. [default: results/STUDY beside it]")
-@click.option("--for", "targets", multiple=True, metavar="TARGET", help=_FOR)
+@click.option(
+    "--for",
+    "targets",
+    multiple=True,
+    metavar="TARGET",
+    help="Wanted error of a number: '1 % friction_coefficient'; may be repeated.",
+)
 @click.option("--no-plots", is_flag=True, help="Draw no figures.")
 @click.option(
     "--workers", type=click.IntRange(0), help="Number of processes; 0: this one only. [default: one per core]"
@@ -38,7 +69,7 @@ _FOR = "Wanted error of a number: '1 % friction_coefficient'; may be repeated."
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
 @click.option("--scheduler-file", type=PATH, help="Scheduler file written by a Dask scheduler.")
 @click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
-@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@_QUIET
 def run(
     study: Path,
     out: Path | None,
@@ -46,8 +77,8 @@ def run(
     no_plots: bool,
     scheduler: str | None,
     scheduler_file: Path | None,
-    quiet: bool,
     retry_failed: bool,
+    quiet: bool,
     **computing: Any,
 ) -> None:
     """Compute all cases of a study file.
@@ -69,29 +100,26 @@ def run(
     from rich.console import Console
 
     from roughvisc.study.execution.cluster import connect
-    from roughvisc.study.execution.run import result_folder, study_folder
+    from roughvisc.study.execution.run import result_folder
     from roughvisc.study.statement.case import read_cases
 
-    keep_long_messages(study_folder(study, out))
     cases = read_cases(study)
     if targets and len(cases) > 1:
-        raise InputError(key="--for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
-    folder = result_folder(cases[0], out, to_write=False)
-    console = Console(quiet=quiet)
-    elsewhere = bool(scheduler or scheduler_file)
-    with connect(scheduler, scheduler_file) if elsewhere else nullcontext() as client:
-        if len(cases) > 1 or (elsewhere and not targets):
+        raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
+    folder, console = result_folder(cases[0], out, to_write=False), Console(quiet=quiet)
+    remote = bool(scheduler or scheduler_file)
+    with connect(scheduler, scheduler_file) if remote else nullcontext() as client:
+        if len(cases) > 1 or (remote and not targets):
             _run_all(cases, folder, console, client=client, retry_failed=retry_failed, **computing)
             return
         case, budgets = cases[0], {}
         if targets:
             case, budgets = _choose(case, targets, folder, console, client=client, **computing)
-        complaint = _run_one(case, folder, study.stem, console, not no_plots, computing["threads"], bool(targets))
+        problem = _run_one(case, folder, study.stem, console, not no_plots, computing["threads"])
         for name, one in budgets.items():
-            show(console, one, folder / "budget", name, not no_plots)
-        if complaint:
-            complain(f"{study.stem}: {complaint}")
-            raise Failure("1 of 1 cases failed", 1)
+            _show_budget(console, one, folder / "budget", name, not no_plots)
+        if problem:
+            raise Failure(f"{study.stem}: {problem}", 1)
 
 
 def _choose(
@@ -103,63 +131,47 @@ def _choose(
     from roughvisc.study.budget.target import choose, parse_targets
     from roughvisc.study.execution.monitor import watcher
 
-    def tell(line: str) -> None:
-        console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
-
-    watch = partial(watcher, not console.quiet, console, summary=False)
+    watch, tell = partial(watcher, not console.quiet, console, summary=False), partial(say, console)
     choice = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
-    tell("Chosen")
-    for reason in choice.reasons:
-        tell(f"  {reason}")
+    tell("\n  ".join(["Chosen", *choice.reasons]))
     return choice.case, choice.budgets
 
 
-def _run_one(
-    case: Case,
-    folder: Path,
-    label: str,
-    console: Console,
-    plots: bool,
-    threads: int | None,
-    chosen: bool = False,
-) -> str:
-    """Compute, keep, draw and sum up one case; what to complain of, empty if nothing."""
+def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
+    """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
     from roughvisc.study.storage.store import open_result, result_path
     from roughvisc.views.console.result_tables import result_table
+    from roughvisc.views.plot import save_figures
 
-    if is_result_of(case, result_path(folder, case.key)):
-        if not chosen:
-            console.print("Already finished: nothing to compute")
+    if not is_result_of(case, result_path(folder, case.key)):
+        require_writable(folder, "since the case is not finished")
+        with reporting(True, label, console, case.at) as report:
+            run_case(case, folder, progress=report, threads=threads or threads_each(1))
+    else:
+        say(console, "Already finished: nothing to compute")
         if not is_writable(folder):
             complain(f"{folder}: is not writable: the finished result is shown, and nothing is written")
             plots = False
-    else:
-        require_writable(folder, "since the case is not finished")
-    end_if_interrupted()
-    with reporting(True, label, console, case.at) as report:
-        path = run_case(case, folder, progress=report, threads=threads or threads_each(1))
     missed = _observe([case], folder, console)
-    with open_result(path) as dataset:
+    with open_result(result_path(folder, case.key)) as dataset:
         console.print(result_table(dataset))
-        say(console, "Result", path)
+        say_path(console, "Result", result_path(folder, case.key))
         if plots:
-            from roughvisc.views.plot import save_figures
-
             say_figures(console, save_figures(dataset, folder, case.key, every=False))
-            say(console, "For all figures, run", path, before="roughvisc plot --all ")
+            say_path(console, "For all figures, run: roughvisc plot --all", folder)
         return unconverged(dataset) or missed
 
 
 def _observe(cases: list[Case], folder: Path, console: Console) -> str:
-    """Add to the results what the study asks to be observed; what to complain of, empty if nothing."""
-    if all(case.settings.observe is None for case in cases):
-        return ""
+    """Add the observables of the study to the results; return what went wrong, empty if nothing."""
     from roughvisc.study.observed import observe
 
+    if all(case.settings.observe is None for case in cases):
+        return ""
     with console.status("observing") as status:
         try:
             observe(cases, folder, progress=lambda done, of: status.update(f"observing: {done} of {of} cases done"))
@@ -169,43 +181,171 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
 
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Client | None, **computing: Any) -> None:
-    """Compute and sum up a sweep."""
+    """Compute and summarise a sweep."""
     from roughvisc.study.execution.monitor import watcher
     from roughvisc.study.execution.sweep import run_cases
-    from roughvisc.study.execution.task import REFUSED
     from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.index import index_of
-    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+    from roughvisc.study.storage.sweep_cases import sweep_cases
     from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
     from roughvisc.views.console.tables import realisations_tables, sweep_table
 
     outcomes = run_cases(cases, folder, client=client, watch=watcher(not console.quiet, console), **computing)
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
-    listed = sweep_cases(cases)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     if (folder / REALISATIONS).exists():
-        console.print(realisations_tables(realisations_table(index_of(folder, warn=False), listed)))
-    say(console, "Results", folder)
+        console.print(realisations_tables(realisations_table(index_of(folder, warn=False), sweep_cases(cases))))
+    say_path(console, "Results", folder)
     for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
         if (folder / name).exists():
-            say(console, what, folder / name)
-    bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
-    number = number_by_key(listed)
-    told = []
-    for outcome in bad:
-        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
-        where = f"case {number[outcome.key]}{again}" if len(cases) > 1 else "the case"
-        told.append(f"{where}: {naming_keys(outcome.message)}")
-    complain_of_all(told, folder / LOG)
+            say_path(console, what, folder / name)
     if missed:
         complain(missed)
-    if all(outcome.error in REFUSED for outcome in outcomes.values()):
-        raise Failure("no case could be computed: the input is invalid", 2)
-    if bad:
-        kept = sum(outcome.kind == "held" for outcome in bad)
-        failed = f"{len(bad) - kept} of {len(outcomes)} cases failed" if len(bad) > kept else ""
-        held = f"{kept} of {len(outcomes)} cases are in use by another run: repeat the command when it has ended"
-        raise Failure("; ".join(filter(None, (failed, held if kept else ""))), 1)
+    _fail_if_any(cases, outcomes, folder / LOG)
     if missed:
         raise Failure("some observables could not be computed", 1)
+
+
+def _fail_if_any(cases: Sequence[Case], outcomes: Mapping[str, Outcome], log: Path) -> None:
+    """Write the messages of the cases that are not done, and end with the status of the sweep."""
+    from roughvisc.study.execution.task import REFUSED
+    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+
+    bad, number = (
+        [outcome for outcome in outcomes.values() if outcome.kind != "done"],
+        number_by_key(sweep_cases(cases)),
+    )
+    for outcome in bad[:_SHOWN]:
+        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
+        complain(f"case {number[outcome.key]}{again}: {outcome.message}")
+    if len(bad) > _SHOWN:
+        complain(f"and {len(bad) - _SHOWN} more; all of them are in {log}")
+    if all(outcome.error in REFUSED for outcome in outcomes.values()):
+        raise Failure("no case could be computed: the input is invalid", 2)
+    held = sum(outcome.kind == "held" for outcome in bad)
+    problems = [f"{len(bad) - held} of {len(outcomes)} cases failed"] if len(bad) > held else []
+    if held:
+        problems.append(
+            f"{held} of {len(outcomes)} cases are in use by another run: repeat the command when it has ended"
+        )
+    if problems:
+        raise Failure("; ".join(problems), 1)
+
+
+@click.command()
+@click.argument("study", type=PATH)
+@click.option("--out", type=PATH, help="Folder for the measurements. [default: results/STUDY-trade]")
+@click.option(
+    "--accuracy", type=QUANTITY, metavar="PART", default="1%", help="Wanted relative error.", show_default=True
+)
+@click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction]")
+@click.option(
+    "--budget", type=QUANTITY, metavar="TIME", default="5 min", help="Total wall time of all runs.", show_default=True
+)
+@_QUIET
+def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, budget: Any, quiet: bool) -> None:
+    """Measure the cost and the error of several tolerances and grids.
+
+    Each run is timed and compared with the finest run. Marks the cheapest setting with the error --accuracy. Writes a
+    NetCDF file and a figure.
+
+    \b
+    Example:
+      roughvisc trade focus_variation-study.toml
+      roughvisc trade focus_variation-study.toml --accuracy 0.1% --quantity mean_gap
+    """
+    from dask.system import CPU_COUNT
+    from rich.console import Console
+    from scipy import fft
+
+    from roughvisc.progress import reporting
+    from roughvisc.study.statement.case import read_study
+    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.study.trade.files import trade_folder
+    from roughvisc.study.trade.recommend import main_quantities
+    from roughvisc.study.trade.trade import trade as measured
+    from roughvisc.units import number
+    from roughvisc.views.console.accuracy_tables import trade_table
+    from roughvisc.views.figures.files import write_figure
+    from roughvisc.views.plot import trade as figure
+
+    part = number(accuracy, "1", "accuracy", above=0, below=1)
+    case, console = read_study(study), Console(quiet=quiet)
+    folder = trade_folder(case, out)
+    with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
+        dataset = measured(case, quantities=[quantity] if quantity else [], budget=budget, progress=report)
+    main = main_quantities(dataset)
+    console.print(trade_table(dataset, quantity or main[0], part))
+    say_path(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
+    drawn = list(dict.fromkeys([quantity or main[0], *main]))[:2]
+    say_path(console, "Figure", write_figure(figure(dataset, drawn), folder / "trade.png"))
+
+
+@click.command()
+@click.argument("study", metavar="STUDY|RESULT", type=PATH)
+@click.option(
+    "--quantity", "quantities", multiple=True, metavar="NAME", help="May be repeated. [default: contact_area]"
+)
+@click.option(
+    "--at", type=QUANTITY, multiple=True, metavar="VALUE", help="Time or speed; may be repeated. [default: all kept]"
+)
+@click.option("--modulus-error", type=QUANTITY, metavar="PART", help="Relative error of the moduli at 95 %: 10%.")
+@click.option(
+    "--time-scale-error", type=QUANTITY, metavar="PART", help="Relative error of the times of the material at 95 %."
+)
+@click.option(
+    "--cutoff", type=QUANTITY, metavar="LENGTH", help="Shortest wavelength that the real surface has: '2 um'."
+)
+@click.option(
+    "--population",
+    type=click.Choice(["patch", "ensemble"]),
+    help="Number of this patch, or of the roughness of which the scan is one sample. [default: patch]",
+)
+@click.option("--out", type=PATH, help="Folder of the budget. [default: budget in the results]")
+@click.option("--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]")
+@_QUIET
+def budget(
+    study: Path,
+    quantities: tuple[str, ...],
+    at: tuple[Any, ...],
+    out: Path | None,
+    workers: int | None,
+    quiet: bool,
+    **known: Any,
+) -> None:
+    """Estimate the total uncertainty of a number, by source.
+
+    Solves the case again on other grids, without its shortest waves, on other patches of the same roughness and with
+    another material, as needed. Prints a table, and writes a NetCDF file and a figure for each quantity. All solves are
+    kept and used again.
+
+    \b
+    Example:
+      roughvisc budget focus_variation-study.toml --modulus-error 10% --cutoff "1 um"
+      roughvisc budget focus_variation-study.toml --quantity mean_gap --population ensemble
+    """
+    from rich.console import Console
+
+    from roughvisc.study.budget.budget import budgets, case_of
+    from roughvisc.study.storage.store import open_result
+
+    console = Console(quiet=quiet)
+    case, folder = case_of(open_result(study) if study.suffix == ".nc" else study, out)
+    names = list(quantities) or ["contact_area"]
+    found = budgets(case, names, at=list(at) or None, known=known, out=folder, workers=workers, progress=not quiet)
+    for name, one in found.items():
+        _show_budget(console, one, folder, name)
+
+
+def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
+    """Print the budget of a number, write it, and draw it."""
+    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.views.console.accuracy_tables import budget_table
+    from roughvisc.views.figures.files import write_figure
+    from roughvisc.views.plot import budget as figure
+
+    console.print(budget_table(found))
+    say_path(console, "Budget", write_dataset(found, folder / f"budget-{name}.nc"))
+    if plots:
+        say_path(console, "Figure", write_figure(figure(found), folder / f"budget-{name}.png"))

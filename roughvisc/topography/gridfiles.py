@@ -63,13 +63,15 @@ def open_grid(
     h = h.transpose("x", "y")
     metres = _metres(unit_of(h), unit if height_unit is None else height_unit, channel.name)
     if height_unit is not None and not math.isclose(metres, height_unit):
-        raise InputError(f"its heights are in {unit_of(h)!r}: leave height_unit= out, or scale them afterwards")
+        raise InputError(
+            f"its heights are in {unit_of(h)!r}: expected no height_unit; scale them afterwards", key="height_unit"
+        )
     axes = []
     for axis, given in zip(("x", "y"), spacing or (None, None), strict=True):
         if given is not None:
             axes.append((np.arange(h.sizes[axis]) + 0.5) * given)
         elif axis not in h.coords:
-            raise InputError(f"there is no coordinate {axis!r}: pass spacing= [m]")
+            raise InputError(f'there is no coordinate {axis!r}: expected spacing, such as "1 um"', key="spacing")
         else:
             axes.append(h[axis].values.astype(float) * _metres(unit_of(h[axis]), unit, axis))
     attrs = {name: value for name, value in h.attrs.items() if name not in ("units", "long_name")}
@@ -121,5 +123,5 @@ def _metres(stated: str | None, unit: float | None, name: str) -> float:
     if stated is not None:
         return metres_in(stated, name)
     if unit is None:
-        raise InputError(f"{name} has no attribute 'units': pass unit= (such as unit='um')")
+        raise InputError(f"{name} has no attribute 'units': expected unit, such as \"um\"", key="unit")
     return unit

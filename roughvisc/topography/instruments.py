@@ -185,8 +185,9 @@ def formats_of(path: Path) -> tuple[str, ...]:
     if not found:
         known = sorted({s for theirs in suffixes().values() for s in theirs})
         raise InputError(
-            f"the suffix {path.suffix!r} is not known: pass format= (see supported_formats()), or format='auto' to "
-            f"have it guessed; known are {', '.join(known)}"
+            f'the suffix {path.suffix!r} is not known: expected format, or "auto" to detect it; known suffixes are '
+            f"{', '.join(known)}",
+            key="format",
         )
     return found
 

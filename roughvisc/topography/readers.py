@@ -35,8 +35,9 @@ WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
 _FEWEST = 16
 #: No height in an array is further from zero: beyond, numbers stand for missing points. [m]
 FARTHEST = 1e3
-_PASS_UNITS = "pass unit= (such as unit='um'; or unit='mm', height_unit='um' where they differ)"
-_PASS_UNIT, _PASS_SPACING = "pass unit= (such as unit='um')", "pass spacing=(dx, dy) [m]"
+#: What to give if a file lacks it: the name is that of the argument, the option and the key.
+_UNIT, _SPACING = 'expected unit, such as "um"', 'expected spacing, such as "1 um"'
+_UNITS = f"{_UNIT}, and height_unit if heights have another"
 _READER = threading.RLock()
 #: Format of the grid files that are read through xarray.
 _GRID = "nc"
@@ -185,22 +186,27 @@ def _labelled(
         unit = quantity(f"1 {stated}", "m", "the unit in the file")
     elif lateral is None and vertical is None:
         if no_size:
-            raise InputError(f"it states no unit of its heights and no size: {_PASS_UNIT}, and {_PASS_SPACING}")
+            text = f"it states no unit of its heights and no size: {_UNIT}, and {_SPACING[9:]}"
+            raise InputError(text, key="unit", expected=_UNIT)
         if sides is None and not known:
-            raise InputError(f"it states no unit of x, y and its heights: {_PASS_UNITS}")
-        raise InputError(f"it states no unit of its heights: {_PASS_UNIT}")
+            raise InputError(f"it states no unit of x, y and its heights: {_UNITS}", key="unit", expected=_UNITS)
+        raise InputError(f"it states no unit of its heights: {_UNIT}", key="unit", expected=_UNIT)
     else:
         unit = lateral if vertical is None else vertical
         if vertical is not None and sides is None and known and lateral is not None:
-            raise InputError("it states the unit of x and y only: pass the unit of its heights as unit=")
+            raise InputError(
+                "it states the unit of x and y only: expected the unit of its heights as unit, and no height_unit",
+                key="height_unit",
+                found=vertical,
+            )
         if sides is None and not known and raw.sides is not None and lateral is None:
-            raise InputError("it states no unit of x and y: pass unit= (such as unit='mm')")
+            raise InputError(f"it states no unit of x and y: {_UNIT}", key="unit", expected=_UNIT)
     values = raw.heights if unit == 1.0 else raw.heights * unit
     if sides is None and raw.sides is not None:
         metres = [quantity(f"1 {one}", "m", "the unit in the file") for one in raw.units or ()] or [lateral or unit] * 2
         sides = tuple(float(f"{d * metre:.15g}") for d, metre in zip(raw.sides, metres, strict=True))
     if sides is None or not all(math.isfinite(d) and d > 0 for d in sides):
-        raise InputError(f"it states no size: {_PASS_SPACING}")
+        raise InputError(f"it states no size: {_SPACING}", key="spacing", expected=_SPACING)
     return labelled(values, sides)
 
 
@@ -217,9 +223,13 @@ def _chosen(opened: Opened, channel: int | str | None) -> Channel:
     for c in opened.channels:
         if channel == c.name or (isinstance(channel, int) and channel == c.index):
             if not c.is_height:
-                raise InputError(f"channel {channel!r} is not an areal height: expected another of {listed}")
+                raise InputError(
+                    f"channel {channel!r} is not an areal height: expected another of {listed}",
+                    key="channel",
+                    found=channel,
+                )
             return c
-    raise InputError(f"channel is {channel!r}: expected one of {listed}")
+    raise InputError(key="channel", found=channel, expected=f"one of {listed}")
 
 
 def _refuse_another_unit(chosen: Channel, lateral: float | None, vertical: float | None) -> None:
@@ -229,7 +239,9 @@ def _refuse_another_unit(chosen: Channel, lateral: float | None, vertical: float
         for key, unit in (("unit", lateral), ("height_unit", vertical)):
             if unit is not None and not math.isclose(stated, unit):
                 raise InputError(
-                    f"it states its unit as {chosen.unit!r}: leave {key}= out, or scale the heights afterwards"
+                    f"it states its unit as {chosen.unit!r}: expected no {key}; scale the heights afterwards",
+                    key=key,
+                    found=unit,
                 )
 
 
@@ -271,7 +283,7 @@ def _reading(path: Path) -> Iterator[None]:
         except Exception as error:  # damaged files raise of every kind, MemoryError and struct.error among them
             forget(error)
             raise InputError(
-                f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format (pass format=)"
+                f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format"
             ) from error
 
 
@@ -282,7 +294,7 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
         if n * d > WIDEST or d < FINEST:
             raise InputError(
                 f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
-                f"(at most {WIDEST:g} m, at least {FINEST:g} m): pass spacing=(dx, dy) [m]"
+                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing"
             )
 
 
@@ -292,7 +304,7 @@ def _low_enough(h: xr.DataArray, path: Path) -> None:
     if count and h.size >= _FEWEST:
         raise InputError(
             f"{path}: {count} heights are like {example:.6g} m, which is not plausible (at most "
-            f"{HIGHEST:g} m from zero): expected heights in the unit that the file states, or that unit= states"
+            f"{HIGHEST:g} m from zero): expected heights in the unit that the file or `unit` states"
         )
 
 

@@ -70,18 +70,24 @@ def known_suffix(path: Path) -> None:
         raise InputError(f"{path}: found the suffix {path.suffix!r}: expected one of {', '.join(WRITABLE)}")
 
 
-def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any]) -> str:
-    """Surface card of a scan file, as TOML: its checksum, and how it is read; it is not conditioned yet.
+def card_text(
+    file: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    options: Mapping[str, Any],
+    steps: Mapping[str, Any] | None = None,
+) -> str:
+    """Return the surface card of a scan file as TOML: its checksum, how it is read, and how it is conditioned.
 
     Parameters
     ----------
     file : path
         The scan.
     folder : path
-        Where the card is going to be: the file is named relative to it.
+        Folder of the card: the file is named relative to it.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened; None where
-        it does not.
+        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened, or None.
+    steps : mapping, optional
+        Conditioning steps, as for :func:`surface_table`. [m]
 
     Raises
     ------
@@ -94,20 +100,9 @@ def card_text(file: str | os.PathLike[str], folder: str | os.PathLike[str], opti
     lines = [f"title = {_text(file.stem)}", f"file = {_text(Path(os.path.relpath(file, folder)).as_posix())}"]
     lines.append(f"sha256 = {_text(sha256(file))}")
     lines += [f"{key} = {value}" for key, value in _how_to_read(options, _numbers).items()]
-    return "\n".join(lines) + _REST
-
-
-_REST = """
-# source = "..."                            # where it comes from
-# licence = "..."                           # who may use it
-# instrument = "..."
-
-# What is done to the heights whenever the card is opened; take the # away from what you want.
-# [conditioning]
-# level = 1                                 # a plane is taken off
-# outliers = true                           # spikes become missing points, before anything is filled in
-# fill = "harmonic"                         # missing points are filled in; the mask stays in the result
-"""
+    lines += ["", '# source = "..."      # where it comes from', '# licence = "..."     # who may use it']
+    lines += ['# instrument = "..."', "", "# Steps on the heights whenever the card is opened.", "[conditioning]"]
+    return "\n".join(lines + [f"{key} = {value}" for key, value in _as_toml(steps or {}).items()]) + "\n"
 
 
 def surface_table(
@@ -137,13 +132,7 @@ def surface_table(
     near = Path(os.path.relpath(file, folder))
     entries = {"file": _text((file.resolve() if near.parts[0] == ".." else near).as_posix())}
     entries |= _how_to_read(options, _lengths)
-    for key, value in steps.items():
-        if key == "crop":
-            entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
-        elif key == "filter":
-            entries[key] = _lengths(value)
-        else:
-            entries[key] = json.dumps(value)
+    entries |= _as_toml(steps)
     lines = [f"{key} = {value}" for key, value in entries.items()]
     width = max((len(line) for line, key in zip(lines, entries, strict=True) if key in remarks), default=0)
     shown = [
@@ -151,6 +140,19 @@ def surface_table(
         for line, key in zip(lines, entries, strict=True)
     ]
     return "\n".join(["[surface]", *shown]) + "\n"
+
+
+def _as_toml(steps: Mapping[str, Any]) -> dict[str, str]:
+    """Return the values of conditioning steps as TOML."""
+    entries = {}
+    for key, value in steps.items():
+        if key == "crop":
+            entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
+        elif key == "filter":
+            entries[key] = _lengths(value)
+        else:
+            entries[key] = json.dumps(value)
+    return entries
 
 
 def _how_to_read(options: Mapping[str, Any], spacing: Callable[[Any], str]) -> dict[str, str]:

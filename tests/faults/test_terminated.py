@@ -60,43 +60,6 @@ def test_run__writes_its_checkpoint_and_ends_quietly(tmp_path, text, options, wh
         assert [one.name for one in unfinished.parent.glob(f"*{case.key}*")] == [path.name]
 
 
-#: Runs the command line; a signal comes while a module is imported, and what the import raises is an ImportError, as
-#: the initialization of compiled modules has it.
-SIGNALLED = """
-import os, runpy, sys, time
-
-class Finder:
-    def find_spec(self, name, path=None, target=None):
-        if name == "pydantic":
-            sys.meta_path.remove(self)
-            try:
-                os.kill(os.getpid(), NUMBER)
-                time.sleep(0.05)
-            except BaseException as error:
-                raise ImportError("initialization failed") from error
-
-sys.meta_path.insert(0, Finder())
-sys.argv = ["roughvisc", "run", "s.toml"]
-runpy.run_module("roughvisc", run_name="__main__")
-"""
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-def test_run__signalled_during_an_import_ends_quietly(tmp_path, number, status):
-    (tmp_path / "s.toml").write_text(MANY_STEPS)
-    script = SIGNALLED.replace("NUMBER", str(int(number)))
-    process = subprocess.Popen([sys.executable, "-c", script], cwd=tmp_path, stdout=-1, stderr=-1, text=True)
-    out, err = process.communicate(timeout=100)
-    assert (out, err, process.returncode) == (
-        "",
-        "roughvisc: interrupted; finished work is kept; repeat the command to resume\n",
-        status,
-    )
-    assert not (tmp_path / "results").exists(), "nothing has begun"
-
-
 def test_import__leaves_the_handlers_of_the_process_alone():
     script = "import signal; b = [signal.getsignal(n) for n in (2, 15)]; import roughvisc.cli\n"
     script += "assert [signal.getsignal(n) for n in (2, 15)] == b"

@@ -45,22 +45,6 @@ class AuditInputs:
         return {name: value for name, value in values.items() if value is not None}
 
 
-def from_options(texts: Mapping[str, str | None]) -> AuditInputs:
-    """What is stated on a command line, where numbers are texts too; messages name the options.
-
-    Raises
-    ------
-    InputError
-        As :class:`AuditInputs` does.
-    """
-    values = {name: _number_or_text(text) for name, text in texts.items()}
-    try:
-        return AuditInputs(**values)
-    except InputError as error:
-        key = f"--{error.key.replace('_', '-')}"
-        raise InputError(key=key, found=error.found, expected=error.expected) from None
-
-
 def of_study(path: Path) -> dict[str, Any]:
     """What a study file states for an audit, in SI; of a sweep, what its first case does.
 
@@ -71,10 +55,3 @@ def of_study(path: Path) -> dict[str, Any]:
     """
     stated = read_cases(path)[0].settings.audit
     return {} if stated is None else stated.model_dump(exclude_none=True)
-
-
-def _number_or_text(text: str | None) -> Any:
-    try:
-        return text if text is None else float(text)
-    except ValueError:
-        return text

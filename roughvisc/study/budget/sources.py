@@ -104,9 +104,8 @@ def known_errors(given: Mapping[str, Any]) -> dict[str, Any]:
     """
     known = {name: one for name, one in given.items() if one is not None}
     for name in ("modulus_error", "time_scale_error"):
-        value = known.get(name, 0.0)
-        if not (isinstance(value, int | float) and 0 <= value < 1):
-            raise InputError(key=name, found=value, expected="a relative error, at least 0 and below 1")
+        if name in known:
+            known[name] = number(known[name], "1", name, least=0, below=1)
     if "cutoff" in known:
         known["cutoff"] = number(known["cutoff"], "m", "cutoff", above=0)
     found: dict[str, Any] = {"population": "patch"} | known

@@ -87,11 +87,7 @@ def targets_of(want: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, Any
             targets[name] = number(value, "1", f"want.{name}", above=0, below=1)
     if not targets:
         raise InputError(key="want", found=dict(want), expected="a target such as {'contact_area': '1 %'}")
-    known = {name: value for name, value in want.items() if name in KNOWN}
-    for name in ("modulus_error", "time_scale_error"):
-        if known.get(name) is not None:
-            known[name] = number(known[name], "1", name)
-    return targets, known_errors(known)
+    return targets, known_errors({name: value for name, value in want.items() if name in KNOWN})
 
 
 def parse_targets(texts: Sequence[str]) -> dict[str, str]:
@@ -111,11 +107,11 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         amount, _, name = text.strip().rpartition(" ")
         if not (name.isidentifier() and is_quantity(amount, "1")):
-            raise InputError(key="--for", found=text, expected="a target such as '1 % contact_area'")
+            raise InputError(key="for", found=text, expected="a target such as '1 % contact_area'")
         if name not in QUANTITIES:
-            raise InputError(key="--for", found=text, expected=f"a number of a budget{nearest(name, [*QUANTITIES])}")
+            raise InputError(key="for", found=text, expected=f"a number of a budget{nearest(name, [*QUANTITIES])}")
         if name in found:
-            raise InputError(key="--for", found=text, expected=f"one target for {name}")
+            raise InputError(key="for", found=text, expected=f"one target for {name}")
         found[name] = amount
     return found
 

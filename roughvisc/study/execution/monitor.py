@@ -117,7 +117,7 @@ class LiveMonitor(Monitor):
                 self._bars.say("further cases that end so are counted here, and named in the log")
 
     def tick(self) -> None:
-        self._bars.line("cases")
+        self._bars.line("sweep")
 
     def message(self, text: str) -> None:
         self._bars.say(text)
@@ -134,7 +134,7 @@ class LiveMonitor(Monitor):
         """Move the bar of the sweep."""
         with self._lock:
             done = sum(self._running.values()) + len(self._ended)
-        self._bars.reached("cases", done, len(self._names), self._summary())
+        self._bars.reached("sweep", done, len(self._names), self._summary())
 
     def _summary(self) -> str:
         with self._lock:

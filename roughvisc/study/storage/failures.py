@@ -83,28 +83,6 @@ def _version() -> dict[str, Any]:
 LOG = "sweep.log"
 
 
-def append(folder: Path, message: str) -> Path | None:
-    """Write a message to the log of a folder; the log's path, None if there is no such folder or it cannot be written.
-
-    Parameters
-    ----------
-    folder : Path
-        Of results; not made.
-    message : str
-        What is logged as an error.
-    """
-    path = folder / LOG
-    if not folder.is_dir():
-        return None
-    record = logging.LogRecord("roughvisc", logging.ERROR, "", 0, message, None, None)
-    try:
-        with path.open("a", encoding="utf-8", errors="backslashreplace") as stream:
-            stream.write(f"{_formatter().format(record)}\n")
-    except OSError:
-        return None
-    return path
-
-
 def _formatter() -> logging.Formatter:
     return logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s")
 

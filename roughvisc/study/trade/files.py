@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import xarray as xr
@@ -11,7 +10,6 @@ from roughvisc.errors import InputError
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import NETCDF
-from roughvisc.units import quantity
 
 
 def trade_folder(case: Case, out: str | Path | None) -> Path:
@@ -61,37 +59,3 @@ def is_trade(path: str | Path) -> bool:
             return _holds_a_trade(file)
     except (OSError, ValueError, RuntimeError):
         return False
-
-
-def part_of_one(text: str, name: str) -> float:
-    """A part of one from ``1%``, ``0.1 %`` or ``0.01``.
-
-    Examples
-    --------
-    >>> part_of_one("1%", "--accuracy"), part_of_one("0.02", "--accuracy")
-    (0.01, 0.02)
-    """
-    try:
-        part = quantity(text, "1")
-    except InputError:
-        part = math.nan
-    if not 0 < part < 1:
-        raise InputError(key=name, found=text, expected="a part such as 1% or 0.01, above 0 and below 1")
-    return part
-
-
-def seconds(text: str, name: str) -> float:
-    """A length of time from ``5 min``, ``90 s`` or a number of seconds. [s]
-
-    Examples
-    --------
-    >>> seconds("5 min", "--budget"), seconds("90", "--budget")
-    (300.0, 90.0)
-    """
-    try:
-        time = quantity(float(text) if text.strip().replace(".", "", 1).isdecimal() else text, "s")
-    except InputError:
-        time = math.nan
-    if not 0 < time < math.inf:
-        raise InputError(key=name, found=text, expected="a time such as '5 min' or 90 (seconds), above 0")
-    return time

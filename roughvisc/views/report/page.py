@@ -69,14 +69,14 @@ Rows = tuple[list[str], list[list[str]], list[str]]
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
 
-def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | Path | None = None) -> Path:
+def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], out: str | Path | None = None) -> Path:
     """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
     Parameters
     ----------
     results : path, xarray.Dataset, or sequence of them
         A result file, a folder of them, one case's result, or several.
-    path : path, optional
+    out : path, optional
         File to write. Default: ``report.html`` in the folder, or beside the file with its name and ``-report.html``.
 
     Returns
@@ -87,7 +87,7 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
     Raises
     ------
     InputError
-        If there is no result, or no `path` where Datasets are given.
+        If there is no result, or no `out` where Datasets are given.
     """
     failures: list[dict[str, str]] = []
     swept: list[dict[str, Any]] = []
@@ -106,17 +106,17 @@ def report(results: str | Path | xr.Dataset | Sequence[xr.Dataset], path: str | 
             failures = _failures(source)
             drawn = realisation_rows(realisations_table(index_of(source), swept_cases))
             swept = _swept(source) if len(sources) > 1 else []
-        path = path or (source / "report.html" if in_folder else source.with_name(f"{source.stem}-report.html"))
+        out = out or (source / "report.html" if in_folder else source.with_name(f"{source.stem}-report.html"))
     else:
         sources = [results] if isinstance(results, xr.Dataset) else list(results)
-    if path is None:
-        raise InputError("path is None: expected the name of the page, where Datasets are given")
+    if out is None:
+        raise InputError("out is None: expected the name of the page, where Datasets are given")
     if not sources and not failures:
         raise InputError("found no results: expected at least one")
     page = _page(sources, numbers, failures, swept, drawn)
-    with atomic_write(Path(path)) as temporary:
+    with atomic_write(Path(out)) as temporary:
         temporary.write_text(page, encoding="utf-8")
-    return Path(path)
+    return Path(out)
 
 
 def _files(folder: Path) -> list[Path]:

@@ -432,8 +432,9 @@ def test_study__states_values_that_change_no_key(tmp_path, invoke):
     assert "6 mm" in invoke("audit", tmp_path / "results", "--thickness", "6 mm")[1]
     path.write_text(AUDITED.replace("0.6 mm", "7 mm"))
     assert "7 mm" in invoke("audit", tmp_path / "results", "--study", path)[1]
-    for option, found in (("--density", "3 m"), ("--work-of-adhesion", "sticky"), ("--base", "glue")):
-        status, _, err = invoke("audit", tmp_path / "results", option, found, "--thickness", "1 mm")
+    for option, found in (("density", "3 m"), ("work_of_adhesion", "sticky"), ("base", "glue")):
+        name = f"--{option.replace('_', '-')}"
+        status, _, err = invoke("audit", tmp_path / "results", name, found, "--thickness", "1 mm")
         assert (status, f"{option}: found '{found}'" in err) == (2, True)
     for line in ('work_of_adhesion = "5 N"', 'base = "bonded"', "hardness = 3"):
         path.write_text(f"{BALL}[audit]\n{line}\n")

@@ -428,9 +428,9 @@ def test_closed_gap__has_no_relative_error(tmp_path):
 
 @pytest.mark.parametrize("text", ["1 % frobnication", "1", "1 %", "60 s", "3 kg mean_gap"])
 def test_target__that_is_none_is_refused(text):
-    with refused("--for", text):
+    with refused("for", text):
         parse_targets([text])
-    with refused("--for", "2 % force"):
+    with refused("for", "2 % force"):
         parse_targets(["1 % force", "2 % force"])
 
 

@@ -316,14 +316,20 @@ def test_command__writes_its_files_and_marks_the_cheapest(invoke, tmp_path, monk
 
 
 @pytest.mark.parametrize(
-    ("option", "found"),
-    [("--accuracy", "200%"), ("--accuracy", "much"), ("--quantity", FRICTION), ("--budget", "0"), ("--budget", "3 m")],
+    ("option", "found", "message"),
+    [
+        ("--accuracy", "200%", "accuracy: found '200%'"),
+        ("--accuracy", "much", "accuracy: found 'much'"),
+        ("--quantity", FRICTION, f"quantities: found '{FRICTION}'"),
+        ("--budget", "0", "budget: found 0.0"),
+        ("--budget", "3 m", "budget: found '3 m'"),
+    ],
 )
-def test_command__refuses_wrong_options_before_anything_runs(invoke, tmp_path, option, found):
+def test_command__refuses_wrong_options_before_anything_runs(invoke, tmp_path, option, found, message):
     (tmp_path / "ball.toml").write_text(STUDY)
     status, out, err = invoke("trade", "ball.toml", option, found)
     assert (status, out) == (2, "")
-    assert f"{option}: found '{found}'" in err
+    assert err.startswith(f"roughvisc: {message}")
     assert not (tmp_path / "results").exists()
 
 

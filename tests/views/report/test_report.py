@@ -98,7 +98,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
     assert "&lt;b&gt;a.sur" in text
     assert ('<td class="number warn">0.003</td>' in text) == (not within)
     assert "do not record the whole study" in text
-    with pytest.raises(InputError, match="path"):
+    with pytest.raises(InputError, match="out is None"):
         report([ds])
 
 
