@@ -79,7 +79,7 @@ def simulate(
         Whether contact may reach the border of the grid in free space. With "accept" the scan outline is treated as a
         punch; the attribute ``warnings`` of the result says so if contact reached the border.
     grid_error : bool
-        Whether to estimate the grid error from two more runs, on cells twice and four times as long: ``grid_error``,
+        Whether to estimate the grid error from one more run, on cells twice as long: ``grid_error``,
         ``grid_error_area`` and others at the output times.
     numerics : Numerics
         Settings that are rarely changed: length of the time steps.

@@ -83,7 +83,8 @@ class Variable:
 #: Comments of several variables.
 _COARSER = (
     "bound in practice, over the largest value of all rows, at a speed over the value there: from the same on cells "
-    "twice and four times as long (grid convergence index); of a scan it includes the roughness that coarser cells lose"
+    "twice as long, in steady sliding also four times (grid convergence index); of a scan it includes the roughness "
+    "that coarser cells lose"
 )
 _SPOTS = (
     "of the contact spots; constriction on both sides, each body a half-space, without the gap and without films; "

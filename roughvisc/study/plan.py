@@ -115,7 +115,7 @@ _ITERATIONS = 3
 #: last time. [s, 1, s]
 _BUDGET, _SHARE, _LONGEST = 1.5, 0.05, 15.0
 #: Work of the runs on coarser grids that estimate the grid error, over that of the run.
-_GRID_ERROR = 0.4
+_GRID_ERROR = 0.3
 #: Time to begin a case and to write its file, and to write a byte of a field. [s]
 _FILE, _WRITE = 0.05, 3e-9
 #: Contact fraction below which full contact is not expected: theories of roughness do not hold for single indenters.

@@ -16,7 +16,7 @@ from roughvisc.topography.cards import read_toml
 from roughvisc.topography.readers import sha256
 
 #: Raised by whoever changes the numbers that an unchanged case gives.
-NUMERICS_REVISION = 29
+NUMERICS_REVISION = 30
 
 #: Keys of a surface card that say whence it came and change no height.
 _PROSE = {
