@@ -1,4 +1,4 @@
-"""The driver: takes the rows that an experiment yields, one after the other, and has them recorded."""
+"""The driver: runs an experiment, records its rows and returns them as a Dataset."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Array = NDArray[Any]
 Progress = Callable[[float, float], None]
 #: Attributes of a surface that stay with its heights: the source, and how missing points were filled.
 _ORIGIN = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
-#: Between two libraries in the account of what a solve was computed with.
+#: Separator of the transform libraries of a resumed solve.
 _THEN = "; then "
 
 
@@ -120,7 +120,7 @@ def solve(
     problem : Problem
         Surface, body and settings.
     experiment : Experiment
-        What is done.
+        A loading or steady sliding.
     recorder : Recorder, optional
         Records the rows, and knows from where the run continues. Default: in memory, from the beginning.
     progress : bool or callable
@@ -202,11 +202,11 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     Parameters
     ----------
     experiment : Experiment
-        What is done.
+        A loading or steady sliding.
     rows : Rows
         Rows of the experiment, all of them found.
     recorder : Recorder
-        Holds what was recorded of them.
+        Recorder of these rows.
 
     Returns
     -------

@@ -31,7 +31,7 @@ _FREE = 0.25
 
 
 def surface_stands_alone(height: xr.DataArray) -> bool | None:
-    """Whether a surface is a single indenter (True) or a regular wave (False) by its recipe; None if that is open.
+    """Return whether a surface is a single indenter (True) or a regular wave (False) by its recipe; None if unknown.
 
     Parameters
     ----------
@@ -46,14 +46,14 @@ def surface_stands_alone(height: xr.DataArray) -> bool | None:
 
 
 def contact_stands_alone(pressure: Array, axis: int) -> bool:
-    """Whether nothing touches over a quarter of the period along an axis, in one piece.
+    """Return whether a contact-free gap spans at least a quarter of the period along an axis.
 
     Parameters
     ----------
     pressure : ndarray, shape (nx, ny)
         [Pa]
     axis : {0, 1}
-        Of the motion.
+        Axis of the motion.
     """
     touching = np.flatnonzero((pressure > 0).any(axis=1 - axis))
     if not touching.size:
@@ -64,7 +64,7 @@ def contact_stands_alone(pressure: Array, axis: int) -> bool:
 
 
 def creep_left(after_a_period: float, in_the_end: float) -> float:
-    """Part of all that creeps which is still to come after a period; 1 of a material that creeps without end.
+    """Return the part of the creep that has not recovered after a period; 1 for a material that creeps without end.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def creep_left(after_a_period: float, in_the_end: float) -> float:
 
 
 def wake_note(left: Mapping[float, float], period: float) -> str:
-    """What to say of contacts that run into each other's wake; empty if they do not.
+    """Return a warning if contacts slide into each other's wake, else ''.
 
     Parameters
     ----------
@@ -122,14 +122,14 @@ def speeds_note(dataset: xr.Dataset) -> str:
 
 
 def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
-    """What to say of a periodic surface with a step where it repeats; empty if it has none.
+    """Return a warning if a periodic surface has a step where it repeats, else ''.
 
     Parameters
     ----------
     height : DataArray, dims (x, y)
         The rigid profile. [m]
     dataset : Dataset
-        The result; where it holds the pressure, what the outermost cells carry of it is told.
+        The result. If it holds the pressure, the warning states the part that the outermost cells carry.
     """
     borders = border_mismatch(height)
     if not borders.jumps:
@@ -148,12 +148,12 @@ def border_note(height: xr.DataArray, dataset: xr.Dataset) -> str:
 
 
 def percent(share: float) -> str:
-    """A share to two digits, as 100 and not 1e+02."""
+    """Return a share to two digits, as 100 and not 1e+02."""
     return f"{float(f'{100 * share:.2g}'):g} %"
 
 
 def slope_note(height: xr.DataArray, boundary: str, approach: float) -> str:
-    """What to say of a surface that is too steep for small slopes; empty if it is not.
+    """Return a warning if a surface is too steep for small slopes, else ''.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The surface that is pressed, as plain arrays, and the part of it that is solved on.
+"""The surface of a run as plain arrays, and its domain: the part that is solved on.
 
 In free space nothing outside the contact matters. An elastic estimate with the final compliance and the largest load
 says how far the surfaces approach. Only cells whose undeformed gap is smaller can touch. A run uses the rectangle
@@ -59,8 +59,6 @@ class Profile:
     ----------
     present : ndarray of bool, shape (nx, ny)
         Cells with material.
-    highest : float
-        Height of the highest point, which on an indenter may lie between the cells. [m]
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at absent cells. [m]
     least_gap, mean_gap : float
@@ -93,8 +91,7 @@ class Profile:
                 "if there is no material"
             )
         self.height, self.kernel = height, kernel
-        self.highest = highest(height)
-        self.gap = self.highest - values
+        self.gap = highest(height) - values
         self.least_gap = float(np.nanmin(self.gap))
         self.gap[~self.present] = 0.0
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)
@@ -221,7 +218,7 @@ def expected_contact(problem: Problem, program: Program, enlarged: int | None = 
         return Expected(height)
     larger = enlarged_indenter(height)
     if larger is None and not (body.separates and not body.kernel.raises_surface):
-        return Expected(height)  # neither larger nor a part of it
+        return Expected(height)  # it is neither enlarged nor cropped
     times = enlarged or 0
     for _ in range(times):
         assert larger is not None, "it was enlarged before"

@@ -1,4 +1,4 @@
-"""Cores and memory of a run: what is available, what a run needs, and the refusal of a run that does not fit."""
+"""Cores and memory of a run: available memory, memory of a run, and the refusal of a run that does not fit."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Available:
     words: str
 
     def fits(self, needed: float) -> bool:
-        """Return whether a case that needs so much fits. [byte]"""
+        """Return whether a case that needs this much memory fits. [byte]"""
         return needed <= PART * self.size
 
 
@@ -193,7 +193,7 @@ def curve_bytes(settings: Settings, cells: float) -> float:
 def require_loading(
     shape: tuple[int, int], program: Program, settings: Settings, body: Body, *, in_memory: bool
 ) -> None:
-    """Refuse a loading on so many cells that does not fit in memory even if its contact stays sparse.
+    """Refuse a loading that does not fit in memory even if its contact stays sparse.
 
     Raises
     ------

@@ -195,12 +195,12 @@ def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
 
     Notes
     -----
-    ``shortest`` is the shortest age, next to zero, at which the compliance matters to what is kept; zero for a program
-    of jumps alone. What is kept soonest after a corner of the program resolves the shortest interval. Pressure that
-    came in the last part ``f`` of an interval ``h`` is all that meets ages below ``f h``. What a compliance that
-    ascends from the right value at age zero can be wrong by there is the creep till then: for the whole interval less
-    than ``f`` of ``C(h)``. With a tenth of the tolerance for ``f`` that is as much as the error beyond may be. Steps
-    below a millionth of a segment are not taken, so that ``f`` need not be less.
+    ``shortest`` is the shortest age, next to zero, at which the compliance matters to the kept rows; zero for a program
+    of jumps alone. The shortest interval ``h`` lies between a corner of the program and the kept time after it. Ages
+    below ``f h`` only belong to pressure that came in the last part ``f`` of the interval. There a compliance that
+    starts from the right value is wrong by at most the creep, which is less than ``f C(h)`` over the interval. With a
+    tenth of the tolerance for ``f`` this is as large as the error allowed beyond. No step is shorter than a millionth
+    of a segment, so a smaller ``f`` is not needed.
     """
     shortest, kept = math.inf, kept_times(program, settings.times)
     for segment in program.segments:

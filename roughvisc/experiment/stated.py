@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 INHERITED, INHERITED_APPROACH = 0.02, 0.005
 #: Least stated error of a pressure without a past, over the tolerance. Measured there too.
 LEAST = 0.015
-#: If every step is a row, those that state more than so many tolerances are left out.
+#: If every step is a row, steps with a larger stated error, in tolerances, are left out.
 AT_MOST = 3.0
 #: Error of a pressure at the edge of contact, over the mean one.
 SOLVER_AT_EDGE = 3.0
