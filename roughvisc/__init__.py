@@ -1,12 +1,10 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
-``import roughvisc as rv`` gives the public names that ``__init__.pyi`` lists; each is imported from its module when
-first used, so that the package itself is imported in no time.
+``import roughvisc as rv`` gives the public names that ``__init__.pyi`` lists. Each is imported from its module when it
+is first used, so that importing the package is quick.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 from roughvisc.lazy import public_names
 
@@ -14,7 +12,7 @@ _load, _names = public_names(globals())
 __all__ = ["__version__", *_names]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         from importlib import metadata  # slow to import
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # typing takes longer to import than the rest
+    from collections.abc import Callable
+    from typing import Any
 
 
 def public_names(package: dict[str, Any]) -> tuple[Callable[[str], Any], list[str]]:
-    """``__getattr__`` and ``__all__`` of a package; ``__init__.pyi`` has ``from module import name as name`` for each.
+    """Return ``__getattr__`` and ``__all__`` of a package.
+
+    Its stub, ``__init__.pyi``, has a line ``from module import name as name`` for each public name.
 
     Parameters
     ----------
     package : dict
-        Its ``globals()``, which keep what was imported.
+        ``globals()`` of the package, to which the imported names are added.
     """
     with open(f"{package['__file__']}i", encoding="utf-8") as stub:
-        modules = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \2$", stub.read(), re.M)}
+        lines = [line.split() for line in stub if line.startswith("from ")]
+    modules = {words[3]: words[1] for words in lines if len(words) == 6 and words[3] == words[5]}
 
     def load(name: str) -> Any:
         if name not in modules:
