@@ -17,7 +17,6 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.notebook import table
 from roughvisc.units import Quantity, number, quantities, said
 
 #: In which the profile moves.
@@ -240,14 +239,6 @@ class Program:
     def __repr__(self) -> str:
         """Return the first segments in words."""
         return f"Program: {', '.join(self._words() or ['nothing'])}"
-
-    def _repr_html_(self) -> str:
-        words, ends = self._words(), [*self.corners[1 : _LISTED + 1], self.duration]
-        rows = [
-            (str(place), text, f"until {said(end, 's')}" if end else "")
-            for place, (text, end) in enumerate(zip(words, ends, strict=False))
-        ]
-        return table("Program" if rows else "Program: nothing", rows)
 
     def _words(self) -> list[str]:
         """Return the first segments in words, and the number of others."""

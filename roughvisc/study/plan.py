@@ -47,7 +47,6 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory_choice import Choice, choose_memory
 from roughvisc.mechanics.program import Program, Segment, Slide
-from roughvisc.notebook import table
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.quantities import creep_time
@@ -128,46 +127,11 @@ _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
 _ROW, _ROUNDED = 300.0, 0.5
 #: Contact fraction of the middle row below which pressures are compressed, and frames of a chunk of the file.
 _COMPRESSED, _CHUNK = 0.24, 8
-#: Cases that a notebook shows.
-_SHOWN = 8
-#: Heading -> variable and its unit.
-_COLUMNS = {
-    "steps": ("steps", ""),
-    "convolutions": ("convolutions", ""),
-    "wall time": ("wall_time", "s"),
-    "memory": ("memory", "byte"),
-    "disk": ("disk", "byte"),
-}
 
 
-class Plan(xr.Dataset):
-    """Result of :func:`roughvisc.plan`, which a notebook shows as a table."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str:
-        known = {"cells_x", "cells_y", "refusal", *(name for name, _ in _COLUMNS.values())}
-        if not known <= set(self.data_vars) or self["refusal"].dims != ("case",) or "processes" not in self.attrs:
-            return super()._repr_html_()  # a part of a plan, or something made from one
-        varied = [str(name) for name in self.coords if name not in ("case", "case_key")]
-        whole = [
-            f"{self.sizes['case']} cases, {self.attrs['processes']} side by side",
-            *(f"{word} {_text(self.attrs[name], unit)}" for word, (name, unit) in list(_COLUMNS.items())[2:]),
-        ]
-        rows = [("", *varied, "cells", *_COLUMNS, "refused" if self["refusal"].any() else "")]
-        for number in range(min(self.sizes["case"], _SHOWN)):
-            one = self.isel(case=number)
-            mark = "" if bool(one.marched) else "~"  # of the most similar case
-            values = (mark + _text(float(one[name]), unit) for name, unit in _COLUMNS.values())
-            given = (_varied(one[name]) for name in varied)
-            cells = f"{int(one.cells_x)} x {int(one.cells_y)}"
-            rows.append((str(number), *given, cells, *values, str(one.refusal.values)))
-        if (more := self.sizes["case"] - _SHOWN) > 0:
-            rows.append(("...", f"{more} more"))
-        return table(f"{self.attrs.get('title') or 'Plan'}: {', '.join(whole)}", rows)
-
-
-def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None) -> Plan:
+def plan(
+    cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, workers: int | None = None
+) -> xr.Dataset:
     """Estimate the cost of each case on this machine; no case is computed and nothing is written.
 
     Parameters
@@ -182,7 +146,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     Returns
     -------
     xarray.Dataset
-        One row per case along ``case``, with varied parameters as coordinates; a notebook shows it as a table.
+        One row per case along ``case``, with varied parameters as coordinates.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
         thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, and
         ``refusal``, empty if all cases can run.
@@ -231,7 +195,7 @@ def plan(cases: Sequence[Case] | str | Path, out: str | Path | None = None, *, w
     coords: dict[str, Any] = {"case_key": ("case", np.array([case.key for case in cases]))}
     labels = labels_of(parameters, stated[0], ("case",)).values()
     coords |= dict(zip(parameters, labels, strict=True))
-    dataset = Plan(columns, coords=coords)
+    dataset = xr.Dataset(columns, coords=coords)
     dataset.attrs = {"title": cases[0].title} | totals(dataset, folder, workers, there)
     return dataset
 
@@ -862,19 +826,3 @@ def attributes(name: str) -> dict[str, str]:
     """Return the attributes of a variable of a plan."""
     units, long_name = COLUMNS[name]
     return {"long_name": long_name} | ({"units": units} if units else {})
-
-
-def _varied(value: xr.DataArray) -> str:
-    number = value.values[()]
-    if not isinstance(number, np.number):
-        return str(number)
-    unit = str(value.attrs.get("units", ""))
-    return unit_for([number], unit).text(float(number), 6) if unit else f"{number:.6g}"
-
-
-def _text(value: float, unit: str) -> str:
-    if not np.isfinite(value):
-        return "not known"
-    if unit == "byte":
-        return unit_for([value], "B").text(value)
-    return unit_for([value], unit).text(value) if unit else f"{value:.0f}"

@@ -11,7 +11,6 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import Base
-from roughvisc.notebook import table
 from roughvisc.study.audit import body_verdicts as of_body
 from roughvisc.study.audit import surface_verdicts as of_surface
 from roughvisc.study.audit.evidence import of_result
@@ -38,9 +37,9 @@ _WIDTH = 98
 
 @dataclass(frozen=True)
 class Audit:
-    """What was found, an entry an assumption that the scene makes.
+    """Findings on the assumptions that a scene makes.
 
-    Printed it is a table, in a notebook too. ``audit["thickness"]`` is the finding of one assumption, with ``number``,
+    It prints as a table. ``audit["thickness"]`` is the finding of one assumption, with ``number``,
     ``verdict``, ``sentence`` and ``limit``.
 
     Attributes
@@ -73,9 +72,6 @@ class Audit:
             head = f"{one.name:<11} {one.verdict:<9} {one.shown:>7}  "
             lines.append(textwrap.fill(one.sentence, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head)))
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return table(self.title or "audit", [(one.name, one.verdict, one.shown, one.sentence) for one in self.findings])
 
     def to_dataset(self) -> xr.Dataset:
         """The findings over ``assumption``: number, verdict, sentence, and from where on it is doubtful and broken."""
