@@ -28,9 +28,9 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 LIBRARIES = ("lowest-direct", "highest")
 #: Python and libraries with which tests run, and which.
 TESTED = (("3.11", "lowest-direct"), ("3.13", "highest"), ("3.14", "highest"))
-TESTS = ("tests/topography", "tests/study/statement", "tests/mechanics/contact")
+TESTS = ("tests/topography", "tests/study/study_file", "tests/mechanics/contact")
 #: What is named beside Python in the table.
-_TOLD = ("numpy", "scipy", "xarray", "netCDF4", "pydantic")
+_TOLD = ("numpy", "scipy", "xarray", "netCDF4")
 _NOTEBOOK = "first_contact.ipynb"
 
 

@@ -1,171 +1,265 @@
-"""The tables of the page on study files: keys, kinds, units, defaults and meanings as the schema has them.
+"""The tables of keys on the page on study files, from signatures and docstrings.
 
-``rows(name)`` gives those of one table of ``keys.toml``, ``table(name)`` the same in Markdown.
+``python study_keys.py`` prints the page ``study-files.md`` with its marks ``STUDY_KEYS name`` replaced by the tables.
 """
 
+import inspect
 import re
+from pathlib import Path
 
-from roughvisc.study.statement.schema import (
-    StudyFile,
-    evaluation,
-    experiments,
-    material,
-    program,
-    settings,
-    surface,
-)
-from roughvisc.study.statement.schema.keys import meaning as first_meaning
-from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.study.statement.schema.material import TEMPERATURE, THICKNESS
+import roughvisc as rv
+from roughvisc.arguments import arguments, units_of
+from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.mechanics.materials.derived import stiffened
+from roughvisc.mechanics.program import UNITS, Program
+from roughvisc.settings import Numerics, Settings
+from roughvisc.study.si_tables import COLUMNS, MODELS, unit_of
+from roughvisc.study.study_file import KEPT, PROGRAMS, SEGMENTS
+from roughvisc.topography.cards import FACE_STEPS, STEPS
+from roughvisc.topography.surrogates import surrogate
+from roughvisc.topography.synthesis import RECIPES
 
-HEAD = ("key", "expected", "unit", "default", "meaning", "example")
-_STEPS = surface.Prepared.model_fields
-_GENERATED = {f"generate: {name}": one for name, one in surface.GENERATED.items()}
-_MODELS = {f"material: {name}": one for name, one in material.SECTIONS.items()}
-_CASES = {
-    **{f"generate: {name}": {"surface": {"generate": name}} for name in surface.GENERATED},
-    **{f"material: {name}": {"material": {"model": name}} for name in material.SECTIONS},
-}
-
-
-def _only(section, names):
-    return {name: section.model_fields[name] for name in names}
-
-
-def _own(section, other):
-    return {name: field for name, field in section.model_fields.items() if name not in other}
-
-
-#: table -> where its keys stand in a study, and the schema's fields
-TABLES = {
-    "study": ("", StudyFile.model_fields),
-    "surface: a file": ("surface", surface.FromFile.model_fields),
-    "surface: steps of a face": ("surface", _STEPS),
-    "surface: steps of the profile": ("surface", _own(surface.SurfaceSection, _STEPS)),
-    "surface.crop": ("surface.crop", surface.Crop.model_fields),
-    "surface.outliers": ("surface.outliers", surface.Outliers.model_fields),
-    "surface.filter": ("surface.filter", surface.Filter.model_fields),
-    "surface.second": ("surface.second", _own(surface.SecondFace, _STEPS)),
-    "generate: any": (
-        "surface",
-        _only(surface.GENERATED["sphere"], ("generate", "size", "shape")),
-    ),
-    **{
-        name: (
-            "surface",
-            _own(one, {*surface.SurfaceSection.model_fields, "generate", "size", "shape"}),
+HEAD = ("key", "unit", "default", "meaning")
+#: Functions whose docstrings describe the arguments of others.
+_DESCRIBED_BY = {Settings: rv.simulate, SteadySliding: rv.friction, Numerics: Numerics}
+#: Keys that are no arguments of a function: unit, default, meaning.
+_FILE = ("", "none", "a CSV file with columns in place of the lists, relative to the study")
+_COLUMN_UNIT = ("", "that of the heading", "unit of the column, if its heading has none")
+_RECIPE = ("", "required", "the recipe: " + ", ".join(f"`{name}`" for name in RECIPES))
+_MODEL = ("", "required", "the model: " + ", ".join(f"`{name}`" for name in MODELS))
+_CONTROL = ("", "`load`", "what the values are: `load`, `approach` or `pressure`")
+_EXTRA = {
+    "study": {
+        "title": ("", "`untitled`", "title of the study and its figures"),
+        "surface": ("", "required", "the surface"),
+        "material": ("", "required", "the body"),
+        "program": ("", "none", "list of segments; this or `friction` is required"),
+        "friction": ("", "none", "steady sliding"),
+        "solve": ("", "none", "how it is computed"),
+        "keep": ("", "none", "what the result keeps"),
+        "observe": ("", "none", "quantities derived from the result"),
+        "audit": ("", "none", "properties for the audit"),
+        "sweep": ("", "none", "values that are varied"),
+    },
+    "surface: a file": {
+        "file": (
+            "",
+            "required",
+            "an instrument file, a grid file or a surface card, relative to the study",
         )
-        for name, one in _GENERATED.items()
+    },
+    "generate: any": {"generate": _RECIPE},
+    "surface.second": {
+        "flip": (
+            "",
+            "`x`",
+            "axis along which the second face is reversed when it is turned over: `x`, `y` or `none`",
+        )
+    },
+    "material: any": {"model": _MODEL},
+    "friction.speeds": {
+        "from": ("m/s", "required", "lowest speed"),
+        "to": ("m/s", "required", "highest speed"),
+        "count": ("", "required", "number of speeds, evenly spaced on a logarithmic axis"),
+    },
+    "program: cycle": {"cycle": ("", "required", "a table, see below"), "control": _CONTROL},
+    "program: table": {
+        "table": (
+            "",
+            "required",
+            "a table, see below; or the path of a CSV file, whose rows are all kept",
+        ),
+        "control": _CONTROL,
+    },
+    "program.table: a file": {
+        "file": ("", "required", "the path of a table of a test machine, relative to the study")
+    },
+    "keep": {
+        "precision": (
+            "",
+            "none",
+            "relative precision of the fields in the file; exact without it",
+        )
+    },
+    "observe": {
+        "leakage": ("", "none", "leak rate of a fluid through the gap"),
+        "conductance": ("", "none", "conductance of the contact spots"),
     },
     **{
-        name: ("material", _own(one, {"model", "on", *TEMPERATURE, *THICKNESS}))
-        for name, one in _MODELS.items()
+        f"material: {model}": {"file": _FILE}
+        | {
+            one.unit_key: _COLUMN_UNIT
+            for one in columns.values()
+            if one.unit_key not in ("", "frequency_unit")
+        }
+        for model, columns in COLUMNS.items()
     },
-    "material: temperature": ("material", _only(material.SECTIONS["elastic"], TEMPERATURE)),
-    "material: thickness": ("material", _only(material.SECTIONS["elastic"], (*THICKNESS, "on"))),
-    **{
-        f"program: {name}": ("program.0", kind["load"].model_fields)
-        for name, kind in program.KINDS.items()
-    },
-    "program.cycle": ("program.0.cycle", program.TABLES["load"].wave.model_fields),
-    "program.table": ("program.0.table", program.TABLES["load"].rows.model_fields),
-    "friction": ("friction", experiments.FrictionSection.model_fields),
-    "friction.speeds": (
-        "friction.speeds",
-        {field.alias or name: field for name, field in experiments.Decades.model_fields.items()},
+}
+
+
+def _of(function, *names, **renamed):
+    """Rows of the arguments of a function: key -> (function, argument)."""
+    return {key: (function, key) for key in names} | {
+        key: (function, name) for key, name in renamed.items()
+    }
+
+
+def _all(function, *without, skipped=0):
+    return _of(function, *(name for name in arguments(function, skipped) if name not in without))
+
+
+_SETTINGS = [name for name in arguments(Settings) if name not in (*KEPT, "missing")]
+#: Table of the page -> place of its keys in a study, and the argument of each key.
+TABLES = {
+    "study": ("", {}),
+    "surface: a file": ("surface", _all(rv.open_scan, skipped=1)),
+    "surface: steps of a face": (
+        "surface",
+        {name: (STEPS[name].function, STEPS[name].argument) for name in FACE_STEPS},
     ),
-    "solve": ("solve", settings.SolveSection.model_fields),
-    "keep": ("keep", settings.KeepSection.model_fields),
-    "observe": ("observe", evaluation.ObserveSection.model_fields),
-    "observe.leakage": ("observe.leakage", evaluation.LeakageTable.model_fields),
-    "observe.conductance": ("observe.conductance", evaluation.ConductanceTable.model_fields),
-    "audit": ("audit", evaluation.AuditSection.model_fields),
+    "surface: steps of the profile": (
+        "surface",
+        {
+            name: (step.function, step.argument)
+            for name, step in STEPS.items()
+            if name not in FACE_STEPS
+        }
+        | _of(Settings, "missing"),
+    ),
+    "surface.crop": ("surface.crop", _all(rv.crop, skipped=1)),
+    "surface.outliers": ("surface.outliers", _all(rv.mask_outliers, skipped=1)),
+    "surface.filter": ("surface.filter", _all(rv.gaussian_filter, skipped=1)),
+    "surface.second": ("surface.second", _of(rv.combine, "offset")),
+    "generate: any": ("surface", _of(rv.sphere, "size", "shape")),
+    **{
+        f"generate: {name}": ("surface", _all(one, "size", "shape"))
+        for name, one in RECIPES.items()
+    },
+    "material: any": ("material", _of(stiffened, modulus_factor="factor")),
+    **{
+        f"material: {name}": ("material", _all(one, "note", "stands_for"))
+        for name, one in MODELS.items()
+    },
+    "material: temperature": (
+        "material",
+        _of(rv.wlf, "temperature", "reference_temperature", wlf_c1="c1", wlf_c2="c2")
+        | _of(rv.arrhenius, "activation_energy")
+        | _of(rv.shift, shift_factor="factor"),
+    ),
+    "material: thickness": ("material", _of(rv.sheet, "thickness", "base") | _of(rv.layer, "on")),
+    **{
+        f"program: {kind}": (
+            "program.0",
+            {kind: (one, next(iter(arguments(one, 1))))} | _of(one, *list(arguments(one, 1))[1:]),
+        )
+        for kind, one in SEGMENTS.items()
+    },
+    **{f"program: {kind}": ("program.0", {}) for kind in PROGRAMS},
+    "program.cycle": ("program.0.cycle", _all(Program.cycle, "control")),
+    "program.table": ("program.0.table", _all(Program.table, "control", "note")),
+    "program.table: a file": ("program.0.table", _all(rv.read_program, skipped=1)),
+    "friction": ("friction", _all(SteadySliding)),
+    "friction.speeds": ("friction.speeds", {}),
+    "solve": ("solve", _of(Settings, *_SETTINGS)),
+    "keep": ("keep", _of(Settings, *KEPT)),
+    "observe": ("observe", {}),
+    "observe.leakage": ("observe.leakage", _all(rv.observables.leakage, skipped=1)),
+    "observe.conductance": ("observe.conductance", _all(rv.observables.conductance, skipped=1)),
+    "audit": ("audit", _all(rv.audit, skipped=1)),
 }
-#: first word of a table's name -> the table whose meanings hold where it has none of its own
-_SHARED = {"generate": "generate: any", "material": "material: any"}
-_WORDS = {
-    "control": "'load', 'approach' or 'pressure'",
-    "cycle": "a table",
-    "friction": "a table",
-    "note": "a text",
-    "table": "a table, or the path of a CSV file",
-    "crop": "a table of x and y limits",
-    "speed": "a quantity above 0",
-    "over": "a quantity above 0",
-    "solve": "a table",
-    "keep": "a table",
-    "audit": "a table",
-    "sweep": "a table of lists, or several",
-    "precision": "a number above 0 and below 1",
-    "generate": "one of " + ", ".join(surface.GENERATED),
-}
-#: units that depend on another key
+#: Units that depend on another key.
 _UNITS = {
-    **dict.fromkeys(("mean", "amplitude", "values"), "N, m or Pa"),
+    **dict.fromkeys(("mean", "amplitude", "values", "zero", "thin"), "N, m or Pa"),
     "frequencies": "Hz or rad/s",
-    **dict.fromkeys(("from", "to"), "m/s"),
 }
 
 
-def meaning(name, key):
-    """Meaning and example of a key."""
-    return first_meaning((name, _SHARED.get(name.partition(":")[0], "")), key)
-
-
-def rows(name):
-    """Key, what is expected, unit, default, meaning and example of each key of a table."""
-    above, fields = TABLES[name]
-    found = []
-    for key, field in fields.items():
-        words = field.description or _WORDS[key]
-        unit = unit_of(f"{above}.{key}" if above else key, _CASES.get(name))
-        told = ("program.", "material: dynamic", "friction.speeds")
-        unit = _UNITS.get(key, unit) if name.startswith(told) else unit
-        about, example = meaning(name, key)
-        found.append((key, _short(words), unit, _default(field), about, example))
+def described(function):
+    """Meaning of each argument, from the docstring of a function."""
+    about = function if function is surrogate else _DESCRIBED_BY.get(function, function)
+    section = re.split(r"\n(?=Raises|Returns|Notes|Attributes|Examples)", inspect.getdoc(about))
+    found = {}
+    for part in section:
+        if "Parameters\n---" not in part:
+            continue
+        body = part.partition("Parameters\n")[2].partition("\n")[2]
+        for names, text in re.findall(
+            r"^(\S[^\n]*?)(?: : [^\n]*)?\n((?:    [^\n]*\n?|\n)+)", body, re.M
+        ):
+            for name in names.split(", "):
+                found[name.strip("*")] = " ".join(text.split())
     return found
 
 
-def _short(words):
-    """What is expected, without the units, which have a column."""
-    words = re.sub(r"^a number \[[^]]+\], or text with a unit,?", "a quantity", words)
-    words = re.sub(r" \[[^\[\]]+\]| in s\b", "", words)
-    return re.sub(r"(\w)'(\w)", r"\1’\2", words)
+def meaning(function, argument):
+    """Meaning of an argument, in Markdown; of a step without one: what the function does."""
+    if argument == "time_step":
+        function = Numerics
+    text = described(function).get(argument, "") if argument else ""
+    if not text:
+        text = inspect.getdoc(function).partition("\n")[0]
+    text = re.sub(r":math:`([^`]*)`", r"$\1$", text)
+    text = re.sub(r":\w+:`~?([^`]*)`", lambda one: f"`{one[1].rpartition('.')[2]}`", text)
+    text = text.replace("``", "`")
+    text = re.sub(r"\s*\[[^\[\]]*\](?=[.,;:]?(?:\s|$))", "", text)  # the unit has a column
+    return text.removesuffix(".")
 
 
-def _default(field):
-    if field.is_required():
+def _default(name, function, argument):
+    default = arguments(function)[argument][1] if argument else inspect.Parameter.empty
+    if name.startswith("surface: steps") and argument != "missing":
+        return (
+            "not done" if default is inspect.Parameter.empty else f"not done; `true`: `{default}`"
+        )
+    if name in ("material: any", "material: temperature", "material: thickness"):
+        return "none" if default is inspect.Parameter.empty else f"`{default}`"
+    if default is inspect.Parameter.empty:
         return "required"
-    value = field.get_default(call_default_factory=True)
-    if value is None or hasattr(type(value), "model_fields") or value == ():
+    if default in (None, (), ""):
         return "none"
-    if isinstance(value, bool):
-        return f"`{str(value).lower()}`"
-    shown = list(value) if isinstance(value, tuple) else value
+    if isinstance(default, bool):
+        return f"`{str(default).lower()}`"
+    shown = list(default) if isinstance(default, tuple) else default
     return (
         f"`{shown:g}`" if isinstance(shown, float) else "`" + str(shown).replace("'", '"') + "`"
     )
 
 
-def _cells(row):
-    key, words, unit, default, about, example = row
-    cells = (
-        f"`{key}`",
-        re.sub(r"'([^']*)'", r"`\1`", words),
-        unit,
-        default,
-        about,
-        f"`{example}`",
-    )
-    return [cell.replace("|", "\\|") for cell in cells]
+def rows(name):
+    """Key, unit, default and meaning of each key of a table."""
+    above, keys = TABLES[name]
+    found = [(key, *row) for key, row in _EXTRA.get(name, {}).items()]
+    for key, (function, argument) in keys.items():
+        unit = _UNITS.get(key) if name.startswith(("program.", "material: dynamic")) else None
+        if name == "program.table: a file" and key in UNITS:
+            unit = "-"  # the name of a column
+        unit = (
+            unit
+            or unit_of(f"{above}.{key}")
+            or units_of(function).get(argument, "").removeprefix("1")
+        )
+        columns = COLUMNS.get(name.removeprefix("material: "), {})
+        default = "required, or `file`" if key in columns else _default(name, function, argument)
+        found.append((key, unit, default, meaning(function, argument)))
+    return found
 
 
 def table(name):
     """Markdown of a table."""
     lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
-    return "\n".join([*lines, *("| " + " | ".join(_cells(row)) + " |" for row in rows(name))])
+    cells = [[f"`{key}`", *rest] for key, *rest in rows(name)]
+    return "\n".join(
+        [
+            *lines,
+            *("| " + " | ".join(one.replace("|", "\\|") for one in row) + " |" for row in cells),
+        ]
+    )
 
 
 def filled(page):
-    """A page with its marks ``STUDY_KEYS name`` replaced by the tables."""
+    """Return a page with its marks ``STUDY_KEYS name`` replaced by the tables."""
     return re.sub(r"^STUDY_KEYS (.+)$", lambda found: table(found[1]), page, flags=re.M)
+
+
+if __name__ == "__main__":
+    print(filled(Path(__file__).with_name("study-files.md").read_text(encoding="utf-8")))

@@ -23,7 +23,7 @@ from roughvisc.study import storage as storage  # ds.roughvisc is there wherever
 from roughvisc.units import Quantity, quantities
 
 if TYPE_CHECKING:
-    from roughvisc.study.statement.case import Case
+    from roughvisc.study.case import Case
 
 Progress = Callable[[float, float], None]
 
@@ -161,7 +161,7 @@ def friction(
         times, unless the profile is uniform across the motion. Shift factors of a temperature act as factors of the
         speed.
     speeds : float or str, or sequence of them
-        [m/s]
+        Sliding speeds. [m/s]
     load, pressure : float or str
         Load [N] or nominal pressure [Pa]: one of them.
     direction : {"x", "-x", "y", "-y"}
@@ -277,8 +277,8 @@ def run(
         If the contact of a step or at a speed is not solved. The result with the other speeds is written, and the
         message names the file.
     """
+    from roughvisc.study.case import Case, read_study
     from roughvisc.study.execution.single import run_stated
-    from roughvisc.study.statement.case import Case, read_study
 
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None:

@@ -15,7 +15,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.case import read_cases
 from roughvisc.views.sweep_figures.case_text import study_text
 
 ROOT = Path(__file__).parents[1]

@@ -13,8 +13,8 @@ from support import assert_same, numbers
 import roughvisc as rv
 from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.trade.ladder import Setting
 
 HEAD = """
@@ -110,12 +110,11 @@ def over_the_rows(variable, kind):
 
 def computed(case, body=None, **settings):
     """What the function gives that does the same as a study."""
-    solving = case.solving()
+    solving = case.settings
     shared = {"tolerance": solving.tolerance, "fields": solving.fields, "progress": False} | settings
     body = case.body() if body is None else body
-    asked = case.settings.friction
-    if asked is not None:
-        return rv.friction(case.height(), body, speeds=asked.speeds, pressure=asked.pressure, **shared)
+    if asked := case.tables.get("friction"):
+        return rv.friction(case.height(), body, **asked, **shared)
     return rv.simulate(case.height(), body, case.program(), boundary="periodic", times=solving.times, **shared)
 
 

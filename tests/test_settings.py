@@ -12,10 +12,7 @@ from hypothesis import strategies as st
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.settings import WORDS, Numerics, Settings
-from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.keys import study_schema
-from roughvisc.study.statement.schema.settings import KeepSection, SolveSection
-from roughvisc.study.statement.schema.surface import Conditioned
+from roughvisc.study.case import Case, vary
 from roughvisc.study.trade.ladder import Setting
 from roughvisc.variables import FIELDS
 
@@ -37,19 +34,8 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
     given = {name: one.default for name, one in signature.items() if one.kind == one.KEYWORD_ONLY}
     assert given | vars(given.pop("numerics")) == USUAL | {"threads": None, "progress": True}
     assert given.keys().isdisjoint(vars(Numerics()))
-    solve, keep = SolveSection(), KeepSection()
-    assert dict(solve) == {name: USUAL[name] for name in dict(solve)}
-    assert (keep.fields, keep.times) == (USUAL["fields"], "all")
-    assert Conditioned().missing == USUAL["missing"]
-    stated = {*dict(solve), "fields", "times", "missing"}
-    assert stated == set(USUAL)
+    assert vars(STUDY.settings) == USUAL | {"boundary": "free"}
     assert Setting().tolerance == USUAL["tolerance"]
-
-
-def test_words__are_the_same_in_python_in_a_study_and_in_the_solver():
-    properties = study_schema()["$defs"]["SolveSection"]["properties"]
-    stated = {name: tuple(one["enum"]) for name, one in properties.items() if "enum" in one}
-    assert stated == {name: words for name, words in WORDS.items() if name != "missing"}
 
 
 @pytest.mark.parametrize(
@@ -132,6 +118,5 @@ def test_study__states_the_settings_that_the_solver_gets(chosen):
     wanted = Settings(**chosen)
     written = chosen | ({"times": "all"} if wanted.times is None else {})
     case = vary(STUDY, {f"{TABLES.get(name, 'solve')}.{name}": value for name, value in written.items()})
-    kept = tuple(name for name in FIELDS if name in wanted.fields)
     boundary = "free" if wanted.boundary == "auto" else wanted.boundary  # of an indenter
-    assert case.solving() == Settings(**{**vars(wanted), "fields": kept, "boundary": boundary})
+    assert case.settings == Settings(**{**vars(wanted), "boundary": boundary})

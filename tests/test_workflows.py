@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc.api import run
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.observables import history
-from roughvisc.study.statement.case import read_cases, read_study, vary
+from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.variables import NOT_CONVERGED
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
@@ -34,7 +34,7 @@ def test_study__runs(path, tmp_path):
         ds = run(case, tmp_path, progress=False)
         assert float(ds.force[-1]) > 0
         assert (np.diff(ds.contact_area) >= 0).all(), "under a load that is held, the contact grows"
-        assert float(ds.time_error.max()) <= 1.1 * case.settings.solve.tolerance
+        assert float(ds.time_error.max()) <= 1.1 * case.settings.tolerance
         assert 0.01 < float(ds.contact_fraction[-1]) < 0.6
 
 

@@ -165,7 +165,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     from rich.console import Console
 
     from roughvisc.study.first_pressure import first_pressure
-    from roughvisc.study.statement.starter import starter_study
+    from roughvisc.study.first_study import starter_study
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from distributed import Client
     from rich.console import Console
 
+    from roughvisc.study.case import Case
     from roughvisc.study.execution.task import Outcome
-    from roughvisc.study.statement.case import Case
 
 _QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 #: Most messages on failed cases.
@@ -99,9 +99,9 @@ def run(
     """
     from rich.console import Console
 
+    from roughvisc.study.case import read_cases
     from roughvisc.study.execution.cluster import connect
     from roughvisc.study.execution.run import result_folder
-    from roughvisc.study.statement.case import read_cases
 
     cases = read_cases(study)
     if targets and len(cases) > 1:
@@ -170,7 +170,7 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
     """Add the observables of the study to the results; return what went wrong, empty if nothing."""
     from roughvisc.study.observed import observe
 
-    if all(case.settings.observe is None for case in cases):
+    if not any(case.observed() for case in cases):
         return ""
     with console.status("observing") as status:
         try:
@@ -260,7 +260,7 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     from scipy import fft
 
     from roughvisc.progress import reporting
-    from roughvisc.study.statement.case import read_study
+    from roughvisc.study.case import read_study
     from roughvisc.study.storage.store import write_dataset
     from roughvisc.study.trade.files import trade_folder
     from roughvisc.study.trade.recommend import main_quantities

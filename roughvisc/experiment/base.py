@@ -192,10 +192,6 @@ class Experiment(ABC):
         """
 
     @abstractmethod
-    def content(self) -> Any:
-        """Return all that determines the experiment, as JSON has it: for the key of a case."""
-
-    @abstractmethod
     def progress(self, done: float, end: float) -> str:
         """Return the progress in words."""
 

@@ -76,7 +76,6 @@ class Loading(Experiment):
     program: Program
 
     axis: ClassVar[str] = "time"
-    table: ClassVar[str] = "program"
 
     def __repr__(self) -> str:
         return repr(self.program)
@@ -84,14 +83,6 @@ class Loading(Experiment):
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
         """Every accepted step, those to keep as rows of the result."""
         return LoadingRows(problem, self.program, state, in_memory=in_memory)
-
-    def content(self) -> Any:
-        """The segments."""
-        return [
-            [one.control, one.duration, one.end, one.amplitude, one.period]
-            + ([one.slide.distance, one.slide.direction] if one.slide else [])
-            for one in self.program.segments
-        ]
 
     def progress(self, done: float, end: float) -> str:
         """The time reached. [s]"""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Any, ClassVar, get_args
@@ -40,7 +40,7 @@ from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
-from roughvisc.units import unit_for
+from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
@@ -68,6 +68,7 @@ _MEANINGFUL = 0.1
 DIRECTIONS: tuple[str, ...] = get_args(Direction)
 
 
+@quantities(speeds="m/s", load="N", pressure="Pa")
 @dataclass(frozen=True, kw_only=True)
 class SteadySliding(Experiment):
     """What is asked of steady sliding, beside a surface, a material and settings; see :func:`roughvisc.friction`.
@@ -88,13 +89,12 @@ class SteadySliding(Experiment):
     Steady sliding: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
     """
 
-    speeds: Sequence[float] | float
-    load: float | None = None
-    pressure: float | None = None
+    speeds: Sequence[Quantity] | Quantity
+    load: Quantity | None = None
+    pressure: Quantity | None = None
     direction: Direction = "x"
 
     axis: ClassVar[str] = "speed"
-    table: ClassVar[str] = "friction"
     boundary: ClassVar[Boundary] = "periodic"
 
     def __post_init__(self) -> None:
@@ -107,8 +107,10 @@ class SteadySliding(Experiment):
         object.__setattr__(self, "speeds", tuple(speeds.tolist()))
         if self.direction not in DIRECTIONS:
             raise InputError(key="direction", found=self.direction, expected=" or ".join(map(repr, DIRECTIONS)))
-        if (self.load is None) == (self.pressure is None):
-            raise InputError(key="load", found=self.load, expected=f"either this or the pressure ({self.pressure!r})")
+        if self.load is None and self.pressure is None:
+            raise InputError(key="load", expected="a load, or a pressure")
+        if self.load is not None and self.pressure is not None:
+            raise InputError(key="pressure", found=self.pressure, expected=f"either this or the load, {self.load!r}")
         for name, value, unit in (("load", self.load, "N"), ("pressure", self.pressure, "Pa")):
             if value is not None and not (isinstance(value, int | float) and 0 < value < math.inf):
                 raise InputError(key=name, found=value, expected=f"a positive number [{unit}]")
@@ -152,11 +154,6 @@ class SteadySliding(Experiment):
         if settings.missing != "refuse":
             yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
         yield from super().unsupported(settings)
-
-    def content(self) -> Any:
-        """What differs from the defaults."""
-        found = {one.name: getattr(self, one.name) for one in fields(self) if getattr(self, one.name) != one.default}
-        return found | {"speeds": list(self.asked)}
 
     def progress(self, done: float, end: float) -> str:
         """The number of speeds that are found."""

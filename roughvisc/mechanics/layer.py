@@ -582,7 +582,7 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
     True
     """
     if not (isinstance(thickness, int | float) and thickness > 0):
-        raise InputError(f"thickness is {thickness!r}: expected a positive number [m]")
+        raise InputError(key="thickness", found=thickness, expected="a positive number [m]")
     _check("material", material)
     thicknesses: tuple[float, ...] = (float(thickness),)
     if isinstance(on, LayeredBody):
@@ -598,13 +598,13 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
 def _check(name: str, material: Any) -> None:
     """Refuse what is not a material of one body with a constant Poisson's ratio of 0 to 1/2."""
     if isinstance(material, Body):
-        raise InputError(f"{name} is the body {material!r}: expected a material{' or a layer' * (name == 'on')}")
+        raise InputError(key=name, found=material, expected="a material" + " or a layer" * (name == "on"))
     amiss = separability_error(material)
     if amiss:
-        raise InputError(f"{name} is {amiss}: expected one body, Poisson's ratio constant")
+        raise InputError(key=name, found=amiss, expected="one body, Poisson's ratio constant")
     poisson = complete(material).poisson
     if not 0 <= poisson <= 0.5:
-        raise InputError(f"{name} has Poisson's ratio {poisson!r}: expected 0 to 1/2 in a layered body")
+        raise InputError(key=name, found=poisson, expected="Poisson's ratio from 0 to 1/2 in a layered body")
 
 
 def _final_kernel(materials: tuple[Material, ...], thicknesses: tuple[float, ...]) -> LayerKernel:

@@ -139,7 +139,8 @@ class Segment:
         lowest = (self.end or 0.0) - abs(self.amplitude)
         if self.control in PUSHING and lowest < 0:
             reached = f"{self.control} reaches {lowest!r} {UNITS[self.control]}"
-            raise InputError(f"{reached}: expected no negative {self.control}, contact here has no adhesion")
+            expected = f"no negative {self.control}, contact here has no adhesion"
+            raise InputError(f"{reached}: expected {expected}", found=lowest, expected=expected)
         if self.amplitude and not (self.period > 0 and math.isfinite(self.period)):
             raise InputError(f"period of a cycle is {self.period!r}: expected a positive number [s]")
         if self.slide is not None and (self.end is not None or self.amplitude or self.duration == 0):
@@ -204,6 +205,8 @@ class Segment:
 
 #: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
+#: Largest number of cycles.
+MOST_CYCLES = 1e6
 # Segments that the text of a program lists.
 _LISTED = 8
 
@@ -254,10 +257,9 @@ class Program:
 
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""
-        here = f"program.{len(self.segments)}"
         least = 0.0 if control in PUSHING else None
-        end = number(value, UNITS[control], f"{here}.{control}", least=least, instead=INSTEAD[control])
-        return self._then(Segment(control, number(over, "s", f"{here}.over", least=0), end))
+        end = number(value, UNITS[control], control, least=least, instead=INSTEAD[control])
+        return self._then(Segment(control, number(over, "s", "over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
         """This program followed by another one."""
@@ -360,11 +362,10 @@ class Program:
         InputError
             If the time is negative, not finite or of another kind, in the words of a study file.
         """
-        here = f"program.{len(self.segments)}"
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
-        kept = one_of(control, Control, CONTROLS, f"{here}.control")
-        return self._then(Segment(kept, number(duration, "s", f"{here}.hold", least=0)))
+        kept = one_of(control, Control, CONTROLS, "control")
+        return self._then(Segment(kept, number(duration, "s", "hold", least=0)))
 
     def slide(
         self,
@@ -400,17 +401,12 @@ class Program:
         >>> press.slide("2 mm", speed="1 mm/s").hold(1.0).slide("2 mm", over=2.0, direction="-x")
         Program: load to 2 N over 50 ms, slide 2 mm along x over 2 s at 1 mm/s, hold 1 s, slide 2 mm along -x over 2 s at 1 mm/s
         """  # noqa: E501 - one line of output
-        here = f"program.{len(self.segments)}"
-        far = number(distance, "m", f"{here}.slide", above=0)
+        far = number(distance, "m", "slide", above=0)
         if (speed is None) == (over is None):
-            raise InputError(f"{here}: speed is {speed!r} and over is {over!r}: expected one of them")
-        lasting = (
-            number(over, "s", f"{here}.over", above=0)
-            if speed is None
-            else far / number(speed, "m/s", f"{here}.speed", above=0)
-        )
+            raise InputError(key="speed", found=speed, expected=f"either this or over, which is {over!r}")
+        lasting = number(over, "s", "over", above=0) if speed is None else far / number(speed, "m/s", "speed", above=0)
         control = self.segments[-1].control if self.segments else "load"
-        towards = one_of(direction, Direction, DIRECTIONS, f"{here}.direction")
+        towards = one_of(direction, Direction, DIRECTIONS, "direction")
         return self._then(Segment(control, lasting, slide=Slide(far, towards)))
 
     @classmethod
@@ -437,15 +433,16 @@ class Program:
         """
         unit = UNITS[one_of(control, Control, CONTROLS, "control")]
         if len(times) != len(values) or not len(times):
-            raise InputError(f"table has {len(times)} times and {len(values)} values: expected as many, at least one")
-        instants = [number(time, "s", f"table.times.{row}") for row, time in enumerate(times)]
-        ends = [number(value, unit, f"table.values.{row}") for row, value in enumerate(values)]
+            expected = f"as many values as times, {len(times)}, at least one"
+            raise InputError(key="values", found=len(values), expected=expected)
+        instants = [number(time, "s", f"times.{row}") for row, time in enumerate(times)]
+        ends = [number(value, unit, f"values.{row}") for row, value in enumerate(values)]
         if instants[0] != 0:
-            raise InputError(key="table.times.0", found=times[0], expected="zero")
+            raise InputError(key="times.0", found=times[0], expected="zero")
         segments = [Segment(control, 0.0, ends[0])] if ends[0] else []
         for row, (before, now) in enumerate(pairwise(instants), 1):
             if not now >= before:
-                raise InputError(key=f"table.times.{row}", found=times[row], expected=f"at least {before!r} s")
+                raise InputError(key=f"times.{row}", found=times[row], expected=f"at least {before!r} s")
             segments.append(Segment(control, now - before, ends[row]))
         return cls(tuple(segments), note)
 
@@ -479,10 +476,10 @@ class Program:
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
         unit, instead = UNITS[one_of(control, Control, CONTROLS, "control")], INSTEAD[control]
-        middle = number(mean, unit, "cycle.mean", least=0 if control in PUSHING else None, instead=instead)
-        height = number(amplitude, unit, "cycle.amplitude", instead=instead)
-        length = number(period, "s", "cycle.period", above=0)
-        duration = length * number(cycles, "1", "cycle.cycles", above=0)
+        middle = number(mean, unit, "mean", least=0 if control in PUSHING else None, instead=instead)
+        height = number(amplitude, unit, "amplitude", instead=instead)
+        length = number(period, "s", "period", above=0)
+        duration = length * number(cycles, "1", "cycles", above=0, most=MOST_CYCLES)
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     @quantities(area="m^2")

@@ -74,9 +74,8 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     """
     amiss = separability_error(material)
     if amiss:
-        raise InputError(
-            f"thickness is {thickness!r}, and the material is {amiss}: expected one body, Poisson's ratio constant"
-        )
+        expected = f"none with a material that is {amiss}; a sheet has one material, Poisson's ratio constant"
+        raise InputError(key="thickness", found=thickness, expected=expected)
     endless = thickness == math.inf
     kernel = Sheet(1.0 if endless else thickness, complete(material).poisson, base)  # checks all arguments
     return Body(material) if endless else Body(material, kernel)
@@ -124,11 +123,11 @@ class Sheet(Kernel):
 
     def __post_init__(self) -> None:
         if not (isinstance(self.thickness, int | float) and 0 < self.thickness < math.inf):
-            raise InputError(f"thickness is {self.thickness!r}: expected a positive number [m]")
+            raise InputError(key="thickness", found=self.thickness, expected="a positive number [m]")
         if not 0 <= self.poisson <= 0.5:
-            raise InputError(f"Poisson's ratio of a sheet is {self.poisson!r}: expected 0 to 1/2")
+            raise InputError(key="poisson", found=self.poisson, expected="0 to 1/2 in a sheet")
         if self.base not in get_args(Base):
-            raise InputError(f"base is {self.base!r}: expected {' or '.join(map(repr, get_args(Base)))}")
+            raise InputError(key="base", found=self.base, expected=" or ".join(map(repr, get_args(Base))))
 
     @property
     def uniform_displacement(self) -> float:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.observables.frozen import over_frames
 from roughvisc.observables.resistivity import Kind, resistivities
@@ -51,10 +50,7 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     ----------
     .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
     """
-    try:
-        flows, both = resistivities(resistivity, kind)
-    except InputError as error:
-        raise InputError(f"resistivity: {error}") from None
+    flows, both = resistivities(resistivity, kind)
     stiffness, error = over_frames(dataset, _punch, outputs=2)
     name, factor = f"{flows}_conductance", 2 / sum(both)
     found = {name: factor * stiffness, f"{name}_error": factor * error}

@@ -70,7 +70,7 @@ def _work_at(at: np.ndarray, slack: np.ndarray, times: np.ndarray, work: np.ndar
 
 
 def _program_of(dataset: xr.Dataset) -> Any:
-    from roughvisc.study.statement.case import Case
+    from roughvisc.study.case import Case
 
     if "case" not in dataset.attrs:
         raise InputError("the result does not record its program: give program=")

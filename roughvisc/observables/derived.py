@@ -31,7 +31,7 @@ def material_of(dataset: xr.Dataset, missing: str = "the result does not record 
     """Material of the case in the attributes of a result; an :class:`InputError` of these words if there is none."""
     if "case" not in dataset.attrs:
         raise InputError(missing)
-    from roughvisc.study.statement.case import Case
+    from roughvisc.study.case import Case
 
     return Case.from_json(dataset.attrs["case"]).material()
 

@@ -13,7 +13,7 @@ from roughvisc.mechanics.transport.flow import Flow, fluxes
 from roughvisc.mechanics.transport.flow import flow as flow_through
 from roughvisc.observables.derived import need
 from roughvisc.topography.grid import spacing
-from roughvisc.units import number
+from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import LEAK_MEANINGS, axis_of
 
 #: Distance of the bounds, relative, up to which a leak rate counts as known.
@@ -21,11 +21,12 @@ _CERTIFIED = 1e-6
 _FLOWS, _CLOSED, _NOT_CERTIFIED = range(len(LEAK_MEANINGS))
 
 
+@quantities(viscosity="Pa s", pressure_drop="Pa")
 def leakage(
     dataset: xr.Dataset,
     *,
-    viscosity: float | str = 1e-3,
-    pressure_drop: float | str = 1e5,
+    viscosity: Quantity = 1e-3,
+    pressure_drop: Quantity = 1e5,
     along: Literal["x", "y"] = "x",
     sides: Literal["closed", "periodic"] | None = None,
     flow: bool = False,
@@ -79,14 +80,14 @@ def leakage(
     --------
     >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
     """
-    gap = _gap_of(dataset)
     fluid = {
         "viscosity": number(viscosity, "Pa s", "viscosity", above=0),
         "pressure_drop": number(pressure_drop, "Pa", "pressure_drop", above=0),
     }
+    gap = _gap_of(dataset)
     drop, wrap = fluid["pressure_drop"] / fluid["viscosity"], _sides_meet(dataset, sides)
     if along not in ("x", "y"):
-        raise InputError(f"along is {along!r}: expected 'x' or 'y'")
+        raise InputError(key="along", found=along, expected="'x' or 'y'")
     cells = spacing(dataset, "leakage")
     sizes = {"x": cells[0] * gap.sizes["x"], "y": cells[1] * gap.sizes["y"]}
     across = "y" if along == "x" else "x"

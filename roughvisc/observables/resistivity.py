@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Literal, get_args
 
 from roughvisc.errors import InputError
-from roughvisc.units import is_quantity, quantity, shown
+from roughvisc.units import is_quantity, quantity
 
 Kind = Literal["thermal", "electrical"]
 #: What a resistivity is counted in.
@@ -35,14 +35,14 @@ def resistivities(stated: Any, kind: str | None = None) -> tuple[str, tuple[floa
     (('thermal', (5.0, 0.0)), ('electrical', (1.0, 2.0)), ('electrical', (2e-08, 0.0)))
     """
     if isinstance(stated, str) or not isinstance(stated, Sequence) or len(stated) != 2:
-        raise InputError(f"found {shown(stated)}: expected {WANTED}")
+        raise InputError(key="resistivity", found=stated, expected=WANTED)
     if kind is not None and kind not in get_args(Kind):
-        raise InputError(f"found the kind {shown(kind)}: expected {' or '.join(map(repr, get_args(Kind)))}")
+        raise InputError(key="kind", found=kind, expected=" or ".join(map(repr, get_args(Kind))))
     if kind is None:
         kind = "electrical" if any(_is_electrical(one) for one in stated) else "thermal"
-    first, second = (quantity(one, UNITS[kind]) for one in stated)
+    first, second = (quantity(one, UNITS[kind], "resistivity") for one in stated)
     if min(first, second) < 0 or first + second == 0:
-        raise InputError(f"found {shown(stated)}: expected none below zero, and not both zero")
+        raise InputError(key="resistivity", found=stated, expected="none below zero, and not both zero")
     return kind, (first, second)
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.variation import ITSELF, REALISATION
+from roughvisc.study.sweep_table import ITSELF, REALISATION
 
 Array = NDArray[np.float64]
 #: Confidence of the intervals.

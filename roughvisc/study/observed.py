@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked
+from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.index import index_of, save_index
 from roughvisc.study.storage.lock import lock_case, lock_path
@@ -59,7 +59,7 @@ def observe(
         If a quantity cannot be computed from a result; its file is not changed.
     """
     cases = read_cases(cases) if isinstance(cases, str | Path) else cases
-    distinct = {case.key: case for case in cases if case.settings.observe is not None}
+    distinct = {case.key: case for case in cases if case.observed()}
     folder = result_folder(cases[0], out, to_write=False).absolute()
     added = []
     for number, case in enumerate(distinct.values()):
@@ -92,7 +92,7 @@ def _add(case: Case, path: Path) -> bool:
             found, compat="equals", join="exact"
         )
         whole.attrs = result.attrs | {"case": case.to_json(), OBSERVED: json.dumps(known)}
-        write_result(whole, path, precision=case.settings.keep.precision)
+        write_result(whole, path, precision=case.precision)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True
 
@@ -100,8 +100,7 @@ def _add(case: Case, path: Path) -> bool:
 def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
     """Return the observables that a result does not have, or has for other values."""
     before = json.loads(result.attrs.get(OBSERVED, "{}"))
-    wanted: Mapping[str, Any] = case.settings.observe.stated()
-    return {name: values for name, values in wanted.items() if before.get(name) != values}
+    return {name: values for name, values in case.observed().items() if before.get(name) != values}
 
 
 def _frame_by_frame(result: xr.Dataset) -> xr.Dataset:

@@ -47,10 +47,10 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory_choice import Choice, choose_memory
 from roughvisc.mechanics.program import Program, Segment, Slide
+from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.quantities import creep_time
-from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.files import existing_part
 from roughvisc.study.storage.parameters import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
@@ -271,7 +271,7 @@ class _Setups:
         experiment = case.experiment()
         if isinstance(experiment, Loading):
             experiment = Loading(experiment.program.on_area(area))
-        problem = Problem(height, body, case.solving()).with_known_boundary(experiment.boundary)
+        problem = Problem(height, body, case.settings).with_known_boundary(experiment.boundary)
         settings = problem.settings
         profile = Profile(height, settings.missing, body.kernel)
         if not isinstance(experiment, Loading):
@@ -291,8 +291,8 @@ class _Setups:
 
     def choice(self, case: Case, program: Program) -> Choice:
         """Return the memory of a material, which may take a fit."""
-        options = memory_options(program, case.solving())
-        name = f"{case.settings.material!r} {options!r}"
+        options = memory_options(program, case.settings)
+        name = f"{case.tables['material']} {options!r}"
         if name not in self._choices:
             self._choices[name] = choose_memory(case.body(), **options)
         return self._choices[name]
@@ -584,7 +584,7 @@ def _weight(segment: Segment) -> float:
 
 def _row_of(case: Case, height: xr.DataArray | None) -> dict[str, Any]:
     """Return a row in which only the case and its grid are known."""
-    boundary = case.solving().boundary
+    boundary = case.settings.boundary
     row: dict[str, Any] = {name: "" if not unit else np.nan for name, (unit, _) in COLUMNS.items()}
     row |= {"boundary": boundary, "padded": boundary == "free", "marched": False, "late_times": _late_times(case)}
     row |= {"exponentials": 0, **dict.fromkeys(_COUNTS, 0)}
@@ -690,12 +690,12 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: Any) -> flo
     contact : ndarray
         Part of the cells in contact at kept times.
     """
-    dense, frames = 1.0 if case.settings.keep.precision is None else _ROUNDED, rows
+    dense, frames = 1.0 if case.precision is None else _ROUNDED, rows
     if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
         frames = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
     few = contact[len(contact) // 2] < _COMPRESSED  # the writer looks at the middle frame
     pressure = rows * (float(contact.mean()) + 0.01) if few else frames * dense
-    fields = sum(pressure if name == "pressure" else frames * dense for name in case.settings.keep.fields)
+    fields = sum(pressure if name == "pressure" else frames * dense for name in case.settings.fields)
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
 
 
@@ -708,7 +708,7 @@ def _scheme(time_step: Any, exponentials: int, slid: int) -> str:
 
 def _late_times(case: Case) -> str:
     """Return the listed times after the end of the program, in words."""
-    late = case.settings.late_times()
+    late = case.late_times()
     if not late:
         return ""
     unit, end = unit_for(late, "s"), case.program().duration

@@ -17,7 +17,7 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.observables.conductance import conductance
 from roughvisc.observables.frozen import incremental_stiffness
 from roughvisc.observables.leakage import leakage
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
 
 Array = NDArray[np.float64]
 #: Keyword arguments of the observables, as ``[observe]`` of a study states them.
@@ -57,10 +57,9 @@ class Observable:
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
         """Its values in a whole result of a case, over the axis, observed as the study says."""
-        observe = case.settings.observe
         if self.derive is None:
             return np.asarray(result[self.name].values, dtype=float)
-        return np.asarray(self.derive(result, {} if observe is None else observe.stated()).values, dtype=float)
+        return np.asarray(self.derive(result, case.observed()).values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
         """What steps and solver leave of its logarithm, as the rows of a result state it. [-]"""

@@ -1,4 +1,4 @@
-"""Arguments of the conditioning steps: what each may be, for functions, surface cards and study files alike."""
+"""Arguments of the conditioning steps, for functions, surface cards and study files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Argument:
     def check(self, name: str, value: Any) -> None:
         """Refuse a value that is not allowed with an :class:`InputError` that names the argument."""
         if not self.allows(value):
-            raise InputError(f"{name} is {value!r}: expected {self.wanted}")
+            raise InputError(key=name, found=value, expected=self.wanted)
 
 
 def _whole(value: Any) -> bool:

@@ -39,8 +39,8 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     InputError
         If the order is none of these, or the points present do not determine the polynomial.
     """
+    ORDER.check("order", order)
     h = checked(h, "level")
-    ORDER.check("level: order", order)
     require_heights(h, "level")
     kept = {} if order == 0 else {"period": None}  # a polynomial does not repeat
     return noted(like(h, less_polynomial(h.values, order)), f"levelled: polynomial of order {order} removed", **kept)
@@ -106,13 +106,12 @@ def gaussian_filter(
     ----------
     .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
     """
+    cutoff = number("cutoff", cutoff, "m")
+    KEEP.check("keep", keep)
     h = checked(h, "gaussian_filter")
-    cutoff, sides = number("cutoff", cutoff, "m"), spacing(h)
+    sides = spacing(h)
     if cutoff < 3 * max(sides):
-        raise InputError(
-            f"gaussian_filter: cutoff is {cutoff!r}: expected at least three cells, {3 * max(sides):.6g} [m]"
-        )
-    KEEP.check("gaussian_filter: keep", keep)
+        raise InputError(key="cutoff", found=cutoff, expected=f"at least three cells, {3 * max(sides):.6g} [m]")
     require_heights(h, "gaussian_filter")
     heights = _long_waves(h.values, [cutoff / d for d in sides], periodic)
     if keep == "short":

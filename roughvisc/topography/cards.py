@@ -2,29 +2,65 @@
 
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
 Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
-their order in the file: crop, rotate90, invert, level, outliers, fill, filter, shortest_wave, realisation, resample,
-mirror.
+their order in the file: that of :data:`STEPS`.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import xarray as xr
 
+from roughvisc.arguments import a_table, call, check, dotted, located, one_of, refuse_unknown
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography import conditioning
 from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.surrogates import surrogate
-from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, UNITS, make
-from roughvisc.units import quantity, shown
+from roughvisc.topography.synthesis import BOUNDARIES, RECIPES
+from roughvisc.units import in_si
 
-_PROVENANCE = ("title", "description", "licence", "source")
-_FILE = ("file", "sha256", "instrument", "format", "channel", "unit", "height_unit", "spacing")
+
+class Step(NamedTuple):
+    """Conditioning step.
+
+    Attributes
+    ----------
+    function : callable
+        Takes heights and arguments, and returns heights.
+    argument : str
+        Name of the argument that a value states which is neither true nor a table; empty if there is none.
+    """
+
+    function: Callable[..., xr.DataArray]
+    argument: str = ""
+
+
+#: Conditioning steps in the order in which they act. A value is true (the function with its defaults), false (the step
+#: is left out), the value of one argument, or a table of arguments.
+STEPS: dict[str, Step] = {
+    "crop": Step(conditioning.crop),
+    "rotate90": Step(conditioning.rotate90, "turns"),
+    "invert": Step(conditioning.invert),
+    "level": Step(conditioning.level, "order"),
+    "outliers": Step(conditioning.mask_outliers),
+    "fill": Step(conditioning.fill, "method"),
+    "filter": Step(conditioning.gaussian_filter, "cutoff"),
+    "shortest_wave": Step(conditioning.without_short_waves, "shortest"),
+    "realisation": Step(surrogate, "number"),
+    "resample": Step(conditioning.resample, "shape"),
+}
+#: Steps that a face may have before a second face lies on it.
+FACE_STEPS = ("crop", "rotate90", "invert", "level", "outliers", "fill", "filter")
+#: Steps that leave a periodic surface periodic.
+_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")
+#: Keys of a card that change no height.
+PROVENANCE = ("title", "description", "licence", "source", "instrument")
+_FILE = ("file", "sha256", "format", "channel", "unit", "height_unit", "spacing")
 
 
 def is_card(path: Path, format: str | None) -> bool:
@@ -81,14 +117,13 @@ def open_card(path: Path, *, conditioned: bool = True, **options: Any) -> xr.Dat
                 "found " + ("both" if "file" in card else "neither") + ": expected either file or generate"
             )
         steps = card.pop("conditioning", {})
-        about = {key: _text(card, key) for key in _PROVENANCE if key in card}
-        rest = {key: value for key, value in card.items() if key not in _PROVENANCE}
+        about = {key: _text(card, key) for key in PROVENANCE if key in card}
+        rest = {key: value for key, value in card.items() if key not in PROVENANCE}
         h = _scan(rest, path.parent) if "file" in rest else generate(rest)
-        h = condition(h, steps) if conditioned else h
+        h = condition(h, steps, "conditioning") if conditioned else h
     except InputError as error:
         raise error.prefixed(str(path)) from error
-    instrument = {"instrument": card["instrument"]} if "instrument" in card else {}
-    return h.assign_attrs(card=path.name, **about, **instrument)
+    return h.assign_attrs(card=path.name, **about)
 
 
 def read_toml(path: Path, wanted: str) -> dict[str, Any]:
@@ -115,44 +150,36 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
         raise InputError(f"{path}: is not {wanted}: it is nested too deeply") from error
 
 
-def generate(table: Mapping[str, Any]) -> xr.DataArray:
-    """Height from a recipe and its parameters, as cards and studies write them. [m]
+def generate(table: Mapping[str, Any], where: str = "") -> xr.DataArray:
+    """Make heights by a recipe. [m]
 
     Parameters
     ----------
     table : mapping
-        ``generate`` names the recipe: sphere, cone, flat_punch, wavy or self_affine; the other keys are its
-        parameters, quantities as numbers in SI or texts with a unit.
+        ``generate``, the name of the recipe, and its arguments: quantities are numbers in SI or texts with a unit.
+    where : str
+        Dotted name of the table, for messages.
 
     Raises
     ------
     InputError
         If the recipe or a key is unknown, a parameter is missing, or a value is wrong.
     """
-    name = table["generate"]
-    if not isinstance(name, str) or name not in RECIPES:
-        raise InputError(f"generate is {shown(name)}: expected one of {', '.join(RECIPES)}")
-    given = {key: value for key, value in table.items() if key != "generate"}
-    _known(given, RECIPES[name], f"{name} takes")
-    try:
-        return make(name, {key: _quantities(value, UNITS.get(key), key) for key, value in given.items()})
-    except TypeError as error:  # "missing 1 required positional argument: 'radius'"
-        raise InputError(f"{name}: {str(error).partition('() ')[2] or error}") from error
+    recipe = RECIPES[one_of(dotted(where, "generate"), table["generate"], RECIPES)]
+    return call(recipe, where, {key: value for key, value in table.items() if key != "generate"})
 
 
-def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
-    """Height after conditioning steps, as cards and studies write them.
+def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.DataArray:
+    """Condition heights.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
     steps : mapping
-        Any of ``crop`` (a table of x and y limits), ``rotate90`` (turns), ``invert``, ``level`` (order, or true for a
-        plane), ``outliers`` (true, or a table of window and threshold), ``fill`` (true or a method), ``filter`` (the
-        cut-off, or a table of cutoff, keep and periodic), ``shortest_wave`` (a length), ``realisation`` (the number of
-        a surrogate, or a table of ``number`` and ``seed``) and ``resample`` (cells). They act in this order; false
-        leaves a step out.
+        Any of :data:`STEPS` with their values, in any order; they act in the order of that list.
+    where : str
+        Dotted name of the table, for messages.
 
     Returns
     -------
@@ -164,14 +191,50 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any]) -> xr.DataArray:
     InputError
         If a step or an option is unknown, or a value is wrong.
     """
-    if not isinstance(steps, Mapping):
-        raise InputError(f"conditioning is {steps!r}: expected a table of steps")
-    _known(steps, _STEPS, "conditioning takes")
-    for name, step in _STEPS.items():
-        value = steps.get(name, False)
-        if value is not False:
-            h = step(h, value)
+    for name, arguments in _stated(steps, where):
+        with _named(steps, where, name):
+            h = call(STEPS[name].function, "", arguments, h)
     return h
+
+
+def check_steps(steps: Mapping[str, Any], where: str = "") -> None:
+    """Check conditioning steps without heights.
+
+    Parameters
+    ----------
+    steps, where
+        As :func:`condition` has them.
+    """
+    for name, arguments in _stated(steps, where):
+        with _named(steps, where, name):
+            check(STEPS[name].function, "", arguments)
+
+
+@contextmanager
+def _named(steps: Mapping[str, Any], where: str, name: str) -> Iterator[None]:
+    """Put the key of a step in front of errors about its argument, which the value of the key may be itself."""
+    try:
+        yield
+    except InputError as error:
+        key = dotted(where, name)
+        if error.key == STEPS[name].argument != "" and not isinstance(steps[name], Mapping | bool):
+            raise InputError(key=key, found=error.found, expected=error.expected) from error
+        raise located(error, key) from error
+
+
+def _stated(steps: Any, where: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield name and arguments of each step that is not left out, in order."""
+    refuse_unknown(where, a_table(where or "conditioning", steps), STEPS)
+    for name, step in STEPS.items():
+        value = steps.get(name, False)
+        if isinstance(value, Mapping):
+            yield name, dict(value)
+        elif value is True:
+            yield name, {}
+        elif value is not False:
+            if not step.argument:
+                raise InputError(key=dotted(where, name), found=value, expected="true, false or a table")
+            yield name, {step.argument: value}
 
 
 def boundary_after(
@@ -192,7 +255,7 @@ def boundary_after(
     >>> boundary_after({"level": 1, "realisation": 1}, None), boundary_after({"level": 1}, "free")
     ('periodic', None)
     """
-    for step in _STEPS:
+    for step in STEPS:
         if steps.get(step, False) is not False:
             kept = made == "periodic" and step in _KEEP_PERIOD
             made = "periodic" if kept or step == "realisation" else None
@@ -214,7 +277,7 @@ def boundary_of_card(path: Path) -> Literal["free", "periodic"] | None:
 
 
 def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
-    _known(card, _FILE, "a card of a file takes")
+    refuse_unknown("", card, _FILE)
     path = folder / _text(card, "file")
     if not path.exists():
         raise InputError(f"file is {card['file']!r}: there is no such file")
@@ -227,7 +290,7 @@ def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
         )
     options = {key: card[key] for key in ("format", "channel", "unit", "height_unit") if key in card}
     if "spacing" in card:
-        options["spacing"] = _quantities(card["spacing"], "m", "spacing")
+        options["spacing"] = in_si(card["spacing"], "m", "spacing")
     if is_card(path, options.get("format")):
         return open_card(path, **{key: value for key, value in options.items() if key != "format"})
     return read_file(existing(path), **options)
@@ -237,75 +300,3 @@ def _text(card: Mapping[str, Any], key: str) -> str:
     if not isinstance(card[key], str):
         raise InputError(f"{key} is {card[key]!r}: expected a text")
     return card[key]
-
-
-def _known(given: Mapping[str, Any], known: Any, who: str) -> None:
-    unknown = [key for key in given if key not in known]
-    if unknown:
-        raise InputError(f"unknown key {', '.join(map(repr, unknown))}: {who} {', '.join(known)}")
-
-
-def _quantities(value: Any, unit: str | None, name: str) -> Any:
-    if unit is None:  # counts and switches
-        return value
-    if isinstance(value, list | tuple):
-        return tuple(quantity(part, unit, name) for part in value)
-    return quantity(value, unit, name)
-
-
-def _table(name: str, value: Any, known: tuple[str, ...]) -> dict[str, Any]:
-    """Options of a step that is either true or a table."""
-    if value is True:
-        return {}
-    if not isinstance(value, Mapping):
-        raise InputError(f"{name} is {value!r}: expected true, false, or a table of {', '.join(known)}")
-    _known(value, known, f"{name} takes")
-    return dict(value)
-
-
-def _switch(name: str, step: Callable[[xr.DataArray], xr.DataArray]) -> Callable[[xr.DataArray, Any], xr.DataArray]:
-    def switched(h: xr.DataArray, value: Any) -> xr.DataArray:
-        if value is not True:
-            raise InputError(f"{name} is {value!r}: expected true or false")
-        return step(h)
-
-    return switched
-
-
-def _crop(h: xr.DataArray, value: Any) -> xr.DataArray:
-    limits = _table("crop", value, ("x", "y"))
-    return conditioning.crop(h, **{axis: _quantities(pair, "m", f"crop.{axis}") for axis, pair in limits.items()})
-
-
-def _filter(h: xr.DataArray, value: Any) -> xr.DataArray:
-    options = (
-        _table("filter", value, ("cutoff", "keep", "periodic")) if isinstance(value, Mapping) else {"cutoff": value}
-    )
-    if "cutoff" not in options:
-        raise InputError("filter.cutoff is missing: expected a wavelength [m]")
-    options["cutoff"] = quantity(options["cutoff"], "m", "filter.cutoff")
-    return conditioning.gaussian_filter(h, **options)
-
-
-def _realisation(h: xr.DataArray, value: Any) -> xr.DataArray:
-    options = _table("realisation", value, ("number", "seed")) if isinstance(value, Mapping) else {"number": value}
-    if "number" not in options:
-        raise InputError("realisation.number is missing: expected the number of a surrogate")
-    return surrogate(h, options["number"], seed=options.get("seed", 0))
-
-
-#: step -> (height, value in the file) -> height; in the order in which they act
-_STEPS: dict[str, Callable[[xr.DataArray, Any], xr.DataArray]] = {
-    "crop": _crop,
-    "rotate90": conditioning.rotate90,
-    "invert": _switch("invert", conditioning.invert),
-    "level": lambda h, value: conditioning.level(h, 1 if value is True else value),
-    "outliers": lambda h, value: conditioning.mask_outliers(h, **_table("outliers", value, ("window", "threshold"))),
-    "fill": lambda h, value: conditioning.fill(h, "harmonic" if value is True else value),
-    "filter": _filter,
-    "shortest_wave": lambda h, value: conditioning.without_short_waves(h, quantity(value, "m", "shortest_wave")),
-    "realisation": _realisation,
-    "resample": conditioning.resample,
-}
-#: Steps that leave a surface that repeats one that does.
-_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")

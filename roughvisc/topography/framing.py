@@ -51,22 +51,28 @@ def crop(
     InputError
         If limits are not a pair, or fewer than two cells lie within them along an axis.
     """
+    chosen = {axis: _ascending(axis, limits) for axis, limits in (("x", x), ("y", y)) if limits is not None}
     h = checked(h, "crop")
     whole = h.shape
-    for axis, limits in (("x", x), ("y", y)):
-        if limits is None:
-            continue
-        try:
-            low, high = (float(limit) for limit in limits)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"crop: {axis} is {limits!r}: expected a pair (low, high) [m]") from error
+    for axis, (low, high) in chosen.items():
         inside = (h[axis].values >= low) & (h[axis].values <= high)
         if inside.sum() < 2:
             held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
-            raise InputError(f"crop: {axis} is {limits!r}: expected limits that hold two cells at least of {held} m")
+            raise InputError(key=axis, found=(low, high), expected=f"limits that hold two cells at least of {held} m")
         h = h.isel({axis: inside})
-    line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {x or 'all'}, y {y or 'all'} m"
+    line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
     return noted(h, line, **({} if h.shape == whole else {"period": None}))
+
+
+def _ascending(axis: str, limits: Any) -> tuple[float, float]:
+    """Return the limits of a coordinate, the lower first. [m]"""
+    try:
+        low, high = (float(limit) for limit in limits)
+    except (TypeError, ValueError):
+        low = high = np.nan
+    if not low < high:
+        raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
+    return low, high
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
@@ -84,8 +90,8 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     xarray.DataArray
         The rotated surface; coordinates start half a cell from zero. [m]
     """
+    TURNS.check("turns", turns)
     h = checked(h, "rotate90")
-    TURNS.check("rotate90: turns", turns)
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
     axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
@@ -159,12 +165,17 @@ def combine(
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
+    if flip not in (None, "x", "y"):
+        raise InputError(key="flip", found=flip, expected="'x', 'y' or None")
+    if align not in ("grid", "centre"):
+        raise InputError(key="align", found=align, expected="'grid' or 'centre'")
+    if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
+        raise InputError(key="offset", found=offset, expected="a pair of lengths, along x and along y [m]")
+    apart = [number("offset", d, "m", low=-np.inf) for d in offset]
+    if align == "grid" and apart != [0.0, 0.0]:
+        raise InputError(key="offset", found=offset, expected="none with align='grid'; align='centre' takes one")
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
-    if flip not in (None, "x", "y"):
-        raise InputError(f"combine: flip is {flip!r}: expected 'x', 'y' or None")
-    if align not in ("grid", "centre"):
-        raise InputError(f"combine: align is {align!r}: expected 'grid' or 'centre'")
     about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
     sha = h2.attrs.get("source_sha256")
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
@@ -172,11 +183,9 @@ def combine(
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
         line += f", reversed along {flip}"
     if align == "centre":
-        h1, h2 = _laid_on(h1, h2, offset)
-        apart = ", ".join(f"{float(d):.6g}" for d in offset)
-        line += f", its centre ({apart}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
-    elif tuple(offset) != (0.0, 0.0):
-        raise InputError(f"combine: offset is {offset!r} with align='grid': expected align='centre'")
+        h1, h2 = _laid_on(h1, h2, apart)
+        centre = ", ".join(f"{d:.6g}" for d in apart)
+        line += f", its centre ({centre}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
     _refuse_another_grid(h1, h2)
     both = like(h1, h1.values + h2.values)
     lost = {"recipe", "highest", "missing"} | (set() if repeats else {"period"})
@@ -193,15 +202,15 @@ def combine(
     )
 
 
-def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataArray, xr.DataArray]:
+def _laid_on(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr.DataArray, xr.DataArray]:
     """Both faces on those cells of the first that the second covers wholly, laid centre on centre.
 
     Parameters
     ----------
     h1, h2 : xarray.DataArray
         Heights over (x, y). [m]
-    offset : pair of float
-        How far the second's centre lies from that of the first, along x and y. [m]
+    apart : pair of float
+        Position of the second centre relative to the first, along x and y. [m]
 
     Returns
     -------
@@ -211,13 +220,10 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, offset: Any) -> tuple[xr.DataAr
     Raises
     ------
     InputError
-        If the offset is no pair of numbers, or fewer than two cells are covered along an axis.
+        If fewer than two cells are covered along an axis.
     """
     from scipy.interpolate import RectBivariateSpline  # slow to import
 
-    if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
-        raise InputError(f"combine: offset is {offset!r}: expected a pair of lengths, along x and along y [m]")
-    apart = [number("offset", d, "m", low=-np.inf) for d in offset]
     lengths = [n * d for n, d in zip(h2.shape, spacing(h2), strict=True)]
     shape = [min(n, max(2, round(length / d))) for n, length, d in zip(h2.shape, lengths, spacing(h1), strict=True)]
     if tuple(shape) != h2.shape:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import DataNeeded, NoData
 from roughvisc.errors import InputError
 from roughvisc.units import quantity, shown
 from roughvisc.variables import VARIABLES
@@ -96,7 +97,11 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
         If `h` holds no real numbers over exactly the dimensions x and y, has fewer than `least` points in a
         direction, no numeric coordinates, unequal steps, or a unit that is no length; the message names the `step`
         that asked.
+    DataNeeded
+        If `h` only stands for heights: the step has checked its arguments.
     """
+    if isinstance(h, NoData):
+        raise DataNeeded(step)
     if isinstance(h, xr.Dataset):
         if "height" not in h.data_vars:
             held = ", ".join(map(str, h.data_vars)) or "nothing"
@@ -297,7 +302,7 @@ def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = 
     right = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
     if not (right and low < value <= high):
         below = f" and at most {high:g}" if math.isfinite(high) else ""
-        raise InputError(f"{name} is {value!r}: expected a finite number above {low:g}{below} [{unit}]")
+        raise InputError(key=name, found=value, expected=f"a finite number above {low:g}{below} [{unit}]")
     return float(value)
 
 
@@ -305,7 +310,7 @@ def pair(name: str, value: Any) -> tuple[float, float]:
     """Two positive lengths, or one for both. [m]"""
     both = _both(value)
     if len(both) != 2:
-        raise InputError(f"{name} is {value!r}: expected one number or a pair (x, y) [m]")
+        raise InputError(key=name, found=value, expected="one number or a pair (x, y) [m]")
     return number(name, both[0], "m"), number(name, both[1], "m")
 
 
@@ -314,9 +319,8 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     both = _both(value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole:
-        raise InputError(
-            f"{name} is {shown(value)}: expected a whole number of cells of at least {low}, or a pair of them"
-        )
+        expected = f"a whole number of cells of at least {low}, or a pair of them"
+        raise InputError(key=name, found=value, expected=expected)
     if both[0] * both[1] > MOST_CELLS:
         text = f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}"
         raise InputError(text, key=name, found=value, expected=f"at most {MOST_CELLS:.3g} cells")

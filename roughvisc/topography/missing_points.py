@@ -59,9 +59,9 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
     would otherwise use the spikes as the rim of the hole.
     """
-    h = checked(h, "mask_outliers")
-    WINDOW.check("mask_outliers: window", window)
+    WINDOW.check("window", window)
     threshold = number("threshold", threshold, "-")
+    h = checked(h, "mask_outliers")
     require_heights(h, "mask_outliers")
     off = np.empty_like(h.values)
     for rows, median in _local_median(h.values, window):
@@ -98,8 +98,8 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
     InputError
         If the method is unknown, all points are missing, or they are absent on purpose (no material there).
     """
+    FILL.check("method", method)
     h = checked(h, "fill")
-    FILL.check("fill: method", method)
     if h.attrs.get("missing") == "absent":
         raise InputError(
             "fill: the missing cells are absent (there is no material): expected a scan with missing points"

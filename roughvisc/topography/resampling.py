@@ -70,8 +70,8 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     where the last factor accounts for the distance between the first centres of both grids. A wavelength of exactly two
     old cells is kept on a finer grid, as the sine that is largest at the old centres.
     """
-    h = checked(h, "resample")
     shape = counts("shape", shape)
+    h = checked(h, "resample")
     missing, filled = np.isnan(h.values), filled_points(h)
     values = h.values.copy()
     if missing.any():
@@ -116,14 +116,13 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     InputError
         If points are missing or the length is out of its range.
     """
+    shortest = number("shortest", shortest, "m")
     h = checked(h, "without_short_waves")
-    shortest, sides = number("shortest", shortest, "m"), spacing(h)
+    sides = spacing(h)
     lengths = [n * d for n, d in zip(h.shape, sides, strict=True)]
     if not 2 * max(sides) * (1 - _ROUNDING) <= shortest < min(lengths):
-        raise InputError(
-            f"without_short_waves: shortest is {shortest!r}: expected at least two cells, {2 * max(sides):.6g} [m], "
-            f"and less than the sides, {min(lengths):.6g} [m]"
-        )
+        expected = f"at least two cells, {2 * max(sides):.6g} [m], and less than the sides, {min(lengths):.6g} [m]"
+        raise InputError(key="shortest", found=shortest, expected=expected)
     require_complete(h, "without_short_waves")
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
     if _repeats("without_short_waves", h, periodic):

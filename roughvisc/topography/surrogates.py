@@ -63,20 +63,22 @@ def surrogates(
     3
     """
     if not (isinstance(count, int | np.integer) and not isinstance(count, bool) and count >= 1):
-        raise InputError(f"surrogates: count is {count!r}: expected a positive whole number")
+        raise InputError(key="count", found=count, expected="a positive whole number")
     found = [surrogate(h, number, seed=seed, amplitudes=amplitudes) for number in range(1, int(count) + 1)]
     return xr.concat(found, xr.DataArray(np.arange(1, count + 1), dims="realisation", name="realisation"))
 
 
 def surrogate(
-    h: xr.DataArray, realisation: int, *, seed: int = 0, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
+    h: xr.DataArray, number: int, *, seed: int = 0, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
 ) -> xr.DataArray:
-    """One surface of :func:`surrogates`, by its number. [m]"""
-    h = checked(h, "surrogates")
+    """Return one surface of :func:`surrogates`, by its number. [m]"""
+    if not (isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 1):
+        raise InputError(key="number", found=number, expected="the number of a surrogate, from 1")
     if amplitudes not in ("fixed", "gaussian"):
-        raise InputError(f"surrogates: amplitudes is {amplitudes!r}: expected 'gaussian' or 'fixed'")
+        raise InputError(key="amplitudes", found=amplitudes, expected="'gaussian' or 'fixed'")
     if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
-        raise InputError(f"surrogates: seed is {seed!r}: expected a whole number >= 0")
+        raise InputError(key="seed", found=seed, expected="a whole number >= 0")
+    h = checked(h, "surrogates")
     require_complete(h, "surrogates")
     if is_mirrored(h.values):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
@@ -84,7 +86,7 @@ def surrogate(
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # its rings are as wide
     (nx, ny), sides = h.shape, spacing(h)
     area, whole = h.size * math.prod(sides), np.pi / max(sides)
-    waves = RandomWaves([int(seed), int(realisation)], amplitudes == "gaussian")
+    waves = RandomWaves([int(seed), int(number)], amplitudes == "gaussian")
     q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, sides[0]), 2 * np.pi * scipy.fft.rfftfreq(ny, sides[1])
     rings = np.round(spectrum["wavevector"].values / step).astype(int)
     density = np.zeros(rings[-1] + 1)
@@ -101,5 +103,5 @@ def surrogate(
     make_hermitian(heights_q)
     grid = labelled(synthesised(heights_q, ny), (sides[0], sides[1])).assign_coords(x=h["x"], y=h["y"])
     return noted(
-        grid, f"surrogate {realisation} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
+        grid, f"surrogate {number} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
     )

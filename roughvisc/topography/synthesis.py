@@ -1,4 +1,4 @@
-"""Surfaces from recipes, as cards and studies name them: waves and roughness here, indenters from :mod:`.indenters`.
+"""Recipes of surfaces, by the names of surface cards and studies; the indenters come from :mod:`.indenters`.
 
 Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the recipe stays in the attributes.
 """
@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from inspect import Parameter, signature
 from typing import Any, Literal
 
 import numpy as np
 import scipy.fft
 import xarray as xr
 
+from roughvisc.arguments import check_keys, located, one_of, units_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, recipe_of, sphere
@@ -22,7 +22,7 @@ from roughvisc.units import Quantity, quantities
 
 
 @quantities(amplitude="m", wavelength="m", size="m")
-def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves: int = 2) -> xr.DataArray:
+def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves: Literal[1, 2] = 2) -> xr.DataArray:
     r"""Regular waves, periodic over the domain, with a crest at the corner ``x = y = 0``.
 
     Parameters
@@ -51,11 +51,12 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     amplitude, wavelength = number("amplitude", amplitude, "m"), number("wavelength", wavelength, "m")
     size, shape = pair("size", size), counts("shape", shape, low=1)
     if waves not in (1, 2):
-        raise InputError(f"waves is {waves!r}: expected 1 (along x) or 2 (along x and y)")
+        raise InputError(key="waves", found=waves, expected="1 (along x) or 2 (along x and y)")
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
-            raise InputError(f"size holds {periods:.6g} wavelengths: expected a whole number, so that the waves repeat")
+            expected = f"a whole number of wavelengths, so that the waves repeat; {side:.6g} m holds {periods:.6g}"
+            raise InputError(key="size", found=size, expected=expected)
     along = [
         np.cos(2 * np.pi * round(s / wavelength) * (np.arange(n) + 0.5) / n) for s, n in zip(size, shape, strict=True)
     ]
@@ -143,7 +144,7 @@ def self_affine(
     """
     size, shape = pair("size", size), counts("shape", shape)
     if amplitudes not in ("fixed", "gaussian"):
-        raise InputError(f"amplitudes is {amplitudes!r}: expected 'fixed' or 'gaussian'")
+        raise InputError(key="amplitudes", found=amplitudes, expected="'fixed' or 'gaussian'")
     hurst = number("hurst", hurst, "-", high=1.0)
     if (rms_slope is None) == (rms_height is None):
         raise InputError(
@@ -251,37 +252,43 @@ def synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
     return flat[: nx * ny].reshape(nx, ny)
 
 
-#: recipe -> what makes its heights
-_MAKERS: dict[str, Callable[..., xr.DataArray]] = {
-    maker.__name__: maker for maker in (sphere, cone, flat_punch, wavy, self_affine)
+#: Function of each recipe, by its name in surface cards and studies.
+RECIPES: dict[str, Callable[..., xr.DataArray]] = {
+    recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
 }
-#: recipe -> its arguments and their defaults, those of the function itself; ``...``: none
-RECIPES: dict[str, dict[str, Any]] = {
-    name: {
-        key: ... if argument.default is Parameter.empty else argument.default
-        for key, argument in signature(maker).parameters.items()
-    }
-    for name, maker in _MAKERS.items()
-}
-#: argument -> its unit, the same in all recipes; what is not here is taken as it is
-UNITS = {
-    **dict.fromkeys(("size", "radius", "amplitude", "wavelength", "rms_height", "rolloff", "shortcut"), "m"),
-    **dict.fromkeys(("slope", "hurst", "rms_slope", "anisotropy"), "1"),
-}
-#: recipe -> the boundary that its surfaces are made for
+#: Boundary that the surfaces of each recipe are made for.
 BOUNDARIES: dict[str, Literal["free", "periodic"]] = {
-    name: "periodic" if name in ("wavy", "self_affine") else "free" for name in _MAKERS
+    name: "periodic" if name in ("wavy", "self_affine") else "free" for name in RECIPES
 }
 
 
-def make(name: str, arguments: Mapping[str, Any]) -> xr.DataArray:
-    """Heights of a recipe over (x, y), as cards and studies name it. [m]
+def check_recipe(where: str, table: Mapping[str, Any]) -> None:
+    """Check the arguments of a recipe without making its heights.
+
+    Parameters
+    ----------
+    where : str
+        Dotted name of the table, for messages.
+    table : mapping
+        ``generate``, the name of the recipe, and its arguments in SI.
 
     Raises
     ------
-    TypeError
-        If an argument is unknown or missing.
     InputError
-        If an argument has a wrong value.
+        If the recipe or a key is unknown, an argument is missing, or a value is wrong.
     """
-    return _MAKERS[name](**arguments)
+    recipe = RECIPES[one_of(f"{where}.generate", table["generate"], RECIPES)]
+    stated = {key: value for key, value in table.items() if key != "generate"}
+    check_keys(recipe, where, stated)
+    try:
+        for key, value in stated.items():
+            if key == "size":
+                pair(key, value)
+            elif key == "shape":
+                counts(key, value, low=2 if recipe is self_affine else 1)
+            elif key == "seed" and value < 0:
+                raise InputError(key=key, found=value, expected="a whole number, at least 0")
+            elif key in units_of(recipe):
+                number(key, value, units_of(recipe)[key], high=1.0 if key == "hurst" else math.inf)
+    except InputError as error:
+        raise located(error, where) from error

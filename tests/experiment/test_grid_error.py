@@ -8,7 +8,7 @@ from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment.coarser import block_means, coarser, pressure_distance
-from roughvisc.study.statement.case import Case, read_study
+from roughvisc.study.case import Case, read_study
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import grown
 

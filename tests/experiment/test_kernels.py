@@ -12,7 +12,8 @@ from roughvisc.mechanics.body import HALF_SPACE, HalfSpace, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
+from roughvisc.study.study_file import material_of
 
 FIELDS = ("pressure", "gap", "displacement")
 #: What counts time, and what knows a closed form of the half-space.
@@ -116,7 +117,7 @@ def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
 
 
 def case_on(kernel, monkeypatch, **settings):
-    monkeypatch.setattr(Case, "body", lambda self: rv.Body(self.settings.material.build(), kernel))
+    monkeypatch.setattr(Case, "body", lambda self: rv.Body(material_of(self.tables["material"]), kernel))
     stated = {
         "surface": {"generate": "sphere", "radius": 1e-3, "size": 4e-4, "shape": 128},
         "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.case import read_cases
 
 RUBBER = rv.elastic(shear_modulus=1e6)
 STUDY = """

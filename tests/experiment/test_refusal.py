@@ -14,9 +14,9 @@ from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
 from roughvisc.mechanics import threads as threads_module
+from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_cases, read_study, vary
 from roughvisc.study.storage.store import open_result
 
 ROUGH = """

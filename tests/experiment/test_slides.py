@@ -9,8 +9,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.kept_times import kept_times
-from roughvisc.study.statement.case import Case, read_study
-from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.case import Case, read_study
+from roughvisc.study.si_tables import unit_of
 from roughvisc.views.sweep_figures.case_text import program_words
 
 SIDE = 1e-3

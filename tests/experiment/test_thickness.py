@@ -14,7 +14,7 @@ from roughvisc.cli import main
 from roughvisc.mechanics.closed_forms import Cone, Paraboloid
 from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.sheet import Sheet
-from roughvisc.study.statement.case import Case, read_cases
+from roughvisc.study.case import Case, read_cases
 
 RADIUS, THICKNESS = 1e-3, 1e-4
 WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)

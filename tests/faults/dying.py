@@ -14,8 +14,8 @@ import traceback
 from pathlib import Path
 
 from roughvisc.errors import RoughviscError
+from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_study
 
 #: What is asked of the system of a folder's files. Not listing it: what is not found is not there.
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.truncate", "os.utime")

@@ -8,7 +8,7 @@ import xarray as xr
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.case import read_cases
 
 TWO_LOADS = BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 

@@ -10,7 +10,7 @@ from support import BALL, refused
 import roughvisc as rv
 from roughvisc.cli import group
 from roughvisc.errors import InputError
-from roughvisc.study.statement.case import read_cases, read_study
+from roughvisc.study.case import read_cases, read_study
 from roughvisc.tables import Wanted, read_table
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -32,8 +32,8 @@ def study(tmp_path):
 @pytest.mark.parametrize("shape", [f"1{'0' * 30}", "[100000, 100000]"])
 def test_commands__refuse_a_recipe_of_too_many_cells(study, invoke, command, shape):
     study.write_text(SMALL.replace("[12, 9]", shape))
-    with refused("shape"):
-        read_study(study).height()
+    with refused("surface.shape"):
+        read_study(study)
     status, out, err = invoke(command, study)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "surface: shape" in err

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 from support import BALL
 
+from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_study
 from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.upkeep import clean_folder
 

@@ -4,7 +4,7 @@ import pytest
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.study.statement.case import read_cases
+from roughvisc.study.case import read_cases
 from roughvisc.study.storage.lock import lock_case, lock_path
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")

@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 from support import BALL
 
+from roughvisc.study.case import read_cases
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import open_result
 
 MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", 'time_step = "160 us"\n[keep]')

@@ -9,10 +9,10 @@ import scipy.stats
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.ensembles import STANDING, over_realisations
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import REALISATIONS, to_table

@@ -14,7 +14,7 @@ from roughvisc.errors import EdgeContactError
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.resources import PROCESS
 from roughvisc.study import plan as plan_module
-from roughvisc.study.statement.case import read_cases, vary
+from roughvisc.study.case import read_cases, vary
 
 ROUGH = """
 title = "Rough"
@@ -187,7 +187,7 @@ def test_elastic_contact__is_that_of_hertz(study, step):
     program = vary(case, {"program": [step | {"over": 1e-3}, {"hold": 50.0}]}).program()
     size, radius, compliance = 1e-3, 1e-2, float(case.material().contact_compliance(50.0))
     ball = rv.sphere(radius, size, (64, 57))
-    found = plan_module.elastic_contact(Problem(ball, case.body(), case.solving()), program)
+    found = plan_module.elastic_contact(Problem(ball, case.body(), case.settings), program)
     square = radius * step["approach"] if "approach" in step else (0.75 * radius * step["load"] * compliance) ** (2 / 3)
     assert found == pytest.approx(math.pi * square / size**2, rel=0.08)
 

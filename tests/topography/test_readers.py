@@ -23,6 +23,7 @@ from scan_files import (
     write_text,
     write_x3p,
 )
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.topography import conditioning, instruments, synthesis
@@ -233,7 +234,7 @@ def test_from_array__labels_and_refuses():
     for wrong in (np.zeros(5), np.zeros((1, 5)), "text", [[1, 2], [3]], np.zeros((2, 2, 2))):
         with pytest.raises(InputError, match="heights"):
             from_array(wrong, 1e-6)
-    with pytest.raises(InputError, match="spacing is -1"):
+    with refused("spacing", -1):
         from_array(np.zeros((3, 3)), -1)
     data = np.zeros((3, 3))
     from_array(data, 1e-6)[0, 0] = 1.0
@@ -325,7 +326,7 @@ def test_card__of_a_recipe_reads_units(tmp_path):
         (BALL + "[conditioning]\nsmooth = 1", "smooth"),
         (BALL + "[conditioning]\nfill = 3", "fill"),
         (BALL + "[conditioning]\ninvert = 3", "invert"),
-        (BALL + '[conditioning]\nfilter = "3 s"', "cutoff"),
+        (BALL + '[conditioning]\nfilter = "3 s"', "conditioning.filter"),
         (BALL + "[conditioning]\noutliers = {size = 3}", "size"),
         ('file = "card.toml"\nsha256 = "x"\nmagic = 3', "magic"),
         ("conditioning = 3\n" + BALL, "conditioning"),

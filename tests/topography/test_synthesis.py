@@ -11,6 +11,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, shapes
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.topography.indenters import grown
@@ -302,7 +303,7 @@ def test_strip__of_one_cell_begins_at_zero():
         assert float(strip.max()) == pytest.approx(0, abs=1e-18)  # the middle cell is at the apex
         assert grown(strip).sizes["x"] > 33
     assert flat_punch(1e-4, (1e-5, 1e-3), (1, 33)).shape == (1, 33)
-    with pytest.raises(InputError, match=r"shape is \(33, 1\).*at least 2"):
+    with refused("shape", (33, 1)):
         self_affine(1e-3, (33, 1), hurst=0.8, rms_slope=0.1, seed=0)
 
 

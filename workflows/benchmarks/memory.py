@@ -13,8 +13,8 @@ from concurrent.futures import ProcessPoolExecutor
 from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.storage.store import open_result
 from roughvisc.topography.grid import nominal_area
 
@@ -52,7 +52,7 @@ def one(side, material, boundary):
         with open_result(run_case(case, folder)) as ds:
             contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    settings, program = case.solving(), case.program().on_area(nominal_area(case.height()))
+    settings, program = case.settings, case.program().on_area(nominal_area(case.height()))
     memory = choose_memory(case.body(), **memory_options(program, settings)).memory
     stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact, rows=rows)
     return {

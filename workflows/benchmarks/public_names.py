@@ -34,13 +34,10 @@ def public_names():
 def study_keys():
     import roughvisc as rv
 
-    schema = rv.study_schema()
-    tables = {"study": schema, **schema["$defs"]}
-    return {
-        f"{name}.{key}": str(one.get("default"))
-        for name, table in tables.items()
-        for key, one in table["properties"].items()
-    }
+    sys.path.insert(0, str(Path(rv.__file__).parents[1] / "docs"))
+    from study_keys import TABLES, rows
+
+    return {f"{name}.{row[0]}": "" for name in TABLES for row in rows(name)}
 
 
 def variables():

@@ -17,16 +17,14 @@ Kind = Literal["shear", "tensile"]
 
 def check_poisson(poisson: float) -> None:
     if not -1 < poisson <= 0.5:
-        wanted = "a number above -1 and up to 0.5"
-        raise InputError(f"poisson is {poisson!r}: expected {wanted}", key="poisson", found=poisson, expected=wanted)
+        raise InputError(key="poisson", found=poisson, expected="a number above -1 and up to 0.5")
 
 
 def tensile_to_shear(kind: Kind, poisson: float) -> float:
     """Return the shear compliance over the measured compliance: ``2 (1 + nu)`` in tension, one in shear."""
     check_poisson(poisson)
     if kind not in ("shear", "tensile"):
-        wanted = "'shear' or 'tensile'"
-        raise InputError(f"kind is {kind!r}: expected {wanted}", key="kind", found=kind, expected=wanted)
+        raise InputError(key="kind", found=kind, expected="'shear' or 'tensile'")
     return 2 * (1 + poisson) if kind == "tensile" else 1.0
 
 
@@ -34,8 +32,8 @@ def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> flo
     """Return the value if it is a positive number, or zero if zero is allowed."""
     good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
     if not good:
-        wanted = f"a {'non-negative' if zero else 'positive'} number [{unit}]"
-        raise InputError(f"{name} is {value!r}: expected {wanted}", key=name, found=value, expected=wanted)
+        expected = f"a {'non-negative' if zero else 'positive'} number [{unit}]"
+        raise InputError(key=name, found=value, expected=expected)
     return value
 
 

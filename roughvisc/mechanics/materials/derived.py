@@ -96,7 +96,7 @@ def shift(material: Material, factor: float) -> Prony | Creep:
     3e-06
     """
     if not (isinstance(factor, int | float | np.number) and 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT):
-        raise InputError(f"shift factor is {factor!r}: expected a number from 1e-30 to 1e30")
+        raise InputError(key="factor", found=factor, expected="a number from 1e-30 to 1e30")
     return _scaled(material, float(factor), 1.0, f"all times multiplied by {factor:.6g} (time-temperature shift)")
 
 

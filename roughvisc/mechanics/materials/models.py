@@ -33,7 +33,8 @@ def _spring(
     of_shear, of_young = (f"{part or 'shear_'}modulus", f"{part}young_modulus")
     if (shear is None) == (young is None):
         message = f"{of_shear} is {shear!r} and {of_young} is {young!r}: expected one of them"
-        raise InputError(message, key=of_young, found=young, expected=f"{of_shear} or {of_young}")
+        key = of_shear if young is None else of_young
+        raise InputError(message, key=key, found=young, expected=f"either {of_shear} or {of_young}")
     if young is None:
         return check_number(of_shear, shear, "Pa")
     young = check_number(of_young, young, "Pa")

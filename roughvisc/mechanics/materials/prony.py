@@ -60,7 +60,8 @@ class Prony:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))
         object.__setattr__(self, "times", tuple(float(t) for t in self.times))
         if len(self.compliances) != len(self.times):
-            raise InputError(f"{len(self.compliances)} compliances for {len(self.times)} times: expected as many")
+            expected = f"as many as times, {len(self.times)}"
+            raise InputError(key="compliances", found=len(self.compliances), expected=expected)
         check_number("glassy", self.glassy, "1/Pa", zero=True)
         check_number("fluidity", self.fluidity, "1/(Pa s)", zero=True)
         for i, (compliance, time) in enumerate(zip(self.compliances, self.times, strict=True)):
@@ -68,7 +69,8 @@ class Prony:
             check_number(f"times[{i}]", time, "s")
         check_poisson(self.poisson)
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
-            raise InputError("all compliances are zero: a rigid material cannot be pressed")
+            expected = "a positive compliance: a rigid material cannot be pressed"
+            raise InputError(key="glassy", found=self.glassy, expected=expected)
 
     def __repr__(self) -> str:
         """The constructor of springs and dashpots that makes the series, if there is one; otherwise the series."""

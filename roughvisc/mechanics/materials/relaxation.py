@@ -60,7 +60,7 @@ def from_relaxation(
     """
     check_number("equilibrium", equilibrium, "Pa", zero=True)
     if len(moduli) != len(times):
-        raise InputError(f"{len(moduli)} moduli for {len(times)} times: expected as many")
+        raise InputError(key="moduli", found=len(moduli), expected=f"as many as times, {len(times)}")
     for i, (modulus, time) in enumerate(zip(moduli, times, strict=True)):
         check_number(f"moduli[{i}]", modulus, "Pa", zero=True)
         check_number(f"times[{i}]", time, "s")
@@ -73,7 +73,7 @@ def from_relaxation(
     equilibrium, weights = equilibrium / factor, weights / factor
     glassy_modulus = equilibrium + float(np.sum(weights))
     if glassy_modulus == 0:
-        raise InputError("all moduli are zero: expected a positive equilibrium modulus or one in `moduli`")
+        raise InputError(key="moduli", found=moduli, expected="a positive modulus, or a positive equilibrium modulus")
     # dividing G~(s) = G_e + sum G_i s/(s + r_i) by s makes the equilibrium modulus a pole at zero like the others:
     # G~(-m)/(-m) = -G_e/m + sum G_i/(r_i - m), one zero between each two poles and none above the last
     poles = np.append(0.0, rates) if equilibrium else rates

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, check_number, check_poisson, checked_rows, tensile_to_shear
@@ -176,7 +176,7 @@ def dynamic_table(
     loss: Sequence[Quantity],
     *,
     frequency_unit: Literal["rad/s", "Hz"],
-    shift_factors: ArrayLike | None = None,
+    shift_factors: float | Sequence[float] | None = None,
     kind: Kind = "shear",
     poisson: float = 0.5,
 ) -> Prony:

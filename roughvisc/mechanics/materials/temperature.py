@@ -58,10 +58,8 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: f
     check_number("c2", c2, "K")
     above = temperature - reference_temperature
     if not c2 + above > 0:
-        raise InputError(
-            f"temperature is {temperature:g} K: expected above {reference_temperature - c2:g} K, where the WLF shift "
-            "has its pole (reference temperature less c2)"
-        )
+        pole = f"{reference_temperature - c2:g} K, the reference temperature less c2, where the WLF shift has its pole"
+        raise InputError(key="temperature", found=temperature, expected=f"a temperature above {pole}")
     return _power(10.0, -c1 * above / (c2 + above))
 
 

@@ -21,8 +21,8 @@ from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.sheet import BASE, Sheet, complement
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
+from roughvisc.study.case import Case
 from roughvisc.study.quantities import creep_time
-from roughvisc.study.statement.case import Case
 from roughvisc.topography.framing import with_images
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import OTHER_DIMS, axis_of
@@ -240,7 +240,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         area=area,
         fraction=float(row.get("contact_fraction", math.nan)),
         contact=contact,
-        given=_stated(case),
+        given={} if case is None else case.audit_inputs(),
     )
 
 
@@ -276,9 +276,7 @@ def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
 
 def bodies_of(case: Case, end: float) -> tuple[Body, ...]:
     """The deformable bodies of a case after a time [s]; none if Poisson's ratio of one changes in time."""
-    stated = case.settings.material
-    parts = [stated.a, stated.b] if stated.model == "pair" else [stated]
-    materials = [complete(part.build()) for part in parts]
+    materials = [complete(one) for one in case.materials()]
     if any(map(separability_error, materials)):
         return ()
     return tuple(Body(*(float(one.contact_compliance(t)) for t in (0.0, end)), float(one.poisson)) for one in materials)
@@ -311,8 +309,3 @@ def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[B
     if "poisson" in attrs and "compliance_at_end" in attrs:
         return (Body(*(float(attrs[name]) for name in ("compliance_at_once", "compliance_at_end", "poisson"))),)
     return bodies_of(case, creep_time(case.experiment(), size)) if case is not None else ()
-
-
-def _stated(case: Case | None) -> dict[str, Any]:
-    stated = case.settings.audit if case is not None else None
-    return {} if stated is None else stated.model_dump(exclude_none=True)

@@ -9,9 +9,18 @@ from typing import Any, get_args
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import Base
-from roughvisc.study.statement.case import read_cases
-from roughvisc.study.statement.schema.evaluation import BOUNDS
 from roughvisc.units import number
+
+#: Unit and bounds of each quantity.
+BOUNDS: dict[str, tuple[str, dict[str, float]]] = {
+    "work_of_adhesion": ("J/m^2", {"least": 0}),
+    "yield_strength": ("Pa", {"above": 0}),
+    "thickness": ("m", {"above": 0}),
+    "density": ("kg/m^3", {"above": 0}),
+    "linear_strain": ("1", {"above": 0}),
+    "heat_conductivity": ("W/m/K", {"above": 0}),
+    "volumetric_heat_capacity": ("J/m^3/K", {"above": 0}),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,5 +62,6 @@ def of_study(path: Path) -> dict[str, Any]:
     InputError
         If the study is wrong.
     """
-    stated = read_cases(path)[0].settings.audit
-    return {} if stated is None else stated.model_dump(exclude_none=True)
+    from roughvisc.study.case import read_cases  # which checks what it reads by this module
+
+    return read_cases(path)[0].audit_inputs()

@@ -15,11 +15,11 @@ from roughvisc.errors import InputError
 from roughvisc.study.budget.solves import FOLDER, Array, Bench, Reading, finished_result, nearest_rows, read
 from roughvisc.study.budget.sources import SURROGATES, Asked, Found, Population, Values, judge, known_errors, together
 from roughvisc.study.budget.variants import Variants, with_rows
+from roughvisc.study.case import Case, read_study
 from roughvisc.study.ensembles import STANDING, STANDING_ATTRIBUTES, ratio, standing
 from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.quantities import Observable, known_quantity
-from roughvisc.study.statement.case import Case, read_study
 from roughvisc.study.storage.store import result_path
 from roughvisc.topography.parameters import parameters
 from roughvisc.units import Quantity, in_si, quantities

@@ -17,8 +17,8 @@ from roughvisc.study.budget.budget import assembled
 from roughvisc.study.budget.solves import Array, Bench, Reading
 from roughvisc.study.budget.sources import SOURCES, Asked, Found, judge, together
 from roughvisc.study.budget.variants import Variants, with_rows
+from roughvisc.study.case import Case, vary
 from roughvisc.study.quantities import Observable
-from roughvisc.study.statement.case import Case, vary
 from roughvisc.study.trade.ladder import has_steps
 from roughvisc.topography.grid import spacing
 from roughvisc.variables import AXES
@@ -63,8 +63,8 @@ class Grids:
         base, own = self.variants.case, self.own
         changed = base if level == 0 else self.variants.on_cells(2.0**level)
         changes = {key: one for key, one in changed.varied.items() if key not in base.varied}
-        if base.settings.solve.tolerance != own.settings.solve.tolerance:
-            changes["solve.tolerance"] = base.settings.solve.tolerance
+        if base.settings.tolerance != own.settings.tolerance:
+            changes["solve.tolerance"] = base.settings.tolerance
         return replace(changed, varied={**own.varied, **changes}, written=own.written)
 
     def words(self, level: int) -> str:
@@ -89,14 +89,14 @@ def cells_in_words(level: int) -> str:
 
 def grids_of(case: Case, quantities: Sequence[Observable], tolerance: float) -> Grids:
     """Grids of a case whose solves keep what the quantities need, beside what the study keeps."""
-    fields = [*case.settings.keep.fields, *(field for one in quantities for field in one.fields)]
+    fields = [*case.settings.fields, *(field for one in quantities for field in one.fields)]
     base = vary(with_rows(case, None, fields), {"solve.tolerance": tolerance})
     return Grids(case, Variants(base, base.height()))
 
 
 def tolerance_for(case: Case, targets: Mapping[str, float]) -> float:
     """Return a fifth of the smallest target; a study that is sharper than usual keeps its own tolerance."""
-    own = case.settings.solve.tolerance
+    own = case.settings.tolerance
     chosen = min(max(FIFTH * min(targets.values()), _SHARPEST), AMPLE)
     return float(f"{min(chosen, own) if own < Settings.tolerance else chosen:.2g}")
 
@@ -181,11 +181,10 @@ class Around:
         Of another experiment over time, those that all solves have.
         """
         case, own = self.asked.variants.case, self.solves[self.level].places
-        if isinstance(case.settings.keep.times, tuple) or not has_steps(case):
+        if isinstance(case.settings.times, tuple) or not has_steps(case):
             return own
-        program = case.settings.program
         others = (*self.solves.values(), *self.parts.values())
-        wanted = [one.places for one in others] if program is None else [np.array(case.program().corners)]
+        wanted = [np.array(case.program().corners)] if "program" in case.tables else [one.places for one in others]
         apart = [np.abs(one[:, None] - own).min(axis=0) for one in wanted]
         return own[np.max(apart, axis=0) <= 1e-9 * np.ptp(own)]
 

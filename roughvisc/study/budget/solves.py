@@ -14,11 +14,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError, RoughviscError
+from roughvisc.study.case import Case
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.run import unconverged
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import open_result, result_path
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.study.budget.solves import Array
 from roughvisc.study.budget.variants import PATCHES, STEP, Variants, slower, stiffer
+from roughvisc.study.case import Case
 from roughvisc.study.quantities import Observable, creep_time, is_sliding
-from roughvisc.study.statement.case import Case
 from roughvisc.units import number, unit_for
 
 Population = Literal["patch", "ensemble"]

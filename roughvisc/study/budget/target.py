@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from roughvisc.arguments import nearest
 from roughvisc.errors import InputError
 from roughvisc.study.budget.grids import (
     AMPLE,
@@ -32,13 +33,12 @@ from roughvisc.study.budget.grids import (
 )
 from roughvisc.study.budget.solves import FOLDER, Bench
 from roughvisc.study.budget.sources import KNOWN, known_errors
+from roughvisc.study.case import Case
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.monitor import Monitor, watcher
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.single import run_stated
 from roughvisc.study.quantities import QUANTITIES, known_quantity
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.schema.section import nearest
 from roughvisc.study.storage.files import atomic_write, require_writable
 from roughvisc.study.storage.store import result_path, write_dataset
 from roughvisc.study.trade.ladder import format_tolerance
@@ -223,13 +223,13 @@ def _reasons(around: Around, targets: Mapping[str, float]) -> Iterator[str]:
     for one in around.quantities:
         parts = f"{percent(around.error(one, RULED))} by grid and solver, {percent(around.floor(one))} by all else"
         yield f"{errors_in_words({one.name: around.error(one)}, targets)}: {parts}"
-    tolerance = grids.variants.case.settings.solve.tolerance
+    tolerance = grids.variants.case.settings.tolerance
     least = FIFTH * min(targets.values())
     why = {
         tolerance > least: "that of the study",
         tolerance < least: "since steps and solver take more of some numbers",
         math.isclose(tolerance, least, rel_tol=0.1): "a fifth of what is wanted",
-        tolerance == grids.own.settings.solve.tolerance: "that of the study",
+        tolerance == grids.own.settings.tolerance: "that of the study",
         tolerance == AMPLE: "ample for what is wanted",
     }
     yield f"tolerance: {format_tolerance(tolerance)}, {why[True]}"

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.material import TEMPERATURE
+from roughvisc.study.case import Case, vary
+from roughvisc.study.study_file import TEMPERATURE
 from roughvisc.study.trade.ladder import changed_keys, grid_change, is_data
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import last_octave, modes
@@ -46,7 +46,7 @@ class Variants:
     @property
     def is_rough(self) -> bool:
         """Whether the whole surface stands for a larger one: then another patch and shorter waves have a meaning."""
-        stands_for_more = self.case.solving().boundary != "free" and is_data(self.case)
+        stands_for_more = self.case.settings.boundary != "free" and is_data(self.case)
         return stands_for_more and bool(np.isfinite(self.height.values).all())
 
     @cached_property
@@ -63,11 +63,12 @@ class Variants:
 
     def on_cells(self, coarsening: float) -> Case:
         """The same waves on cells so many times longer; a half: on cells half as long."""
-        surface = self.case.settings.surface
+        surface = self.case.surface
         key, cells = grid_change(self.case, self.shape, coarsening)
-        if not is_data(self.case) or coarsening > 1 or not surface.resample:
+        if not is_data(self.case) or coarsening > 1 or not surface.get("resample"):
             return vary(self.case, {key: cells})
-        held = max(surface.shortest_wave or 0.0, 2 * max(spacing(self.height)))  # a finer grid would hold more waves
+        # a finer grid would hold more waves
+        held = max(surface.get("shortest_wave", 0.0), 2 * max(spacing(self.height)))
         return vary(self.case, {"surface.shortest_wave": held, "surface.resample": cells})
 
     def without_last_octave(self, case: Case) -> Case:
@@ -82,19 +83,18 @@ class Variants:
 
 def stiffer(case: Case) -> Case:
     """With all moduli larger by :data:`STEP`."""
-    return vary(case, {"material.modulus_factor": STEP * case.settings.material.modulus_factor})
+    return vary(case, {"material.modulus_factor": STEP * case.tables["material"].get("modulus_factor", 1.0)})
 
 
 def slower(case: Case) -> Case:
     """With all times of the material longer by :data:`STEP`."""
-    material = case.settings.material
-    changes: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if getattr(material, key) is not None}
-    return vary(case, changes | {"material.shift_factor": STEP * material.shift})
+    changes: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if key in case.tables["material"]}
+    return vary(case, changes | {"material.shift_factor": STEP * case.shift_factor})
 
 
 def with_rows(case: Case, places: Any, fields: Iterable[str]) -> Case:
     """A case that keeps these fields at these places of its axis, and no error of the grid; all places where None."""
-    settings, experiment = case.solving(), case.experiment()
+    settings, experiment = case.settings, case.experiment()
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
     if places is not None and experiment.axis == "time":
         changes |= changed_keys(settings, replace(settings, times=[float(one) for one in places]))

@@ -30,7 +30,8 @@ from roughvisc.experiment.resources import (
 )
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.memory_choice import choose_memory
-from roughvisc.study.statement.case import Case
+from roughvisc.study import study_file
+from roughvisc.study.case import Case
 from roughvisc.topography.grid import nominal_area
 
 if TYPE_CHECKING:
@@ -299,14 +300,14 @@ def _sizes(cases: Sequence[Case]) -> Iterable[float]:
     """Memory of each case that is large; zero of the others. [byte]"""
     surfaces: dict[str, tuple[int, float]] = {}
     for case in cases:
-        name = json.dumps(json.loads(case.to_json())["surface"], sort_keys=True)
+        name = json.dumps(case.surface, sort_keys=True)
         if name not in surfaces:
             surfaces[name] = _cells_and_area(case)
         cells, area = surfaces[name]
         if cells < WORTH_ASKING:
             yield 0.0
             continue
-        settings, experiment = case.solving(), case.experiment()
+        settings, experiment = case.settings, case.experiment()
         if isinstance(experiment, Loading):
             program = experiment.program.on_area(area)
             memory = choose_memory(case.body(), **memory_options(program, settings)).memory
@@ -317,11 +318,10 @@ def _sizes(cases: Sequence[Case]) -> Iterable[float]:
 
 def _cells_and_area(case: Case) -> tuple[int, float]:
     """Cells of a case's surface, and its area [m2]; no cells where it is small, or cannot be had."""
-    surface = case.settings.surface
-    shape = surface.resample or case.made_shape
+    shape = study_file.cells(case.surface["resample"]) if case.surface.get("resample") else case.made_shape
     if shape is not None:
         return math.prod(shape), 1.0
-    file = getattr(surface, "file", None)
+    file = case.surface.get("file")
     try:
         if file is None or Path(file).stat().st_size < _SMALL_FILE:
             return 0, 1.0

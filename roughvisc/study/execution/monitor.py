@@ -16,8 +16,8 @@ from rich.console import Console
 
 from roughvisc.errors import printable
 from roughvisc.progress import Bars, clock
+from roughvisc.study.case import Case
 from roughvisc.study.execution.task import IN_WORDS, Outcome
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.failures import forget_failure, record_failure
 from roughvisc.study.storage.files import is_writable
 from roughvisc.study.storage.index import Entry, index_of, save_index

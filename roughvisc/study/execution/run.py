@@ -21,8 +21,7 @@ from roughvisc.experiment.base import Problem
 from roughvisc.labels import label, warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import program, program_version
+from roughvisc.study.case import Case, program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
 from roughvisc.study.storage.lock import lock_case, lock_path
@@ -89,10 +88,10 @@ def compute(
     """
     height = case.height()
     with _named(case):
-        problem = Problem(height, case.body(), case.solving())
+        problem = Problem(height, case.body(), case.settings)
         dataset = solve(problem, case.experiment(), keeper, progress=progress, threads=threads)
     if "speed" in dataset:
-        reduced = case.settings.material.shift * dataset["speed"].values
+        reduced = case.shift_factor * dataset["speed"].values
         dataset = label(dataset.assign(reduced_speed=("speed", reduced)))
     transforms = transform_library() if keeper is None else keeper.latest.transforms
     provenance = _provenance(case, dataset.attrs.pop("history", ""), transforms)
@@ -283,7 +282,7 @@ def is_result_of(case: Case, path: Path) -> bool:
 
 def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
     """Write a case's result to its file in a folder; the file is named by the case's key."""
-    path = write_result(dataset, result_path(folder, case.key), precision=case.settings.keep.precision)
+    path = write_result(dataset, result_path(folder, case.key), precision=case.precision)
     dataset.encoding["source"] = str(path)
     stated = warnings_of(dataset.attrs)
     for complaint in filter(None, (unconverged(dataset), stated.get("tolerance"), stated.get("material"))):

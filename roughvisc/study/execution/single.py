@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.study.case import Case
 from roughvisc.study.execution.run import Progress, is_result_of, result_folder, run_case, unconverged
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.files import require_writable
 from roughvisc.study.storage.store import open_result, result_path
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
+from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.cluster import (
     default_client,
     local_client,
@@ -23,7 +24,6 @@ from roughvisc.study.execution.cluster import (
 from roughvisc.study.execution.monitor import Monitor, SweepLog
 from roughvisc.study.execution.run import result_folder, set_aside_damaged
 from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
-from roughvisc.study.statement.case import Case, read_cases
 from roughvisc.study.storage.failures import forget_failure, log_file, recorded_failure
 from roughvisc.study.storage.files import is_writable, require_writable
 from roughvisc.study.storage.index import Index, index_of, warn_of

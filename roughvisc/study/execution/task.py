@@ -17,8 +17,8 @@ import numpy as np
 from distributed.core import Status
 
 from roughvisc.errors import RoughviscError
+from roughvisc.study.case import Case
 from roughvisc.study.execution.run import run_case, unconverged
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.index import Entry, read_entry
 
 if TYPE_CHECKING:

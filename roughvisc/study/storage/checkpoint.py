@@ -30,7 +30,7 @@ from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_i
 
 from roughvisc.experiment.loading import STATES
 from roughvisc.solve import Checkpoint, Recorder
-from roughvisc.study.statement.identity import NUMERICS_REVISION
+from roughvisc.study.case import NUMERICS_REVISION
 from roughvisc.study.storage.files import (
     atomic_write,
     pack_with_checksum,

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.identity import NUMERICS_REVISION, program
+from roughvisc.study.case import NUMERICS_REVISION, Case, program
 from roughvisc.study.storage.files import atomic_write
 
 log = logging.getLogger("roughvisc")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.identity import program_version
+from roughvisc.study.case import program_version
 from roughvisc.study.storage.files import require_file, require_folder, warn_once
 from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
 from roughvisc.study.storage.store import is_json_table, open_result, result_files, result_path

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.study.statement.variation import DRAWN, REALISATION, SURROGATE
+from roughvisc.study.si_tables import default_of, unit_of
+from roughvisc.study.sweep_table import DRAWN, REALISATION, SURROGATE
 
 #: Coordinate that holds the key of the case.
 CASE_KEY = "case_key"
@@ -73,7 +73,11 @@ def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]
         if not below and key not in said_already and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
             keys[key] = None
     stated = [leaf | case.get("varied", {}) for case, leaf in zip(cases, leaves, strict=True)]
-    return {key: _column([one.get(key) for one in stated]) for key in keys}
+
+    def value(key: str, number: int) -> Any:
+        return stated[number][key] if key in stated[number] else default_of(key, cases[number])
+
+    return {key: _column([value(key, number) for number in range(len(cases))]) for key in keys}
 
 
 def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.study.statement.case import Case
-from roughvisc.study.statement.variation import DRAWN, REALISATION
+from roughvisc.study.case import Case
 from roughvisc.study.storage.files import warn_once
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.parameters import CASE_KEY, case_numbers, identifier, labels_of, parameters_of
 from roughvisc.study.storage.store import no_results, read_variable
 from roughvisc.study.storage.sweep_cases import SweepCase, read_sweep, sweep_cases
+from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
 from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
 from roughvisc.study.storage.parameters import case_numbers, parameters_of
 

@@ -14,14 +14,14 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.study.ensembles import STANDING, over_realisations
-from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.study.statement.variation import DRAWN, REALISATION
+from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import Entry, Index, index_of
 from roughvisc.study.storage.parameters import parameters_of
 from roughvisc.study.storage.store import no_results
 from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, read_sweep
+from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import number_and_unit, quantity
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, variables_in_table
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import xarray as xr
 
 from roughvisc.errors import RoughviscError
+from roughvisc.study.case import Case
 from roughvisc.study.execution.run import compute, unconverged
 from roughvisc.study.quantities import Observable, is_sliding, observables_of
-from roughvisc.study.statement.case import Case
 from roughvisc.study.trade.ladder import Setting, changed, has_steps, shape_of
 
 Report = Callable[[str, float, float], None]

@@ -7,8 +7,8 @@ from pathlib import Path
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.study.case import Case
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.statement.case import Case
 from roughvisc.study.storage.store import NETCDF
 
 

@@ -9,11 +9,10 @@ from typing import Any
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.settings import Settings
-from roughvisc.study.statement.case import Case, vary
-from roughvisc.study.statement.schema.surface import FileSurface
+from roughvisc.study.case import Case, vary
+from roughvisc.study.study_file import table_of
+from roughvisc.topography.cards import FACE_STEPS
 
-#: Tables of the settings that are not in ``[solve]``.
-_TABLES = {"times": "keep", "fields": "keep", "missing": "surface"}
 #: Recipes that give the same surface on any grid: only there is the grid a setting and no data.
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Fewest cells a side of a coarser grid that is worth a try.
@@ -65,17 +64,12 @@ def format_tolerance(value: float) -> str:
 
 def is_data(case: Case) -> bool:
     """Whether the grid of the surface is data, so that another grid is another surface."""
-    surface = case.settings.surface
-    return isinstance(surface, FileSurface) or getattr(surface, "generate", "") not in _ANY_GRID or _treated(case)
+    return case.surface.get("generate") not in _ANY_GRID or _is_treated(case)
 
 
-def _treated(case: Case) -> bool:
-    """Whether the heights are no longer those of the recipe."""
-    surface = case.settings.surface
-    steps = ("crop", "rotate90", "invert", "filter", "second")
-    return any(getattr(surface, step) for step in steps) or any(
-        getattr(surface, step) is not False for step in ("level", "outliers", "fill")
-    )
+def _is_treated(case: Case) -> bool:
+    """Return whether the heights differ from those of the recipe."""
+    return any(case.surface.get(step, False) is not False for step in (*FACE_STEPS, "second"))
 
 
 def shape_of(case: Case, shape: tuple[int, int], coarsening: float) -> tuple[int, int]:
@@ -92,7 +86,7 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
         If the surface is not known on a finer grid, or a value is refused.
     """
     changes: dict[str, Any] = {
-        "solve.boundary": case.settings.solve.boundary,  # on any grid
+        "solve.boundary": case.settings.boundary,  # on any grid
         "solve.tolerance": setting.tolerance,
     }
     if setting.coarsening < 1 and is_data(case):
@@ -107,7 +101,7 @@ def changed(case: Case, shape: tuple[int, int], setting: Setting) -> Case:
 def changed_keys(before: Settings, after: Settings) -> dict[str, Any]:
     """Keys of a study, and values, that turn settings into others."""
     return {
-        f"{_TABLES.get(name, 'solve')}.{name}": list(value) if isinstance(value, tuple) else value
+        f"{table_of(name)}.{name}": list(value) if isinstance(value, tuple) else value
         for name in (one.name for one in fields(Settings))
         if (value := getattr(after, name)) != getattr(before, name)
     }

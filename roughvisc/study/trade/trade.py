@@ -18,8 +18,8 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.labels import label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.progress import reporting
+from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.quantities import QUANTITIES, Observable
-from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.trade.bench import NotRun, Report, TimedRuns, further_quantities_of, quantities_of
 from roughvisc.study.trade.ladder import Setting, changed_keys, is_data, ladder, shape_of
 from roughvisc.study.trade.reference import ReferenceRun, all_grids
@@ -140,9 +140,9 @@ def trade(
 
 def _comparable(case: Case, height: xr.DataArray, rungs: Sequence[Setting], derived: Sequence[Observable]) -> Case:
     """Return the case with rows that all settings have in common, and with the pressures that are compared."""
-    keep, settings, experiment = case.settings.keep, case.solving(), case.experiment()
+    settings, experiment = case.settings, case.experiment()
     changes: dict[str, Any] = {"solve.grid_error": False}
-    fields = [*keep.fields, *(field for one in derived for field in one.fields)]
+    fields = [*settings.fields, *(field for one in derived for field in one.fields)]
     changes["keep.fields"] = [*dict.fromkeys([*fields, "pressure"])]
     shape, sides = (height.sizes["x"], height.sizes["y"]), spacing(height)
     shapes = [shape_of(case, shape, grid) for grid in all_grids(rungs, is_data(case))]

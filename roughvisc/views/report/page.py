@@ -21,7 +21,6 @@ from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.audit.limits import Finding
-from roughvisc.study.statement.treatment import Treatment, treatment
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.store import no_results, open_result, result_files
@@ -37,6 +36,7 @@ from roughvisc.views.figures.rows import require
 from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
+from roughvisc.views.report.treatment import Treatment, treatment
 from roughvisc.views.sweep_figures import case_text
 from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 

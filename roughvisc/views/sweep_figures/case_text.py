@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from roughvisc.study.statement.schema.keys import unit_of
+from roughvisc.study.si_tables import unit_of
 from roughvisc.units import Unit, unit_for
 
 #: What an infinite number stands for; the thickness alone may be one.

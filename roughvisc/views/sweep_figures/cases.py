@@ -14,9 +14,9 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import own_rows
-from roughvisc.study.statement.schema.keys import unit_of
-from roughvisc.study.statement.variation import DRAWN, REALISATION
+from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.parameters import combinations, identifier
+from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 from roughvisc.views.figures import style

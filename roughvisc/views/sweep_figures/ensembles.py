@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from roughvisc.study.ensembles import statistics
-from roughvisc.study.statement.variation import ITSELF
+from roughvisc.study.sweep_table import ITSELF
 from roughvisc.variables import NOT_CONVERGED, axis_of
 
 #: How the measured surface itself is drawn.

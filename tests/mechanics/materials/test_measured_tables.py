@@ -332,7 +332,7 @@ def test_dynamic_table__fits_the_loss_as_well():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: rv.creep_table((0, 1), (1, 2), kind="tensile", poisson=0.7), r"poisson is 0\.7"),
+        (lambda: rv.creep_table((0, 1), (1, 2), kind="tensile", poisson=0.7), r"poisson: found 0\.7"),
         (lambda: rv.creep_table((0, 1), (1, -2), kind="tensile"), r"table row 1: compliance is -6"),
         (lambda: rv.relaxation_table((0, 1, 1), (3, 2, 1)), r"table row 2: time 1 after 1: expected ascending time"),
         (lambda: rv.relaxation_table((0, 1), (1, 0)), r"table row 1: modulus is 0: expected a positive modulus"),

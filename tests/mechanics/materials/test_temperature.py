@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from support import refused
 
 import roughvisc as rv
 
@@ -81,17 +82,21 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "key"),
     [
-        (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature is 248 K: expected above 248.4 K"),
-        (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "c1 is -1.0: expected a positive number"),
-        (lambda: rv.arrhenius(-3.0, 300.0, 1e4), r"temperature is -3.0: expected a positive number \[K\]"),
-        (lambda: rv.shift(MATERIALS[0], 0.0), "shift factor is 0.0: expected a number from 1e-30 to 1e30"),
-        (lambda: rv.shift(MATERIALS[0], np.nan), "shift factor is nan"),
-        (lambda: rv.shift(MATERIALS[0], "2"), "shift factor is '2'"),
-        (lambda: rv.shift(3.0, 2.0), "material is a float"),
+        (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature"),
+        (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "c1"),
+        (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
+        (lambda: rv.shift(MATERIALS[0], 0.0), "factor"),
+        (lambda: rv.shift(MATERIALS[0], np.nan), "factor"),
+        (lambda: rv.shift(MATERIALS[0], "2"), "factor"),
     ],
 )
-def test_shift__refuses(wrong, said):
-    with pytest.raises(rv.InputError, match=said):
+def test_shift__refuses_at_the_argument(wrong, key):
+    with refused(key):
         wrong()
+
+
+def test_shift__refuses_what_is_no_material():
+    with pytest.raises(rv.InputError, match="material is a float"):
+        rv.shift(3.0, 2.0)

@@ -13,8 +13,8 @@ from roughvisc import closed_forms as cf
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.audit import adhesion, validity
 from roughvisc.study.audit.limits import LIMITS, STATED, VERDICTS
+from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_study
 from roughvisc.study.storage.store import open_result
 
 RADIUS, MODULUS, LOAD = 1e-2, 4e6, 5e-3

@@ -10,7 +10,7 @@ from support import refused
 import roughvisc as rv
 from roughvisc.study.budget.budget import budgets
 from roughvisc.study.budget.target import parse_targets
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
 
 BALL = """
 title = "Ball"
@@ -223,7 +223,7 @@ def test_scan_with_mirror_images__takes_patches_of_its_own_size(tmp_path):
     recipe = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
     text = ROUGH.replace(recipe, 'file = "scan.x3p"\n').replace('boundary = "periodic"', 'boundary = "mirror"')
     study = case(text, tmp_path)
-    assert study.solving().boundary == "mirror"
+    assert study.settings.boundary == "mirror"
     assert 0 < width(stated(study, tmp_path, population="ensemble"), "sample") < 1
     shapes = set()
     for path in (tmp_path / "budget").glob("*.nc"):
@@ -367,7 +367,7 @@ def test_choice__is_a_case_like_any_other(tmp_path, monkeypatch):
     found = got(study, tmp_path, {"mean_gap": "2 %"})
     chosen = Case.from_json(found.attrs["case"])
     assert chosen.key == found.attrs["case_key"]
-    assert chosen.solving().tolerance == pytest.approx(0.004)
+    assert chosen.settings.tolerance == pytest.approx(0.004)
     monkeypatch.setattr("roughvisc.study.execution.run.compute", None)
     again = rv.run(chosen, tmp_path / "results", progress=False)
     xr.testing.assert_identical(again.drop_attrs(), found.drop_attrs())

@@ -9,10 +9,10 @@ from support import BALL
 
 from roughvisc.api import run
 from roughvisc.errors import RoughviscError
+from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.failures import record_path
 
 SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'

@@ -8,9 +8,9 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
+from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.statement.case import Case, read_study, vary
 from roughvisc.study.storage.store import open_result
 
 
@@ -86,6 +86,6 @@ def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):
     case = read_study(study)
     assert result_folder(case) == tmp_path / "results" / "ball"
     assert result_folder(case, "here") == run_module.Path("here")
-    assert result_folder(Case(case.settings)) == run_module.Path("results/a-ball")
+    assert result_folder(Case(case.tables)) == run_module.Path("results/a-ball")
     with pytest.raises(InputError, match=r"ball\.toml: is a file: expected a folder"):
         result_folder(case, study / "below")

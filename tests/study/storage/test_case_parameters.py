@@ -6,9 +6,10 @@ import xarray as xr
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.study.statement.case import read_study, vary
-from roughvisc.study.statement.schema import Study
-from roughvisc.study.statement.schema.experiments import FrictionSection
+from roughvisc.arguments import arguments
+from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.study.case import read_study, vary
+from roughvisc.study.si_tables import TABLES
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.variables import VARIABLES
 
@@ -82,11 +83,11 @@ def test_open_results__names_each_parameter_once(folder):
 
 
 def test_labels__are_apart_from_all_variables():
-    tables = {f"{name}_" for name in Study.model_fields if name != "friction"}
+    tables = {f"{name}_" for name in TABLES if name != "friction"}
     names = {*VARIABLES}
     assert not [name for name in names if any(name.startswith(table) for table in tables)]
-    assert not names & {f"friction_{key}" for key in FrictionSection.model_fields}
-    assert not {*VARIABLES} & {*Study.model_fields}
+    assert not names & {f"friction_{key}" for key in arguments(SteadySliding)}
+    assert not {*VARIABLES} & {*TABLES}
 
 
 def test_axes__are_found_by_cf_xarray(folder):

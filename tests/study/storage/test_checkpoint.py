@@ -16,9 +16,9 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import transform_library
+from roughvisc.study.case import read_study, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_study, vary
 from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.store import open_result
@@ -236,7 +236,7 @@ def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path):
 _KILLED = """
 import os, random, signal, sys, time
 from pathlib import Path
-from roughvisc.study.statement.case import read_study
+from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
 study, out, kills, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
 case, draw, done = read_study(study), random.Random(seed), 0
@@ -412,7 +412,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     assert stop.asked == steps - steps // 2, "it is finished"
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     with open_result(run_case(case, tmp_path / "scipy")) as same:
-        np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.solve.tolerance)
+        np.testing.assert_allclose(force, same.pressure.sum(("x", "y")).values, rtol=case.settings.tolerance)
 
 
 @pytest.mark.thorough

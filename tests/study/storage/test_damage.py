@@ -15,8 +15,8 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_cases, read_study
 from roughvisc.study.storage.store import DamagedError
 from roughvisc.study.storage.upkeep import clean_folder, verify
 

@@ -65,7 +65,7 @@ def test_accessor__is_there_wherever_results_are(tmp_path):
         f"import roughvisc as rv, xarray as xr, os, sys\nfor source in {list(RESULTS.values())!r}:\n"
         "    pid = os.fork()\n    if pid == 0:\n        exec(source)\n"
         "        print(type(ds.roughvisc).__name__, flush=True)\n"
-        "        heavy = {'matplotlib', 'dask', 'netCDF4', 'pydantic', 'pint'} if len(ds.variables) == 0 else set()\n"
+        "        heavy = {'matplotlib', 'dask', 'netCDF4', 'pint'} if len(ds.variables) == 0 else set()\n"
         "        assert not heavy & set(sys.modules)\n        os._exit(0)\n"
         "    assert os.waitpid(pid, 0)[1] == 0, source\n"
     )

@@ -10,8 +10,8 @@ from support import BALL, LOADS, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.statement.case import read_cases, vary
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.store import open_result, write_result
 from roughvisc.study.storage.sweep_cases import SWEEP

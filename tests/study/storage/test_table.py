@@ -8,9 +8,9 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.study.case import read_cases
 from roughvisc.study.execution.monitor import Monitor
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import CASES
 

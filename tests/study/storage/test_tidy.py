@@ -7,8 +7,8 @@ import pytest
 from sample_results import hertz_creep
 from support import BALL
 
+from roughvisc.study.case import read_cases
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.lock import lock_case
 from roughvisc.study.storage.store import write_result
 from roughvisc.study.storage.upkeep import clean_folder

@@ -11,8 +11,8 @@ from click.testing import CliRunner
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
+from roughvisc.study.case import read_cases
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.statement.case import read_cases
 from roughvisc.study.storage.store import write_result
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.table import to_table

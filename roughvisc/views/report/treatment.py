@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
+from roughvisc.study.study_file import raw_height
+from roughvisc.topography.cards import is_card, open_card
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,14 +55,11 @@ def _measured(dataset: xr.Dataset) -> xr.DataArray | None:
         case = Case.from_json(dataset.attrs["case"])
         if case.surface_sha256 != dataset.attrs.get("surface_sha256"):
             return None
-        surface = case.settings.surface
-        if surface.second is not None:
+        if "second" in case.surface:
             return None
-        path = getattr(surface, "file", None)
-        if path is not None and str(path).lower().endswith(".toml"):
-            from roughvisc.topography.cards import open_card
-
-            return open_card(path, conditioned=False)
-        return surface.raw()
+        path = case.surface.get("file")
+        if path is not None and is_card(Path(path), case.surface.get("format")):
+            return open_card(Path(path), conditioned=False)
+        return raw_height("surface", case.surface)
     except (InputError, OSError):
         return None

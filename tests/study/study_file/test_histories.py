@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from support import refused
 
 import roughvisc as rv
-from roughvisc.study.statement.case import Case, read_cases, read_study
-from roughvisc.study.statement.histories import thinned
+from roughvisc.study.case import Case, read_cases, read_study
+from roughvisc.study.machine_history import thinned
 
 STUDY = """
 [surface]
@@ -85,13 +85,11 @@ def test_bad_tables__are_named_with_the_line(tmp_path, text, keys, at):
         rv.read_program(path, **keys)
 
 
-def test_start_end_zero_factor__choose_the_part_that_counts(tmp_path):
-    path = write(tmp_path, "t [s],x [mm]\n10,5\n11,4\n13,3\n14,3")  # downward motion, touch at 4 mm
-    program = rv.read_program(path, time="t", approach="x", zero="4 mm", factor=-1, start="11 s", end=12, thin=0)
-    assert program == rv.Program.table([0, 1], [0, 0.5e-3], control="approach")
+def test_zero_and_factor__choose_the_origin_and_the_sign(tmp_path):
+    path = write(tmp_path, "t [s],x [mm]\n11,4\n12,3.5\n13,3\n14,3")  # downward motion, touch at 4 mm
+    program = rv.read_program(path, time="t", approach="x", zero="4 mm", factor=-1, thin=0)
+    assert program == rv.Program.table([0, 1, 2, 3], [0, 0.5e-3, 1e-3, 1e-3], control="approach")
     assert "11 s in the file is time zero" in program.note
-    between = rv.read_program(path, time="t", approach="x", zero="4 mm", factor=-1, start=11.5, end=13.5, thin=0)
-    assert between == rv.Program.table([0, 1.5, 2], [0.25e-3, 1e-3, 1e-3], control="approach")
 
 
 def test_noise_below_zero__counts_as_zero_up_to_its_limit(tmp_path):
@@ -99,10 +97,9 @@ def test_noise_below_zero__counts_as_zero_up_to_its_limit(tmp_path):
     program = rv.read_program(path, time="t", load="F", thin=0)
     assert program == rv.Program.table([0, 1, 2, 3], [0, 0.1, 0, 0])
     assert "2 rows below zero count as zero, the lowest -0.001 N" in program.note
-    rv.read_program(path, time="t", load="F", noise="1 mN")
-    for noise in ("0.9 %", "1 s"):
-        with pytest.raises(rv.InputError, match="noise"):
-            rv.read_program(path, time="t", load="F", noise=noise)
+    write(tmp_path, "t [s],F [mN]\n0,-1.1\n1,100")
+    with pytest.raises(rv.InputError, match=r"machine\.csv: load falls to -0\.0011 N"):
+        rv.read_program(path, time="t", load="F", thin=0)
 
 
 def distance(times, values, kept):
@@ -154,10 +151,10 @@ def test_study__takes_columns_by_key_and_keeps_the_case_whole(tmp_path):
     case = read_study(study)
     assert case.program() == rv.Program.table([0, 1, 2], [0, 2e4, 2e4], control="pressure")
     assert case.program().note.startswith("machine.csv: 3 rows became 2 segments")
-    motion = STUDY + 'table = { file = "machine.csv", time = "Zeit", approach = "Weg", start = "3.5 s" }'
+    motion = STUDY + 'table = { file = "machine.csv", time = "Zeit", approach = "Weg" }'
     study.write_text(motion + '\n[sweep]\n"program.0.table.thin" = [0, "1 um"]')
     exact, thin = read_cases(study)
-    assert exact.program() == rv.Program.table([0, 1], [2e-6, 1e-6], control="approach")
+    assert exact.program() == rv.Program.table([0, 1, 2], [0, 2e-6, 1e-6], control="approach")
     assert thin.varied == {"program.0.table.thin": "1 um"}
     path.unlink()
     again = Case.from_json(case.to_json())

@@ -7,7 +7,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.statement.case import Case
+from roughvisc.study.case import Case
+from roughvisc.study.study_file import raw_height
 from roughvisc.topography.cards import condition
 
 H = rv.from_array(np.random.default_rng(0).standard_normal((20, 24)), 1e-6)
@@ -43,6 +44,7 @@ def test_step__is_refused_by_function_card_and_study(function, step, value):
 @pytest.mark.parametrize("order", [0, 1, 2, 3, True, False])
 def test_level__is_what_a_card_makes_of_it(order):
     case = case_with("level", order)
-    expected = case.settings.surface.raw() if order is False else rv.level(case.settings.surface.raw(), int(order))
+    raw = raw_height("surface", case.surface)
+    expected = raw if order is False else rv.level(raw, int(order))
     np.testing.assert_array_equal(case.height(), expected)
-    np.testing.assert_array_equal(condition(case.settings.surface.raw(), {"level": order}), expected)
+    np.testing.assert_array_equal(condition(raw, {"level": order}), expected)

@@ -1,4 +1,4 @@
-"""The text of a first study for a scan, with comments."""
+"""Text of a first study for a scan, with comments."""
 
 from __future__ import annotations
 
@@ -14,28 +14,26 @@ from roughvisc.topography.writers import surface_table, written_quantity
 
 #: The material of a first study: a rubber. [Pa, Pa, Pa s]
 SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY = 3e6, 1e6, 1e5
-#: Contact fraction that is aimed at in the end, unless another is asked for.
+#: Final contact fraction, unless another is requested.
 CONTACT = 0.05
-#: Points from which a coarser grid is proposed for the first run.
+#: Number of points from which a coarser grid is proposed for the first run.
 _LARGE = 400_000
 
 
 @dataclass(frozen=True)
 class FirstPressure:
-    """The pressure of a first study, and what it was found to do.
+    """Pressure of a first study, and the contact that it makes.
 
     Attributes
     ----------
     pressure : float
-        Nominal. [Pa]
+        Nominal pressure. [Pa]
     contact : float
-        Contact fraction that was aimed at, in the end. [-]
+        Requested final contact fraction. [-]
     late, early : float
-        Contact fractions in the end and at once. [-]
+        Contact fractions in the end and instantaneous. [-]
     shape : tuple of int
-        Cells that were pressed.
-    slope : float
-        Root mean square slope of these: that of a large scan's copy is less. [-]
+        Numbers of cells that were pressed.
     """
 
     pressure: float
@@ -43,19 +41,16 @@ class FirstPressure:
     late: float
     early: float
     shape: tuple[int, int]
-    slope: float
 
 
 _REMARKS = {
     "crop": "the largest part without large holes",
-    "level": "a plane is taken off",
-    "outliers": "spikes become missing points ...",
-    "fill": "... and missing points are filled in; the result keeps their mask",
+    "level": "0: the mean is taken off; 1: a plane; 2: plane and curvature",
+    "outliers": "spikes become missing points",
+    "fill": "missing points are filled in; the result keeps their mask",
     "filter": "shorter waves are noise",
 }
-
-
-#: boundary -> line of the study: the scan stands for a larger, nominally flat surface.
+#: Boundary of the study, for a scan that stands for a larger, nominally flat surface.
 _BOUNDARIES = {
     "periodic": 'boundary = "periodic"               # the scan stands for a larger, nominally flat surface',
     "mirror": 'boundary = "mirror"                 # opposite borders differ: the scan repeats with its mirror images',
@@ -69,36 +64,27 @@ def starter_study(
     found: Inspection,
     first: FirstPressure,
 ) -> str:
-    """A study of a scan pressed on a rubber, as TOML, ready to be run and to be changed.
+    """Return a study of a scan pressed on a rubber, as TOML, to be run and changed.
 
     Parameters
     ----------
     file : path
         The scan.
     study : path
-        Where the study is going to be.
+        File of the study.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None where it does not.
+        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None for the others.
     found : Inspection
-        What is seen in the scan.
+        Inspection of the scan.
     first : FirstPressure
-        What the scan is pressed with, and what comes into contact then.
+        Pressure of the scan, and its contact.
     """
-    steps = dict(found.steps)
-    remarks = dict(_REMARKS)
-    if steps["level"] != 1:
-        remarks["level"] = ("the mean is taken off", "", "plane and curvature are taken off; 1: the plane alone")[
-            steps["level"]
-        ]
-    if "outliers" not in steps:
-        remarks["fill"] = "missing points are filled in; the result keeps their mask"
-    surface = surface_table(file, Path(study).parent, options, steps, remarks)
+    surface = surface_table(file, Path(study).parent, options, found.steps, _REMARKS)
     if math.prod(found.shape) > _LARGE:
         coarse = [max(16, n // 2) for n in found.shape]
         surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
-    title = Path(file).stem.replace("_", " ")
     return _TEXT.format(
-        title=title.replace("\\", "").replace('"', ""),
+        title=Path(file).stem.replace("_", " ").replace("\\", "").replace('"', ""),
         name=Path(file).name,
         study=Path(study).name,
         surface=surface,
@@ -109,14 +95,14 @@ def starter_study(
         late=f"{100 * first.late:.2g}",
         early=f"{100 * first.early:.2g}",
         pressed=f"{first.shape[0]} x {first.shape[1]}",
-        copy="" if first.shape == found.shape else _COPY.format(few=f"{first.slope:.2g}", all=f"{found.rms_slope:.2g}"),
-        program=_program(first.pressure, found),
+        pressure=written_quantity(first.pressure, "Pa"),
+        force=written_quantity(first.pressure * found.area, "N", 4),
         boundary=_BOUNDARIES[found.boundary],
     )
 
 
 def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
-    r"""Nominal pressure that brings a small fraction of a rough surface into contact, rounded to two digits.
+    r"""Return the nominal pressure that brings a small fraction of a rough surface into contact, with two digits.
 
     Parameters
     ----------
@@ -150,29 +136,6 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
     return float(f"{fraction * modulus * rms_slope / 2:.2g}")
 
 
-def _program(pressure: float, found: Inspection) -> str:
-    """The line that sets the load, with the pressure and the force that it stands for."""
-    force = written_quantity(pressure * found.area, "N", 4)
-    return f'pressure = "{written_quantity(pressure, "Pa")}"  # nominal: {force} over {written_area(found.area)}'
-
-
-def written_area(area: float) -> str:
-    """An area in the largest unit of which it has a hundredth.
-
-    Examples
-    --------
-    >>> written_area(4.5e-8), written_area(4e-10)
-    ('0.045 mm^2', '400 um^2')
-    """
-    for side, unit in ((1.0, "m"), (1e-3, "mm"), (1e-6, "um")):
-        if area >= 0.01 * side**2:
-            return f"{area / side**2:.4g} {unit}^2"
-    return f"{area / 1e-18:.4g} nm^2"
-
-
-_COPY = """
-# These cells are longer than those of the run, and their rms slope is {few}, not {all}: they were pressed less by that
-# ratio."""
 _TEXT = """\
 # A first study of {name}: pressed on a rubber, and held while the contact creeps.
 #   roughvisc plan {study}     what it will model and cost
@@ -183,16 +146,16 @@ title = "{title} on a rubber"
 {surface}
 [material]                          # a spring in series with a Kelvin element; put your own numbers here
 model = "zener"
-shear_modulus = "{shear}"             # at once
+shear_modulus = "{shear}"             # instantaneous
 kelvin_modulus = "{kelvin}"            # softer in the end ...
 kelvin_viscosity = "{viscosity}"      # ... after some 0.1 s: viscosity over modulus
 poisson = 0.5
 
 # The pressure aims at {contact} % of the area in contact in the end (roughvisc new --contact "{contact} %"). Elastic
 # presses on {pressed} cells, with the stiffness that the rubber has then, give {late} % in the end and {early} % at
-# once.{copy}
+# once.
 [[program]]
-{program}
+pressure = "{pressure}"  # nominal: {force} over the whole surface
 over = "50 ms"                      # within this time, linearly
 
 [[program]]

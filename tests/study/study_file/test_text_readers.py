@@ -42,7 +42,7 @@ def points(_):
 
 
 def of_program(path):
-    program = rv.read_program(path, time="t", load="F", thin=0, start="first")
+    program = rv.read_program(path, time="t", load="F", thin=0)
     return np.array([segment.end for segment in program.segments])
 
 
@@ -101,12 +101,3 @@ def test_quotation_mark_that_is_not_closed__loses_no_rows(rows, tmp_path):
     for read in (lambda: read_table(path, TIME | LOAD), lambda: rv.read_program(path)):
         with pytest.raises(InputError, match=r"table\.csv, line 3: "):
             read()
-
-
-def test_history__with_a_stated_decimal_mark_refuses_what_has_another(tmp_path):
-    path = tmp_path / "machine.csv"
-    path.write_text("t [s];F [N]\n0;0\n1;2.5\n")
-    with pytest.raises(InputError, match="line 3"):
-        rv.read_program(path, time="t", load="F", decimal=",")
-    path.write_text("t [s];F [N]\n0;0\n1;1.250,5\n")
-    assert rv.read_program(path, time="t", load="F", decimal=",").segments[-1].end == 1250.5

@@ -1,0 +1,235 @@
+"""Calls of functions with tables of arguments, as study files and surface cards contain them.
+
+The signature of a function says which keys its table has and of which types they are; the function itself checks the
+values. Errors name the key, the value and what was expected.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from roughvisc.errors import InputError
+from roughvisc.units import shown
+
+
+class DataNeeded(Exception):
+    """A function has checked its arguments, and needs the data that it was called without."""
+
+
+class NoData:
+    """Stands for data that a function is not given, so that it checks its other arguments only.
+
+    A function that looks at it raises :class:`DataNeeded`.
+    """
+
+    def __getattr__(self, name: str) -> Any:
+        raise DataNeeded(name)
+
+    def __getitem__(self, key: Any) -> Any:
+        raise DataNeeded(key)
+
+    def __contains__(self, key: Any) -> bool:
+        raise DataNeeded(key)
+
+
+def call(function: Callable[..., Any], where: str, table: Mapping[str, Any], *first: Any) -> Any:
+    """Call a function with the entries of a table as keyword arguments.
+
+    Parameters
+    ----------
+    function : callable
+        Function, or a dataclass.
+    where : str
+        Dotted name of the table, for messages.
+    table : mapping
+        Argument -> value, with the types of TOML.
+    *first : object
+        First arguments, which are not in the table.
+
+    Raises
+    ------
+    InputError
+        If the table has a key that the function does not have, lacks one that it needs, a value is of another type, or
+        the function refuses a value. The key begins with `where`.
+    """
+    check_keys(function, where, table, len(first))
+    try:
+        return function(*first, **table)
+    except InputError as error:
+        if error.key in list(inspect.signature(function).parameters)[: len(first)]:
+            raise located(InputError(found=error.found, expected=error.expected), where) from error
+        raise located(error, where) from error
+
+
+def check_keys(function: Callable[..., Any], where: str, table: Mapping[str, Any], skipped: int = 0) -> None:
+    """Check the keys of a table, and the types of its values, by the signature of a function.
+
+    Parameters
+    ----------
+    function, where, table
+        As :func:`call` has them.
+    skipped : int
+        Number of first arguments that are not in the table.
+    """
+    known = arguments(function, skipped)
+    refuse_unknown(where, table, known)
+    for key, (hint, default) in known.items():
+        name = dotted(where, key)
+        if key not in table:
+            if default is inspect.Parameter.empty:
+                expected = in_words(hint)
+                raise InputError(f"{name}: missing: expected {expected}", key=name, expected=expected)
+        elif not suits(table[key], hint):
+            raise InputError(key=name, found=table[key], expected=in_words(hint))
+
+
+def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], data: int = 1) -> None:
+    """Check the arguments of a function whose first arguments are data, without the data.
+
+    Parameters
+    ----------
+    function : callable
+        It checks its other arguments before it looks at the data.
+    where, table
+        As :func:`call` has them.
+    data : int
+        Number of first arguments that are data.
+    """
+    with suppress(DataNeeded):
+        call(function, where, table, *[NoData() for _ in range(data)])
+
+
+@cache
+def arguments(function: Callable[..., Any], skipped: int = 0) -> dict[str, tuple[Any, Any]]:
+    """Return type and default of each argument of a function, but for the first ones."""
+    hints = get_type_hints(function)
+    parameters = list(inspect.signature(function).parameters.values())[skipped:]
+    return {one.name: (hints.get(one.name, Any), one.default) for one in parameters}
+
+
+@cache
+def units_of(function: Callable[..., Any]) -> dict[str, str]:
+    """Return the unit of each argument of a function that is a quantity; ``"1"`` for pure numbers.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.materials.models import maxwell
+    >>> units_of(maxwell)["viscosity"], units_of(maxwell)["poisson"]
+    ('Pa s', '1')
+    """
+    numbers = {name: "1" for name, (hint, _) in arguments(function).items() if float in (hint, *get_args(hint))}
+    called = function.__init__ if isinstance(function, type) else function  # type: ignore[misc]
+    return numbers | getattr(called, "quantities", {})
+
+
+def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Refuse a table with a key that is not known."""
+    for key in table:
+        if key not in known:
+            name, expected = dotted(where, key), f"one of {', '.join(known)}"
+            raise InputError(f"{name}: unknown key{nearest(key, known)}", key=name, found=table[key], expected=expected)
+
+
+def close(word: Any, known: Iterable[str]) -> str:
+    """Return a suggestion for a word that is not known; empty if no known word is similar."""
+    near = difflib.get_close_matches(str(word), list(known), n=1)
+    return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def nearest(word: Any, known: Iterable[str]) -> str:
+    """Return a suggestion for a word that is not known, or the list of the known ones."""
+    known = list(known)
+    return close(word, known) or f": expected one of {', '.join(known)}"
+
+
+def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
+    """Return the only one of some keys that a table has, or refuse the table."""
+    keys = list(keys)
+    found = [key for key in keys if key in table]
+    if len(found) != 1:
+        expected = f"exactly one of {', '.join(keys)}"
+        hint = "" if found else next(filter(None, (close(key, keys) for key in table)), "")
+        message = f"{where}: found {shown(table)}: expected {expected}{hint}"
+        raise InputError(message, key=where, found=table, expected=expected)
+    return found[0]
+
+
+def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
+    """Return a value that is one of some words, or refuse it."""
+    words = list(words)
+    if value not in words:
+        expected = f"one of {', '.join(words)}"
+        hint = nearest(value, words) if isinstance(value, str) else f": expected {expected}"
+        raise InputError(f"{key}: found {shown(value)}{hint}", key=key, found=value, expected=expected)
+    return value
+
+
+def a_table(where: str, value: Any) -> dict[str, Any]:
+    """Return a copy of a value that is a table, or refuse it."""
+    if not isinstance(value, Mapping):
+        raise InputError(key=where, found=value, expected="a table")
+    return dict(value)
+
+
+def located(error: InputError, where: str) -> InputError:
+    """Return an error about an argument as one about a key of a table."""
+    key = re.sub(r"\[(\d+)\]", r".\1", dotted(where, error.key))
+    text = str(error)
+    message = f"{key}{text[len(error.key) :]}" if error.key and text.startswith(f"{error.key}: ") else f"{key}: {text}"
+    expected = error.expected or text.rpartition("expected ")[2]
+    return type(error)(message, key=key, found=error.found, expected=expected, transient=error.transient)
+
+
+def dotted(*names: str) -> str:
+    """Join the names of tables and keys, without those that are empty."""
+    return ".".join(filter(None, names))
+
+
+def suits(value: Any, hint: Any) -> bool:
+    """Return whether a value as TOML has it is of the type of an argument.
+
+    Examples
+    --------
+    >>> suits(2, float | None), suits(True, float), suits("2 m", float | str), suits([1, 2], tuple[float, float])
+    (True, False, True, True)
+    """
+    kind, inner = get_origin(hint), get_args(hint)
+    if kind in (Union, types.UnionType):
+        return any(suits(value, one) for one in inner)
+    if kind is Literal:
+        return any(value == one and isinstance(value, type(one)) for one in inner)
+    if kind is tuple and ... not in inner:
+        return isinstance(value, list | tuple) and len(value) == len(inner) and all(map(suits, value, inner))
+    if kind in (tuple, Sequence):
+        return isinstance(value, list | tuple) and all(suits(one, inner[0]) for one in value)
+    if hint in (float, int):
+        return isinstance(value, (int, float) if hint is float else int) and not isinstance(value, bool)
+    is_plain = hint is not Any and isinstance(hint, type) and not getattr(hint, "_is_protocol", False)
+    return isinstance(value, hint) if is_plain else True
+
+
+def in_words(hint: Any) -> str:
+    """Return the type of an argument in words.
+
+    Examples
+    --------
+    >>> in_words(float | str | None), in_words(Literal["x", "y"]), in_words(Sequence[float])
+    ('a number, or a text with a unit', "'x' or 'y'", 'a list')
+    """
+    inner = [one for one in get_args(hint) if one is not type(None)]
+    if get_origin(hint) is Literal:
+        return " or ".join(map(repr, inner))
+    if get_origin(hint) in (Union, types.UnionType):
+        if float in inner and str in inner:
+            inner = ["a number, or a text with a unit", *(one for one in inner if one not in (float, str))]
+        return " or ".join(dict.fromkeys(one if isinstance(one, str) else in_words(one) for one in inner))
+    named = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+    named |= {tuple: "a list", Sequence: "a list"}
+    return named.get(get_origin(hint) or hint, "a value")

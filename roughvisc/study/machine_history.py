@@ -1,0 +1,230 @@
+"""Histories of test machines as loading programs: a zero, a factor, noise below zero, thinned rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.program import PUSHING, UNITS, Control, Program
+from roughvisc.tables import Wanted, read_table
+from roughvisc.units import is_quantity, number
+
+Array = NDArray[np.float64]
+
+#: Loads below zero count as zero down to this part of the largest load.
+_NOISE = 0.01
+#: Number of segments from which a note proposes a larger `thin`, if they are more than a tenth of the rows.
+_MANY = 300
+#: Rows that a search for the end of a segment looks at first.
+_AHEAD = 64
+
+
+class History(NamedTuple):
+    """Recorded history.
+
+    Attributes
+    ----------
+    control : {"load", "approach", "pressure"}
+        What it prescribes.
+    times, values : list of float
+        Times from zero [s], and values [N, m or Pa].
+    note : str
+        Numbers of rows and segments, and what became zero.
+    """
+
+    control: Control
+    times: list[float]
+    values: list[float]
+    note: str
+
+
+def read_program(
+    path: str | Path,
+    *,
+    time: str = "time",
+    load: str | None = None,
+    approach: str | None = None,
+    pressure: str | None = None,
+    zero: float | str = 0.0,
+    factor: float = 1.0,
+    thin: float | str = "0.1 %",
+) -> Program:
+    """Read a program from a table of a test machine: force, motion or nominal pressure against time.
+
+    Parameters
+    ----------
+    path : path
+        A text file; see Notes.
+    time : str
+        Name of the time column. The time of the first row becomes zero.
+    load, approach, pressure : str, optional
+        Name of the prescribed column; give one of them. Default: ``load="load"``.
+    zero : float or str
+        Value in the file that becomes zero: a tare, or the position of first touch. [N, m or Pa]
+    factor : float
+        Factor for the values after subtracting `zero`: -1 if compression is negative in the file.
+    thin : float or str
+        Rows are omitted as long as all rows are within this distance of the straight lines between the kept rows; zero
+        keeps all rows. A string with ``%`` is a part of the largest value. [N, m or Pa]
+
+    Returns
+    -------
+    Program
+        Its ``note`` states the numbers of rows and segments, and what becomes zero.
+
+    Raises
+    ------
+    InputError
+        If the file or a column cannot be read, times do not increase, or loads are below zero by more than 1 % of the
+        largest load, which counts as noise; the message names the line.
+
+    Notes
+    -----
+    Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
+    names; lines above it are skipped. Upper and lower case do not matter. The unit is in the heading, as
+    ``Force [mN]`` or ``Force (mN)``, or in the name given here. Two rows at the same time are a jump.
+    """
+    found = read_history(
+        path, time=time, load=load, approach=approach, pressure=pressure, zero=zero, factor=factor, thin=thin
+    )
+    return Program.table(found.times, found.values, found.control, found.note)
+
+
+def read_history(
+    path: str | Path,
+    *,
+    time: str = "time",
+    load: str | None = None,
+    approach: str | None = None,
+    pressure: str | None = None,
+    zero: float | str = 0.0,
+    factor: float = 1.0,
+    thin: float | str = "0.1 %",
+) -> History:
+    """Read the rows of :func:`read_program`, which has the same arguments."""
+    columns: dict[Control, str | None] = {"load": load, "approach": approach, "pressure": pressure}
+    chosen = {control: name for control, name in columns.items() if name is not None} or {"load": "load"}
+    if len(chosen) > 1:
+        raise InputError(key="load", found=list(chosen), expected="one prescribed column")
+    control, column = next(iter(chosen.items()))
+    unit = UNITS[control]
+    is_part = isinstance(thin, str) and is_quantity(thin, "1")
+    limit = number(thin, "1" if is_part else unit, "thin", least=0)
+    offset, scale = number(zero, unit, "zero"), number(factor, "1", "factor")
+    for key, name in (("time", time), (control, column)):
+        if not name.strip():
+            raise InputError(key=key, found=name, expected="the name of a column")
+    wanted = {"time": Wanted(time, "s"), control: Wanted(column, unit)}
+    found, lines = read_table(path, wanted)
+    _check_times(path, found["time"], lines)
+    start = float(found["time"][0])
+    times, values = _less(found["time"], start), _less(found[control], offset) * scale
+    said = [f"{start:g} s in the file is time zero"] if start else []
+    if control in PUSHING:
+        said += _noise_note(path, control, found["time"], values)
+        values = np.maximum(values, 0.0)
+    largest = float(np.max(np.abs(values)))
+    tolerance = limit * largest if is_part else limit
+    if abs(values[0]) <= tolerance:
+        values[0] = 0.0
+    kept = thinned(times, values, tolerance)
+    segments = len(kept) - (values[0] == 0)
+    lead = f"{Path(path).name}: {len(times):,} rows became {segments:,} segments"
+    if tolerance:
+        part = f", {100 * tolerance / largest:.2g} % of the largest {control}" if largest else ""
+        lead += f", which pass every row within {tolerance:.3g} {unit}{part}"
+    if segments > max(_MANY, len(times) / 10):
+        said.append("the rows scatter by more than that: a larger `thin` leaves fewer segments")
+    return History(control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *said]) + ".")
+
+
+def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
+    falls = np.flatnonzero(np.diff(times) < 0)
+    if falls.size:
+        at = int(falls[0]) + 1
+        raise InputError(
+            f"{path}, line {lines[at]}: time {times[at]:g} s after {times[at - 1]:g} s: expected increasing times"
+        )
+    crowded = np.flatnonzero(times[2:] == times[:-2])
+    if crowded.size:
+        at = int(crowded[0])
+        raise InputError(
+            f"{path}, lines {lines[at]} to {lines[at + 2]}: three rows at {times[at]:g} s: expected at most two, which "
+            "are a jump; export the times with more digits"
+        )
+
+
+def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:
+    """Return a note on values below zero, which count as zero; refuse those that are no noise."""
+    unit, largest, lowest = UNITS[control], max(float(values.max()), 0.0), float(values.min())
+    if lowest < -_NOISE * largest:
+        at = int(np.argmin(values))
+        turn = " Does the machine count compression negative? Then factor = -1." if -lowest > largest else ""
+        raise InputError(
+            f"{path}: {control} falls to {lowest:.3g} {unit} at {times[at]:g} s: expected none below zero by more than "
+            f"{100 * _NOISE:g} % of the largest {control} (`zero` takes an offset off).{turn}"
+        )
+    below = int(np.count_nonzero(values < 0))
+    rows = "row below zero counts" if below == 1 else "rows below zero count"
+    return [f"{below:,} {rows} as zero, the lowest {lowest:.3g} {unit}"] if below else []
+
+
+def _less(values: Array, zero: float) -> Array:
+    """Return values less their zero, rounded to 12 digits, in memory of their own."""
+    return np.array([float(f"{value - zero:.12g}") for value in values.tolist()]) if zero else values.copy()
+
+
+def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
+    """Return the rows to keep so that the straight lines between them pass every row within a tolerance.
+
+    Parameters
+    ----------
+    times, values : ndarray
+        Of the rows; two rows at one time are a jump, and both are kept.
+    tolerance : float
+        In the unit of the values; zero keeps every row.
+
+    Returns
+    -------
+    ndarray of int
+        Ascending, with the first and the last row.
+
+    Notes
+    -----
+    From each row that is kept the line goes to the farthest row that it can reach: the slopes that pass all rows
+    between within the tolerance form a cone, which narrows row by row. One sweep through the rows.
+    """
+    count = len(times)
+    if tolerance <= 0 or count < 3:
+        return np.arange(count)
+    ends = [*np.flatnonzero(np.diff(times) == 0).tolist(), count - 1]
+    kept, row = [0], 0
+    for end in ends:
+        while row < end:
+            row = _farthest(times, values, row, end, tolerance)
+            kept.append(row)
+        if end < count - 1:
+            row = end + 1
+            kept.append(row)
+    return np.array(kept)
+
+
+def _farthest(times: Array, values: Array, row: int, end: int, tolerance: float) -> int:
+    """Return the farthest row, up to an end, that a line from a row reaches within a tolerance of all between."""
+    low, high, best = -np.inf, np.inf, row + 1
+    here, ahead = row + 1, _AHEAD
+    while here <= end and low <= high:
+        there = min(here + ahead, end + 1)
+        span, rise = times[here:there] - times[row], values[here:there] - values[row]
+        lows = np.maximum.accumulate(np.concatenate([[low], (rise - tolerance) / span]))
+        highs = np.minimum.accumulate(np.concatenate([[high], (rise + tolerance) / span]))
+        reached = np.flatnonzero((lows[:-1] <= rise / span) & (rise / span <= highs[:-1]))
+        if reached.size:
+            best = here + int(reached[-1])
+        low, high = float(lows[-1]), float(highs[-1])
+        here, ahead = there, 2 * ahead
+    return best

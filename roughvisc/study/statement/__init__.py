@@ -1,1 +1,0 @@
-"""Statement of a study: study files, their schema, and the cases that they define."""
