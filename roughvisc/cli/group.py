@@ -67,9 +67,14 @@ def say(console: Console, line: str) -> None:
 
 
 def say_path(console: Console, what: str, path: Path) -> None:
-    """Write a line with a path, relative to this folder if it is below it."""
-    shown = os.path.relpath(path)
-    say(console, f"{what}: {path if shown.startswith('..') else shown}")
+    """Write a line with a path."""
+    say(console, f"{what}: {near(path)}")
+
+
+def near(path: Path) -> str:
+    """Return a path relative to this folder if it is below it."""
+    relative = os.path.relpath(path)
+    return str(path) if relative.startswith("..") else relative
 
 
 def say_figures(console: Console, written: Sequence[Path]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import PATH, QUANTITY, Failure, complain, say, say_figures, say_path
+from roughvisc.cli.group import PATH, QUANTITY, Failure, complain, near, say, say_figures, say_path
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
         say_path(console, "Result", result_path(folder, case.key))
         if plots:
             say_figures(console, save_figures(dataset, folder, case.key, every=False))
-            say_path(console, "For all figures, run: roughvisc plot --all", folder)
+            say(console, f"For all figures, run: roughvisc plot --all {near(folder)}")
         return unconverged(dataset) or missed
 
 
