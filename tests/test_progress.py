@@ -46,17 +46,17 @@ def test_bar__is_lines_elsewhere(shown, monkeypatch):
 
 
 def test_measurements_in_turn__have_one_bar_and_a_line_each(shown):
-    lines, bars = shown(False), shown(True)
-    for console in (lines, bars):
-        with reporting(True, "", console) as report:
-            for label in ("coarse", "fine"):
-                report(label, 0.0, 0.0)
-                report(label, 1.0, 2.0)
-    assert [line for line in lines.file.getvalue().splitlines() if line.startswith("measuring")] == [
-        "measuring coarse",
-        "measuring fine",
-    ]
-    assert "coarse" not in bars.file.getvalue().rpartition("fine")[2]
+    console = shown(False)
+    with reporting(True, "", console) as report:
+        for label in ("coarse", "fine"):
+            report(label, 0.0, 0.0)
+            report(label, 1.0, 2.0)
+    written = console.file.getvalue().splitlines()
+    assert [line for line in written if line.startswith("measuring")] == ["measuring coarse", "measuring fine"]
+    with Bars(shown(True)) as bars:
+        bars.only("coarse", 1.0, 2.0)
+        bars.only("fine", 1.0, 2.0)
+        assert [task.description for task in bars._progress.tasks] == ["fine"]
 
 
 @pytest.mark.parametrize("pace", ["steady", "resumed"])

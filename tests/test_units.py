@@ -169,6 +169,7 @@ def test_unit_for__reads_well(values, si, text):
     ("value", "bounds"),
     [
         (0, {"above": 0}),
+        (2.0, {"above": 2}),
         (1e-320, {"above": 0}),  # no double is its reciprocal
         ("-1 mm", {"least": 0}),
         (0.7, {"above": 0, "most": 0.5}),
