@@ -15,8 +15,7 @@ from contextlib import suppress
 from functools import cache
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from roughvisc.errors import InputError
-from roughvisc.units import shown
+from roughvisc.errors import InputError, short_repr
 
 
 class DataNeeded(Exception):
@@ -156,7 +155,7 @@ def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
     if len(found) != 1:
         expected = f"exactly one of {', '.join(keys)}"
         hint = "" if found else next(filter(None, (close(key, keys) for key in table)), "")
-        message = f"{where}: found {shown(table)}: expected {expected}{hint}"
+        message = f"{where}: found {short_repr(table)}: expected {expected}{hint}"
         raise InputError(message, key=where, found=table, expected=expected)
     return found[0]
 
@@ -167,7 +166,7 @@ def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
     if value not in words:
         expected = f"one of {', '.join(words)}"
         hint = nearest(value, words) if isinstance(value, str) else f": expected {expected}"
-        raise InputError(f"{key}: found {shown(value)}{hint}", key=key, found=value, expected=expected)
+        raise InputError(f"{key}: found {short_repr(value)}{hint}", key=key, found=value, expected=expected)
     return value
 
 

@@ -4,6 +4,7 @@ The command line prints the message of a :class:`RoughviscError` without a trace
 """
 
 import unicodedata
+from collections.abc import Mapping
 from typing import Self
 
 
@@ -62,9 +63,8 @@ class InputError(RoughviscError, ValueError):
         self, message: str = "", *, key: str = "", found: object = None, expected: str = "", transient: bool = False
     ) -> None:
         if not message:
-            text = repr(found)
-            text = text if len(text) <= 60 else text[:57] + "..."
-            message = f"{key}: found {text}: expected {expected}" if key else f"found {text}: expected {expected}"
+            message = f"{key}: " if key else ""
+            message += f"found {short_repr(found)}: expected {expected}"
         super().__init__(message, transient=transient)
         self.key, self.found, self.expected = key, found, expected
 
@@ -87,6 +87,14 @@ class TooLargeError(InputError):
 
 class ConvergenceError(RoughviscError, RuntimeError):
     """A step did not reach its tolerance: the message names the time, the residual and what to try."""
+
+
+def short_repr(value: object) -> str:
+    """Return a value as text for a message, of at most 60 characters."""
+    if isinstance(value, Mapping):
+        return f"a table with {', '.join(map(str, value)) or 'no keys'}"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def printable(text: str) -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, short_repr
 
 if TYPE_CHECKING:
     # mypy cannot express that the decorator converts text: inside a function it takes a quantity for a number
@@ -105,7 +105,7 @@ def quantity(value: str | float, unit: str, key: str = "", *, difference: bool =
         expected = f"{expected}, finite"
     if not math.isfinite(result):
         named = f"{key}: " if key else ""
-        message = f"{named}found {shown(value)}{problem}: expected {expected}"
+        message = f"{named}found {short_repr(value)}{problem}: expected {expected}"
         raise InputError(message, key=key, found=value, expected=expected)
     return result
 
@@ -170,9 +170,18 @@ def number(
                 hint = f"{error}; did you mean {other} = {value!r}?"
                 raise InputError(hint, key=key, found=value, expected=error.expected) from None
         raise
-    bounds = {"above": above, "least": least, "most": most, "below": below}
-    if not within(found, **bounds):
-        raise InputError(key=key, found=value, expected=wanted_quantity(unit, **bounds))
+    inside = (
+        (above is None or found > above)
+        and (above != 0 or found >= sys.float_info.min)  # whose reciprocal a double can hold
+        and (least is None or found >= least)
+        and (most is None or found <= most)
+        and (below is None or found < below)
+    )
+    if not inside:
+        limits = {"above": above, "at least": least, "up to": most, "below": below}
+        words = " and ".join(f"{word} {limit:g}" for word, limit in limits.items() if limit is not None)
+        comma = "" if unit in ("", "1") else ","
+        raise InputError(key=key, found=value, expected=f"{_expected(unit)}{comma} {words}")
     return found
 
 
@@ -277,45 +286,6 @@ def is_quantity(value: Any, unit: str) -> bool:
     except InputError:
         return False
     return True
-
-
-def shown(value: Any) -> str:
-    """Return a value as short text for a message."""
-    if isinstance(value, Mapping):
-        return f"a table with {', '.join(map(str, value)) or 'no keys'}"
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def within(
-    number: float,
-    *,
-    above: float | None = None,
-    least: float | None = None,
-    most: float | None = None,
-    below: float | None = None,
-) -> bool:
-    """Whether a number lies between bounds, the first and the last excluded; NaN lies in none."""
-    return (
-        (above is None or number > above)
-        and (above != 0 or number >= sys.float_info.min)  # whose reciprocal a double can hold
-        and (least is None or number >= least)
-        and (most is None or number <= most)
-        and (below is None or number < below)
-    )
-
-
-def range_in_words(**bounds: float | None) -> str:
-    """``" above 0 and up to 0.5"`` and the like, of bounds as :func:`within` has them; empty without any."""
-    words = {"above": "above", "least": "at least", "most": "up to", "below": "below"}
-    told = [f"{word} {bounds[key]:g}" for key, word in words.items() if bounds.get(key) is not None]
-    return " " + " and ".join(told) if told else ""
-
-
-def wanted_quantity(unit: str, **bounds: float | None) -> str:
-    """Describe valid values of a quantity."""
-    limits = range_in_words(**bounds)
-    return _expected(unit) + ("," * (unit not in ("", "1")) + limits if limits else "")
 
 
 def _parsed(text: str, unit: str, difference: bool) -> float:
@@ -457,12 +427,12 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
     return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))
 
 
-def said(value: float, unit: str) -> str:
-    """One value in SI as read in running text, to six digits.
+def format_quantity(value: float, unit: str) -> str:
+    """Return a value in SI as text with a suitable prefix, to six digits.
 
     Examples
     --------
-    >>> said(1e5, "Pa s"), said(0.05, "s"), said(2.0, "N")
+    >>> format_quantity(1e5, "Pa s"), format_quantity(0.05, "s"), format_quantity(2.0, "N")
     ('100 kPa s', '50 ms', '2 N')
     """
     return unit_for([value], unit).text(value, 6)

@@ -16,7 +16,7 @@ from roughvisc.mechanics.stepping import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import grown
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import said
+from roughvisc.units import format_quantity
 from roughvisc.variables import NOT_CONVERGED
 
 Array = NDArray[np.float64]
@@ -87,12 +87,13 @@ def wake_note(left: Mapping[float, float], period: float) -> str:
     speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
     if not speeds:
         return ""
-    where = f"at {said(speeds[0], 'm/s')}" if len(speeds) == 1 else f"from {said(speeds[0], 'm/s')} on"
+    slowest = format_quantity(speeds[0], "m/s")
+    where = f"at {slowest}" if len(speeds) == 1 else f"from {slowest} on"
     most = max(left[speed] for speed in speeds)
     return (
-        f"The surface repeats every {said(period, 'm')}, and {where} the contact slides into the wake of the one "
-        f"before: after a period up to {percent(most)} of the creep has not recovered. Friction and area are those of "
-        "a row of such contacts; those of a single one are not known. Use a longer period."
+        f"The surface repeats every {format_quantity(period, 'm')}, and {where} the contact slides into the wake of "
+        f"the one before: after a period up to {percent(most)} of the creep has not recovered. Friction and area are "
+        "those of a row of such contacts; those of a single one are not known. Use a longer period."
     )
 
 
@@ -114,7 +115,7 @@ def speeds_note(dataset: xr.Dataset) -> str:
     missing = dataset["speed"].values[dataset["status"].values == NOT_CONVERGED]
     if not missing.size:
         return ""
-    which = ", ".join(said(speed, "m/s") for speed in missing)
+    which = ", ".join(format_quantity(speed, "m/s") for speed in missing)
     return (
         f"{missing.size} of {dataset.sizes['speed']} speeds are not solved and missing: {which}. Try a looser "
         "tolerance, a coarser grid, or layers whose moduli differ less."
@@ -235,8 +236,8 @@ def loading_warnings(
             strokes.setdefault(slide.axis, []).append((slide.distance, slide.distance / segment.duration))
             real = cells * profile.spacing[slide.axis]
             if abs(real - slide.distance) > _SAME_DISTANCE * slide.distance:
-                distances = f"{said(real, 'm')}, {cells} whole cells, of {said(slide.distance, 'm')}"
-                slides.append(f"program.{number} slides {distances}")
+                done, wanted = format_quantity(real, "m"), format_quantity(slide.distance, "m")
+                slides.append(f"program.{number} slides {done}, {cells} whole cells, of {wanted}")
     wakes = []
     for axis, runs in sorted(strokes.items()):
         period = profile.height.shape[axis] * profile.spacing[axis]

@@ -29,7 +29,7 @@ from roughvisc.mechanics.materials.creep import Creep, Material, complete
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
-from roughvisc.units import Quantity, quantities, said
+from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -500,7 +500,7 @@ class LayeredBody(Body):
     def __repr__(self) -> str:
         text = repr(self.below[-1])
         for material, h in zip((self.material, *self.below[:-1])[::-1], self.thicknesses[::-1], strict=True):
-            text = f"layer({material!r}, thickness={said(h, 'm')}, on={text})"
+            text = f"layer({material!r}, thickness={format_quantity(h, 'm')}, on={text})"
         return text
 
     @property

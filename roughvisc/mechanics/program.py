@@ -17,7 +17,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.units import Quantity, number, quantities, said
+from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
@@ -71,7 +71,7 @@ class Slide:
         side = spacing[self.axis]
         number = math.floor(self.distance / side * (1 + 1e-12) + 0.5)
         if number < 1:
-            least = f"at least half a cell of {said(side, 'm')}, or a finer grid"
+            least = f"at least half a cell of {format_quantity(side, 'm')}, or a finer grid"
             raise InputError(key="slide", found=self.distance, expected=least)
         return number
 
@@ -148,17 +148,17 @@ class Segment:
 
     def __str__(self) -> str:
         """In words, such as ``load to 2 N over 50 ms``."""
-        lasting, unit = said(self.duration, "s"), UNITS[self.control]
+        lasting, unit = format_quantity(self.duration, "s"), UNITS[self.control]
         named = "nominal pressure" if self.control == "pressure" else self.control
         if self.amplitude:
-            wave = f"{said(self.end or 0.0, unit)} ± {said(self.amplitude, unit)}"
-            return f"{named} {wave} in {self.duration / self.period:g} cycles of {said(self.period, 's')}"
+            wave = f"{format_quantity(self.end or 0.0, unit)} ± {format_quantity(self.amplitude, unit)}"
+            return f"{named} {wave} in {self.duration / self.period:g} cycles of {format_quantity(self.period, 's')}"
         if self.slide is not None:
-            way = f"slide {said(self.slide.distance, 'm')} along {self.slide.direction}"
-            return f"{way} over {lasting} at {said(self.slide.distance / self.duration, 'm/s')}"
+            way = f"slide {format_quantity(self.slide.distance, 'm')} along {self.slide.direction}"
+            return f"{way} over {lasting} at {format_quantity(self.slide.distance / self.duration, 'm/s')}"
         if self.end is None:
             return f"hold {named} {lasting}"
-        reached = f"{named} to {said(self.end, unit)}"
+        reached = f"{named} to {format_quantity(self.end, unit)}"
         return f"{reached} over {lasting}" if self.duration else f"{reached} at once"
 
     @property
@@ -248,9 +248,9 @@ class Program:
         words = [str(segment) for segment in self.segments[:_LISTED]]
         for place, (before, segment) in enumerate(pairwise(self.segments[:_LISTED]), 1):
             if segment.holds and segment.control == before.control:
-                words[place] = f"hold {said(segment.duration, 's')}"
+                words[place] = f"hold {format_quantity(segment.duration, 's')}"
         more = len(self.segments) - _LISTED
-        return words + ([f"and {more} more segments, {said(self.duration, 's')} in all"] if more > 0 else [])
+        return words + ([f"and {more} more segments, {format_quantity(self.duration, 's')} in all"] if more > 0 else [])
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)

@@ -11,13 +11,12 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.study import study_file
 from roughvisc.study.si_tables import in_si, si_tables
 from roughvisc.study.sweep_table import REALISATION, SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.cards import PROVENANCE, STEPS, is_card, measured_file, read_toml
 from roughvisc.topography.readers import sha256
-from roughvisc.units import shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -326,7 +325,7 @@ def read_cases(path: str | Path) -> list[Case]:
                     raise InputError(key=key, found=change[key], expected=expected)
             case = _changed(data, change, path)
         except InputError as error:
-            values = ", ".join(f"{key} = {shown(value)}" for key, value in varied.items())
+            values = ", ".join(f"{key} = {short_repr(value)}" for key, value in varied.items())
             raise error.prefixed(f"{path}: case {number} ({values})" if varied else str(path)) from error
         cases.append(case if drawn is None else as_realisation(case, drawn))
     return cases

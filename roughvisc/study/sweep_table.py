@@ -11,9 +11,8 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, short_repr
 from roughvisc.topography.cards import is_card, read_toml
-from roughvisc.units import shown
 
 #: Key of a sweep, and the key of the number of a realisation in a case.
 REALISATIONS, REALISATION = "realisations", "realisation"
@@ -207,7 +206,7 @@ def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
                 message = f"{key}: found {part!r}: {named} has entries 0 to {len(here) - 1}"
                 raise InputError(message, key=key, found=value, expected=f"an entry of {named}")
         elif not isinstance(here, dict):
-            message = f"{key}: {named} is {shown(here)}, which has no keys"
+            message = f"{key}: {named} is {short_repr(here)}, which has no keys"
             raise InputError(message, key=key, found=value, expected=f"a table {named}")
         if depth < len(above):
             here = here[int(part)] if isinstance(here, list) else here.setdefault(part, {})

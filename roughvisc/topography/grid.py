@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.arguments import DataNeeded, NoData
-from roughvisc.errors import InputError
-from roughvisc.units import quantity, shown
+from roughvisc.errors import InputError, short_repr
+from roughvisc.units import quantity
 from roughvisc.variables import VARIABLES
 
 #: Attributes of numbers as a file packs them, before xarray decodes them.
@@ -322,7 +322,7 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
         expected = f"a whole number of cells of at least {low}, or a pair of them"
         raise InputError(key=name, found=value, expected=expected)
     if both[0] * both[1] > MOST_CELLS:
-        text = f"{name} is {shown(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}"
+        text = f"{name} is {short_repr(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}"
         raise InputError(text, key=name, found=value, expected=f"at most {MOST_CELLS:.3g} cells")
     return int(both[0]), int(both[1])
 

@@ -22,7 +22,7 @@ from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 from roughvisc.mechanics.materials.words import in_words
-from roughvisc.units import Quantity, quantities, said
+from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -306,8 +306,9 @@ def _gap(kind: str, times: Array) -> str:
     if not ratio > _DECADE:
         return ""
     return (
-        f"The {kind} table has no row between {said(before, 's')} and {said(after, 's')}, more than a decade: the "
-        "material between them is a guess, and stated errors do not include it. Use at least one row per decade."
+        f"The {kind} table has no row between {format_quantity(before, 's')} and {format_quantity(after, 's')}, more "
+        "than a decade: the material between them is a guess, and stated errors do not include it. Use at least one "
+        "row per decade."
     )
 
 

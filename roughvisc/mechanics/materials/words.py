@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from roughvisc.units import said, unit_for
+from roughvisc.units import format_quantity, unit_for
 
 #: Longest series or table that is listed in full.
 _LISTED = 4
@@ -40,8 +40,8 @@ def in_words(name: str, poisson: float, note: str, **parameters: tuple[Any, str]
 
 def _text(value: Any, unit: str) -> str:
     if not isinstance(value, Sequence):
-        return said(value, unit) if value else "0"
+        return format_quantity(value, unit) if value else "0"
     if len(value) > _LISTED:
-        return f"{len(value)} from {said(value[0], unit)} to {said(value[-1], unit)}"
+        return f"{len(value)} from {format_quantity(value[0], unit)} to {format_quantity(value[-1], unit)}"
     shown = unit_for(value, unit)
     return f"({', '.join(f'{number:.6g}' for number in shown(value))}) {shown.symbol}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from roughvisc.units import said
+from roughvisc.units import format_quantity
 
 #: The verdicts, from the best to the worst; without a number none is given.
 HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN = "holds", "doubtful", "broken", "not known"
@@ -208,7 +208,7 @@ def unknown(name: str, sentence: str) -> Finding:
 
 def as_text(value: float, unit: str, digits: int = 2) -> str:
     """A quantity in SI to so many digits, as 490 kPa and not 4.9e+02 kPa."""
-    return said(float(f"{value:.{digits}g}"), unit)
+    return format_quantity(float(f"{value:.{digits}g}"), unit)
 
 
 def percent(share: float) -> str:

@@ -26,12 +26,11 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, short_repr
 from roughvisc.labels import label
 from roughvisc.steps import STEPS, steps_of, with_steps
 from roughvisc.study.storage.files import atomic_write, require_file
 from roughvisc.topography.grid import cell_edges
-from roughvisc.units import shown
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 log = logging.getLogger("roughvisc")
@@ -519,7 +518,7 @@ def _foreign(dataset: xr.Dataset) -> str:
     if odd := [name for name in AXES[rows].needed if dataset[name].dims != (rows,)]:
         return f"holds {odd[0]} over {', '.join(map(str, dataset[odd[0]].dims)) or 'nothing'}"
     if not isinstance(dataset.attrs.get("tolerance", 1.0), float | np.floating):
-        return f"has the tolerance {shown(dataset.attrs['tolerance'])}"
+        return f"has the tolerance {short_repr(dataset.attrs['tolerance'])}"
     return "" if is_json_table(dataset.attrs.get("case", "{}")) else "has an attribute case that is no case in JSON"
 
 
