@@ -80,13 +80,11 @@ def check_keys(function: Callable[..., Any], where: str, table: Mapping[str, Any
     known = arguments(function, skipped)
     refuse_unknown(where, table, known)
     for key, (hint, default) in known.items():
-        name = dotted(where, key)
-        if key not in table:
-            if default is inspect.Parameter.empty:
-                expected = in_words(hint)
-                raise InputError(f"{name}: missing: expected {expected}", key=name, expected=expected)
-        elif not suits(table[key], hint):
-            raise InputError(key=name, found=table[key], expected=in_words(hint))
+        name, expected = dotted(where, key), in_words(hint, units_of(function).get(key, "1"))
+        if key not in table and default is inspect.Parameter.empty:
+            raise InputError(f"{name}: missing: expected {expected}", key=name, expected=expected)
+        if key in table and not suits(table[key], hint):
+            raise InputError(key=name, found=table[key], expected=expected)
 
 
 def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], data: int = 1) -> None:
@@ -214,20 +212,28 @@ def suits(value: Any, hint: Any) -> bool:
     return isinstance(value, hint) if is_plain else True
 
 
-def in_words(hint: Any) -> str:
+def in_words(hint: Any, unit: str = "1") -> str:
     """Return the type of an argument in words.
+
+    Parameters
+    ----------
+    hint : type
+        Annotation of the argument.
+    unit : str
+        Its unit; ``"1"`` if it has none.
 
     Examples
     --------
-    >>> in_words(float | str | None), in_words(Literal["x", "y"]), in_words(Sequence[float])
-    ('a number, or a text with a unit', "'x' or 'y'", 'a list')
+    >>> in_words(float | str | None, "Pa"), in_words(Literal["x", "y"]), in_words(Sequence[float])
+    ('a number [Pa], or text with a unit', "'x' or 'y'", 'a list')
     """
     inner = [one for one in get_args(hint) if one is not type(None)]
     if get_origin(hint) is Literal:
         return " or ".join(map(repr, inner))
     if get_origin(hint) in (Union, types.UnionType):
         if float in inner and str in inner:
-            inner = ["a number, or a text with a unit", *(one for one in inner if one not in (float, str))]
+            number = "a number, or a text" if unit == "1" else f"a number [{unit}], or text with a unit"
+            inner = [number, *(one for one in inner if one not in (float, str))]
         return " or ".join(dict.fromkeys(one if isinstance(one, str) else in_words(one) for one in inner))
     named = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
     named |= {tuple: "a list", Sequence: "a list"}

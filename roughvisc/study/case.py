@@ -421,7 +421,7 @@ def _digest(stated: Any) -> str:
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return f"{value + 0.0:.15g}" if abs(value) < 1e300 else str(value)
+        return f"{value + 0.0:.15g}"
     if isinstance(value, Mapping):
         return {key: _rounded(entry) for key, entry in value.items() if key != "note"}
     if isinstance(value, list | tuple):

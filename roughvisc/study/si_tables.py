@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -138,6 +139,11 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     -------
     object
         The value with numbers in place of texts with a unit. A text that is no quantity of the unit is unchanged.
+
+    Raises
+    ------
+    InputError
+        If an integer is larger than any number of double precision.
     """
     if isinstance(value, Mapping):
         return {name: in_si(one, f"{key}.{name}", tables) for name, one in value.items()}
@@ -147,10 +153,10 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     if unit and isinstance(value, str):
         with suppress(InputError):
             return quantity(value, unit, difference=key.endswith("wlf_c2"))
-    if unit not in ("", "1") and isinstance(value, int) and not isinstance(value, bool):
-        with suppress(OverflowError):  # of an integer of hundreds of digits, which is refused later
-            return float(value)
-    return value
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        raise InputError(key=key, found=value, expected="a number with fewer digits")
+    is_number = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if is_number and unit not in ("", "1") else value
 
 
 def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:

@@ -11,6 +11,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
+from roughvisc.arguments import a_table
 from roughvisc.errors import InputError, short_repr
 from roughvisc.topography.cards import is_card, read_toml
 
@@ -139,10 +140,10 @@ def _realisations(change: Mapping[str, Any], data: Mapping[str, Any], folder: Pa
         raise InputError(key=where, found=count, expected=f"a whole number from 2 to {MOST}")
     for key, value in rest.items():
         data = place(data, key, value) if key.partition(".")[0] == "surface" else data
-    surface = data.get("surface", {})
+    surface = a_table("surface", data.get("surface"))
+    second = a_table("surface.second", surface.get("second", {}))
     if stated := [key for key in DRAWN if key in rest] + [SURROGATE] * ("realisation" in surface):
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
-    second = surface.get("second", {})
     if "file" in surface or "file" in second:
         made = _card_recipe(surface.get("file"), folder)
         if made not in (None, "self_affine"):
@@ -160,17 +161,13 @@ def _seeds(faces: Mapping[str, Mapping[str, Any]], count: int) -> dict[str, int]
     if not rough:
         made = faces[_SEED].get("generate")
         raise InputError(key=where, found=f"generate = {made!r}", expected="a scan, or generate = 'self_affine'")
+    seeds = {key: face.get("seed") for key, face in rough.items()}
     for key, face in rough.items():
-        if not isinstance(face.get("seed"), int):
-            raise InputError(key=where, found=face.get("seed"), expected=f"a whole number as {key}")
+        if not isinstance(seeds[key], int):
+            raise InputError(key=where, found=seeds[key], expected=f"a whole number as {key}")
         if "amplitudes" not in face:
-            raise InputError(
-                key=where,
-                found=count,
-                expected=f"{key.removesuffix('seed')}amplitudes, 'gaussian' for patches of a surface, or 'fixed' for "
-                "surfaces of one rms height",
-            )
-    seeds = {key: face["seed"] for key, face in rough.items()}
+            kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
+            raise InputError(key=where, found=count, expected=f"{key.removesuffix('seed')}amplitudes, {kinds}")
     if 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
         expected = f"seeds of the two faces that are equal, or at least {count} apart"
         raise InputError(key=where, found=list(seeds.values()), expected=expected)

@@ -68,7 +68,7 @@ class Variants:
         if not is_data(self.case) or coarsening > 1 or not surface.get("resample"):
             return vary(self.case, {key: cells})
         # a finer grid would hold more waves
-        held = max(surface.get("shortest_wave", 0.0), 2 * max(spacing(self.height)))
+        held = max(surface.get("shortest_wave") or 0.0, 2 * max(spacing(self.height)))
         return vary(self.case, {"surface.shortest_wave": held, "surface.resample": cells})
 
     def without_last_octave(self, case: Case) -> Case:
