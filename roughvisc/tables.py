@@ -172,9 +172,7 @@ class _Place(NamedTuple):
     unit: str
 
 
-def read_table(
-    path: str | Path, wanted: Mapping[str, Wanted], *, decimal: str | None = None
-) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
+def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
     """Read columns of numbers from a text file.
 
     Parameters
@@ -183,8 +181,6 @@ def read_table(
         A text file with semicolons, tabs, commas or blanks between the cells. Lines that begin with ``#`` are comments.
     wanted : mapping of str to Wanted
         Key of the column in messages and in the result -> column.
-    decimal : {".", ","}, optional
-        Decimal mark. Default: found from the numbers.
 
     Returns
     -------
@@ -223,16 +219,19 @@ def read_table(
         for key, place in places.items()
     }
     try:
-        mark = decimal or decimal_mark((cell for column in cells.values() for cell in column), separator)
+        mark = decimal_mark((cell for column in cells.values() for cell in column), separator)
     except InputError as error:
-        raise InputError(f"{path}: {error}, or the decimal mark stated") from None
+        raise error.prefixed(str(path)) from None
     columns = {}
     for key, place in places.items():
         factor = _factor(place.unit, wanted[key].unit, f"{path}: unit of {key}")
         numbers = [float(plain_number(cell, mark) or "nan") for cell in cells[key]]
         for row, cell, number in zip(below, cells[key], numbers, strict=True):
             if not math.isfinite(number):
-                raise InputError(f"{path}, line {row.line}: found {cell!r}: expected a number for {key}")
+                where, expected = f"{path}, line {row.line}", f"a number for {key}"
+                raise InputError(
+                    f"{where}: found {cell!r}: expected {expected}", key=key, found=cell, expected=expected
+                )
         columns[key] = np.array([float(f"{number * factor:.15g}") for number in numbers])
     return columns, [row.line for row in below]
 
@@ -331,7 +330,7 @@ def _factor(unit: str, wanted: str, where: str) -> float:
     if unit == wanted:
         return 1.0
     if wanted in FREQUENCY_UNITS:
-        raise InputError(f"{where}: found {unit!r}: expected {wanted!r}, as stated")
+        raise InputError(key=where, found=unit, expected=f"{wanted!r}, as stated")
     return quantity(f"1 {unit}", wanted, where)
 
 
