@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -145,6 +147,8 @@ def solve(
     height = checked(problem.height, "height", least=1)
     problem = replace(problem, height=height).with_known_boundary(experiment.boundary)
     settings = problem.settings
+    settings = replace(settings, grid_error=settings.has_grid_error(height.size, experiment.axis))
+    problem = replace(problem, settings=settings)
     for name, found, why in experiment.unsupported(settings):
         raise InputError(f"{name} is {found!r}: {why}")
     needed: tuple[str, ...] = ()
@@ -161,12 +165,28 @@ def solve(
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
-                found = _solve_once(coarse, loads, Recorder(), lambda *_: None)
+                with _without_log():
+                    found = _solve_once(coarse, loads, Recorder(), lambda *_: None)
                 apart = np.abs(found["time"].values[:, None] - times)  # a slide has others, by half a longer cell
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser)
     return label(in_order(dataset)).drop_vars(needed)
+
+
+@contextmanager
+def _without_log() -> Iterator[None]:
+    """Drop the log of a solve on a coarser grid, which repeats the warnings of the first one; in this thread alone."""
+    here = threading.get_ident()
+
+    def is_of_another_thread(record: logging.LogRecord) -> bool:
+        return record.thread != here
+
+    log.addFilter(is_of_another_thread)
+    try:
+        yield
+    finally:
+        log.removeFilter(is_of_another_thread)
 
 
 def _solve_once(

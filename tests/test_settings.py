@@ -24,7 +24,7 @@ USUAL = {
     "fields": ("pressure", "gap"),
     "missing": "refuse",
     "edge": "error",
-    "grid_error": False,
+    "grid_error": "auto",
 }
 
 
@@ -120,3 +120,21 @@ def test_study__states_the_settings_that_the_solver_gets(chosen):
     case = vary(STUDY, {f"{TABLES.get(name, 'solve')}.{name}": value for name, value in written.items()})
     boundary = "free" if wanted.boundary == "auto" else wanted.boundary  # of an indenter
     assert case.settings == Settings(**{**vars(wanted), "boundary": boundary})
+
+
+@pytest.mark.parametrize(("cells", "stated"), [(255, False), (256, True), (512, True), (513, False)])
+def test_grid_error__is_estimated_by_default_if_it_takes_at_most_a_third(cells, stated):
+    assert Settings().has_grid_error(cells * cells, "time") is stated
+    assert not Settings(fields=()).has_grid_error(cells * cells, "time"), "no pressure is kept"
+    assert Settings(fields=()).has_grid_error(cells * cells, "speed") is stated
+    assert Settings(grid_error=True).has_grid_error(9, "time")
+    assert not Settings(grid_error=False).has_grid_error(256 * 256, "time")
+
+
+def test_grid_error__is_in_a_result_by_default():
+    settings = {"progress": False, "fields": ("pressure",), "times": [0.0]}
+    ball, press = rv.sphere(1e-2, 1e-3, (256, 257)), rv.Program().load(1e-3, over=0)
+    found = rv.simulate(ball, rv.elastic(1e6), press, **settings)
+    exact = rv.closed_forms.hertz(1e-2, 4e6, 1e-3)
+    assert abs(float(found.approach[0]) / exact.approach - 1) < float(found.grid_error_approach[0]) < 0.01
+    assert "grid_error" not in rv.simulate(ball, rv.elastic(1e6), press, grid_error=False, **settings)

@@ -635,7 +635,7 @@ def _planned(
     touching = float(contact.mean())
     beyond = setups.seconds(height, problem, touching) - setups.seconds(run.height, problem, touching)
     seconds = work * (run.seconds + dearer * max(beyond, 0.0)) + passes * _PASS * (height.size - run.height.size)
-    again = 1 + (_GRID_ERROR if settings.grid_error else 0.0)
+    again = 1 + (_GRID_ERROR if settings.has_grid_error(whole.size, experiment.axis) else 0.0)
     length = max(float(np.ptp(whole[axis].values)) for axis in ("x", "y"))
     full = full_contact_pressure(setup.slope, complete(body.material), creep_time(experiment, length))
     memory, pressure = needed(whole.size), force / setup.area
