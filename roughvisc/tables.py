@@ -229,9 +229,7 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
         for row, cell, number in zip(below, cells[key], numbers, strict=True):
             if not math.isfinite(number):
                 where, expected = f"{path}, line {row.line}", f"a number for {key}"
-                raise InputError(
-                    f"{where}: found {cell!r}: expected {expected}", key=key, found=cell, expected=expected
-                )
+                raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
         columns[key] = np.array([float(f"{number * factor:.15g}") for number in numbers])
     return columns, [row.line for row in below]
 
@@ -290,7 +288,7 @@ def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mappin
     if rows:
         widest = max(rows[: max(numbers, 1)], key=lambda row: len(row.cells))
         found = f"found {sign.join(widest.cells)[:200]!r} in line {widest.line}"
-    return InputError(f"{path}: {found}: expected a heading, {write!r}", key=str(path), found=found, expected=write)
+    return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
 
 
 def _example(name: str, unit: str) -> str:
@@ -317,7 +315,6 @@ def _places(path: Path, heading: _Row, wanted: Mapping[str, Wanted]) -> dict[str
             raise InputError(
                 f"{where}: found the column {names[0]!r} without a unit: expected a heading, "
                 f"{_example(names[0], one.unit)!r}",
-                key=key,
                 found=names[0],
                 expected=_example(names[0], one.unit),
             )
@@ -330,7 +327,7 @@ def _factor(unit: str, wanted: str, where: str) -> float:
     if unit == wanted:
         return 1.0
     if wanted in FREQUENCY_UNITS:
-        raise InputError(key=where, found=unit, expected=f"{wanted!r}, as stated")
+        raise InputError(f"{where}: found {unit!r}: expected {wanted!r}, as stated", found=unit, expected=wanted)
     return quantity(f"1 {unit}", wanted, where)
 
 
