@@ -96,7 +96,7 @@ def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
 
 def cells(shape: Any) -> tuple[int, int]:
     """Return the numbers of cells along x and y, of which a table may state one for both."""
-    both = shape.get("shape") if isinstance(shape, Mapping) else shape
+    both: Any = shape.get("shape") if isinstance(shape, Mapping) else shape
     return (int(both[0]), int(both[1])) if isinstance(both, list | tuple) else (int(both), int(both))
 
 
@@ -296,11 +296,10 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
     settings = replace(settings, boundary=boundary)
     if late := late_times(settings, experiment):
-        times = tuple(time for time in settings.times if time not in late)
-        if not times:
-            expected = f"a time up to the end of the program, {experiment.program.duration:g} s"
-            raise InputError(key="keep.times", found=list(late), expected=expected)
-        settings = replace(settings, times=times)
+        times: Any = settings.times
+        if late == times:
+            raise InputError(key="keep.times", found=list(late), expected="a time up to the end of the program")
+        settings = replace(settings, times=times[: -len(late)])
     for name, value, why in experiment.unsupported(settings):
         key = f"{table_of(name)}.{name}"
         raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)

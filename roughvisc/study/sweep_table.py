@@ -161,7 +161,7 @@ def _seeds(faces: Mapping[str, Mapping[str, Any]], count: int) -> dict[str, int]
     if not rough:
         made = faces[_SEED].get("generate")
         raise InputError(key=where, found=f"generate = {made!r}", expected="a scan, or generate = 'self_affine'")
-    seeds = {key: face.get("seed") for key, face in rough.items()}
+    seeds: dict[str, Any] = {key: face.get("seed") for key, face in rough.items()}
     for key, face in rough.items():
         if not isinstance(seeds[key], int):
             raise InputError(key=where, found=seeds[key], expected=f"a whole number as {key}")
