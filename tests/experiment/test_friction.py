@@ -140,7 +140,7 @@ def test_seam__is_told():
         ({"speeds": []}, "speeds", []),
         ({"speeds": [1.0, -1.0]}, "speeds", [1.0, -1.0]),
         ({"pressure": None}, "load", None),
-        ({"load": 1.0}, "load", 1.0),
+        ({"load": 1.0}, "pressure", PRESS["pressure"]),
         ({"pressure": 0.0}, "pressure", 0.0),
         ({"direction": "z"}, "direction", "z"),
     ],

@@ -206,7 +206,7 @@ def changed(**functions):
         ),
         (changed(contact_compliance=lambda t: 1e-7), r"gives \(\) of .* times: expected a number each"),
         (changed(contact_compliance=lambda t: 0 * t), "is 0 1/Pa at .* expected a positive compliance"),
-        (Logarithmic(poisson=0.7), "poisson is 0.7: expected a number above -1"),
+        (Logarithmic(poisson=0.7), "poisson: found 0.7: expected a number above -1"),
     ],
 )
 def test_what_is_no_material__is_refused(material, words):

@@ -168,7 +168,7 @@ def test_study__states_the_same_program(study):
     assert case.program() == program
     assert Case.from_json(case.to_json()).program() == program
     words = program_words(json.loads(case.to_json())["program"])
-    assert words[2] == "slide 1 mm, speed 100 mm/s, direction x"
+    assert words[2] == "slide 1 mm, speed 100 mm/s"
     assert unit_of("program.2.speed") == "m/s"
 
 

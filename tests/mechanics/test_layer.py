@@ -140,11 +140,20 @@ def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, tu
 @pytest.mark.parametrize(
     ("wrong", "expected"),
     [
-        (lambda: rv.layer(rv.elastic(1e6), 0.0, on=rv.elastic(1e6)), "thickness is 0.0: expected a positive number"),
+        (
+            lambda: rv.layer(rv.elastic(1e6), 0.0, on=rv.elastic(1e6)),
+            "thickness: found 0.0: expected a positive number",
+        ),
         (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=rv.sheet(rv.elastic(1e6), 1e-3)), "expected a material or a layer"),
-        (lambda: rv.layer(rv.Body(rv.elastic(1e6)), 1e-3, on=rv.elastic(1e6)), "material is the body .*: expected a"),
-        (lambda: rv.layer(rv.elastic(1e6, poisson=-0.2), 1e-3, on=rv.elastic(1e6)), "Poisson's ratio -0.2"),
-        (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=rv.pair(rv.elastic(1e6), rv.elastic(1e7))), "on is .*: expected"),
+        (lambda: rv.layer(rv.Body(rv.elastic(1e6)), 1e-3, on=rv.elastic(1e6)), "material: found Body.*: expected a"),
+        (
+            lambda: rv.layer(rv.elastic(1e6, poisson=-0.2), 1e-3, on=rv.elastic(1e6)),
+            "material: found -0.2: expected Poisson's ratio",
+        ),
+        (
+            lambda: rv.layer(rv.elastic(1e6), 1e-3, on=rv.pair(rv.elastic(1e6), rv.elastic(1e7))),
+            "on: found .*: expected",
+        ),
         (lambda: rv.layer(rv.elastic(1e6), 1e-3, on=2e6), "expected one of roughvisc's materials"),
     ],
 )

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from references import OnSheet
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
@@ -171,16 +172,16 @@ def test_influence__of_a_slipping_sheet_does_not_depend_on_poisson():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "key", "found"),
     [
-        ((0.0,), "thickness is 0.0: expected a positive number"),
-        ((math.nan,), "thickness is nan"),
-        ((math.inf,), "thickness is inf"),
-        (("1 s",), "thickness: found '1 s'"),
-        ((1.0, -0.1), "Poisson's ratio of a sheet is -0.1: expected 0 to 1/2"),
-        ((1.0, 0.5, "glued"), "base is 'glued': expected 'bonded' or 'slipping'"),
+        ((0.0,), "thickness", 0.0),
+        ((math.nan,), "thickness", math.nan),
+        ((math.inf,), "thickness", math.inf),
+        (("1 s",), "thickness", "1 s"),
+        ((1.0, -0.1), "poisson", -0.1),
+        ((1.0, 0.5, "glued"), "base", "glued"),
     ],
 )
-def test_sheet__refuses(arguments, message):
-    with pytest.raises(InputError, match=message):
+def test_sheet__refuses(arguments, key, found):
+    with refused(key, found):
         Sheet(*arguments)

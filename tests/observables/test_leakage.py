@@ -108,7 +108,7 @@ def test_frames__on_dask_are_tasks_of_their_own():
         ({"viscosity": "1 bar"}, "viscosity: found '1 bar'"),
         ({"viscosity": 0}, "viscosity: found 0: expected a number"),
         ({"pressure_drop": "much"}, "pressure_drop: found 'much'"),
-        ({"along": "z"}, "along is 'z': expected 'x' or 'y'"),
+        ({"along": "z"}, "along: found 'z': expected 'x' or 'y'"),
         ({"sides": "open"}, "sides is 'open': expected 'closed' or 'periodic'"),
     ],
 )
