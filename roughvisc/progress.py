@@ -54,12 +54,20 @@ class Bars:
         self._lock = threading.Lock()
         self._line_at = time.monotonic()
 
-    def __enter__(self) -> Bars:
+    def start(self) -> None:
+        """Begin to draw."""
         self._progress.start()
+
+    def stop(self) -> None:
+        """End drawing: the bars vanish."""
+        self._progress.stop()
+
+    def __enter__(self) -> Bars:
+        self.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        self.stop()
 
     def reached(self, label: str, now: float, end: float, at: str = "") -> None:
         """Move the bar of a computation, from any thread; both are zero at its start, and `at` describes them."""

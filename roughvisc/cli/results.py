@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -102,29 +103,29 @@ def table(results: Path, out: Path | None) -> None:
     say_path(Console(), "Table", path)
 
 
+#: Properties that an audit needs: option, sign in the help, meaning.
+_PROPERTIES = (
+    ("--work-of-adhesion", "W", 'Work of adhesion of the two surfaces: "50 mJ/m^2".'),
+    ("--yield-strength", "Y", 'Tensile yield strength of the softer body: "40 MPa".'),
+    ("--thickness", "H", 'Actual thickness of the body modelled as a half-space: "5 mm".'),
+    ("--density", "RHO", 'Density of the body: "1100 kg/m^3".'),
+    ("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".'),
+    ("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".'),
+    ("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".'),
+)
+
+
+def _property_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the properties of an audit to a command."""
+    for option, sign, meaning in reversed(_PROPERTIES):
+        command = click.option(option, type=QUANTITY, metavar=sign, help=meaning)(command)
+    return command
+
+
 @click.command()
 @click.argument("result", type=PATH)
-@click.option(
-    "--work-of-adhesion",
-    type=QUANTITY,
-    metavar="W",
-    help='Work of adhesion of the two surfaces: "50 mJ/m^2".',
-)
-@click.option(
-    "--yield-strength", type=QUANTITY, metavar="Y", help='Tensile yield strength of the softer body: "40 MPa".'
-)
-@click.option(
-    "--thickness", type=QUANTITY, metavar="H", help='Actual thickness of the body modelled as a half-space: "5 mm".'
-)
+@_property_options
 @click.option("--base", help="Support of that body: bonded or slipping. [default: bonded]")
-@click.option("--density", type=QUANTITY, metavar="RHO", help='Density of the body: "1100 kg/m^3".')
-@click.option(
-    "--linear-strain", type=QUANTITY, metavar="STRAIN", help='Strain limit of linear behaviour: 0.05, or "5 %".'
-)
-@click.option("--heat-conductivity", type=QUANTITY, metavar="K", help='Heat conductivity of the body: "0.2 W/m/K".')
-@click.option(
-    "--volumetric-heat-capacity", type=QUANTITY, metavar="C", help='Heat capacity of the body: "1.8 MJ/m^3/K".'
-)
 @click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
 def audit(result: Path, study: Path | None, **properties: Any) -> None:
     """Check the assumptions of the model for a result.

@@ -1,4 +1,4 @@
-"""Who is told how a sweep goes on: the live display, what is recorded, and what the index holds."""
+"""Displays and records of a running sweep."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ _SHOWN = 8
 
 
 def watcher(progress: bool, console: Console | None = None, summary: bool = True) -> Monitor:
-    """Who watches a sweep: a display, or nobody."""
+    """Return a live display, or one that shows urgent messages only."""
     return LiveMonitor(console, summary) if progress else Monitor()
 
 
 class Monitor:
-    """Who is told how a sweep goes on, times in seconds; this one shows only what the user should know at once."""
+    """Display of a running sweep, times in seconds; this one shows urgent messages only."""
 
     def begin(self, cases: Sequence[Case], link: str) -> None:
         """The cases, in the order of the study, and the address of Dask's dashboard if there is one."""
 
     def reached(self, key: str, now: float, end: float) -> None:
-        """A running case is at this time of so much; from any thread."""
+        """A running case has reached `now` of `end`; called from any thread."""
 
     def ended(self, outcome: Outcome) -> None:
         """A case ended."""
@@ -53,7 +53,7 @@ class Monitor:
         """Called several times a second."""
 
     def message(self, text: str) -> None:
-        """Something the user should know at once."""
+        """Show an urgent message."""
         print(f"roughvisc: {printable(text)}", file=sys.stderr)
 
     def stopping(self) -> None:
@@ -92,7 +92,7 @@ class LiveMonitor(Monitor):
         self._began = time.monotonic()
         if link:
             self._bars.say(f"Dashboard: {link}")
-        self._bars.__enter__()
+        self._bars.start()
         self._show()
 
     def reached(self, key: str, now: float, end: float) -> None:
@@ -126,7 +126,7 @@ class LiveMonitor(Monitor):
         self._bars.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
 
     def close(self) -> None:
-        self._bars.__exit__()
+        self._bars.stop()
         if self._names and self._sums_up:
             self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
 
@@ -218,7 +218,7 @@ class SweepLog:
             raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self.cases)} cases are finished)")
 
     def tell(self, message: str) -> None:
-        """Say what the user should know at once, and log it."""
+        """Show an urgent message, and log it."""
         log.warning("%s", message)
         self.watch.message(message)
 
