@@ -1,7 +1,7 @@
 """Calls of functions with tables of arguments, as study files and surface cards contain them.
 
-The signature of a function says which keys its table has and of which types they are; the function itself checks the
-values. Errors name the key, the value and what was expected.
+The signature of a function defines the keys of its table and their types. The function itself checks the values. Errors
+name the key, the value and the valid values.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from roughvisc.errors import InputError, short_repr
 
 
 class DataNeeded(Exception):
-    """A function has checked its arguments, and needs the data that it was called without."""
+    """Raised if a function has checked its arguments and needs data that it was not given."""
 
 
 class NoData:
-    """Stands for data that a function is not given, so that it checks its other arguments only.
+    """Placeholder for data, with which a function checks its other arguments only.
 
-    A function that looks at it raises :class:`DataNeeded`.
+    Any access to it raises :class:`DataNeeded`.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -55,8 +55,8 @@ def call(function: Callable[..., Any], where: str, table: Mapping[str, Any], *fi
     Raises
     ------
     InputError
-        If the table has a key that the function does not have, lacks one that it needs, a value is of another type, or
-        the function refuses a value. The key begins with `where`.
+        If a key of the table is unknown or a required one is missing, a value has another type, or the function refuses
+        a value. The key of the error begins with `where`.
     """
     check_keys(function, where, table, len(first))
     try:
@@ -73,7 +73,7 @@ def check_keys(function: Callable[..., Any], where: str, table: Mapping[str, Any
     Parameters
     ----------
     function, where, table
-        As :func:`call` has them.
+        As in :func:`call`.
     skipped : int
         Number of first arguments that are not in the table.
     """
@@ -93,9 +93,9 @@ def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], da
     Parameters
     ----------
     function : callable
-        It checks its other arguments before it looks at the data.
+        Function that checks its other arguments before it uses the data.
     where, table
-        As :func:`call` has them.
+        As in :func:`call`.
     data : int
         Number of first arguments that are data.
     """
@@ -105,7 +105,7 @@ def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], da
 
 @cache
 def arguments(function: Callable[..., Any], skipped: int = 0) -> dict[str, tuple[Any, Any]]:
-    """Return type and default of each argument of a function, but for the first ones."""
+    """Return type and default of each argument of a function, without the first ones."""
     hints = get_type_hints(function)
     parameters = list(inspect.signature(function).parameters.values())[skipped:]
     return {one.name: (hints.get(one.name, Any), one.default) for one in parameters}
@@ -190,7 +190,7 @@ def dotted(*names: str) -> str:
 
 
 def suits(value: Any, hint: Any) -> bool:
-    """Return whether a value as TOML has it is of the type of an argument.
+    """Return whether a TOML value has the type of an argument.
 
     Examples
     --------

@@ -59,13 +59,13 @@ class Case:
     Parameters
     ----------
     tables : mapping
-        The tables of the study file in SI, with absolute paths; columns of CSV files in place of their names.
+        The tables of the study file in SI, with absolute paths and the content of CSV files.
     origin : Path or None
         The study file.
     varied : mapping
         Values that a sweep or :func:`vary` set: dotted key -> value in SI.
     written : mapping
-        Quantities among them as the study file has them: dotted key -> text with a unit.
+        Quantities among them as written in the study file: dotted key -> text with a unit.
     """
 
     tables: Mapping[str, Any]
@@ -192,7 +192,7 @@ class Case:
         return study_file.program_of(self.tables["program"])
 
     def experiment(self) -> Experiment:
-        """Return what is done with the surface."""
+        """Return the experiment: a loading program or steady sliding."""
         return self._experiment
 
     @cached_property
@@ -201,7 +201,7 @@ class Case:
 
     @cached_property
     def settings(self) -> Settings:
-        """Settings of the solve, with the boundary that ``auto`` stands for."""
+        """Settings of the solve, with the boundary that ``auto`` resolves to."""
         return study_file.settings_of(self.tables, self._experiment)
 
     def late_times(self) -> tuple[float, ...]:
@@ -226,7 +226,13 @@ class Case:
         return self._experiment.progress(done, end)
 
     def check(self) -> None:
-        """Raise an :class:`InputError` if anything is wrong that can be known without the heights."""
+        """Check everything that can be checked without the heights.
+
+        Raises
+        ------
+        InputError
+            For the first problem.
+        """
         if not isinstance(self.title, str) or not self.title.strip():
             raise InputError(key="title", found=self.tables["title"], expected="a text")
         study_file.check_surface(self.surface)
@@ -289,8 +295,8 @@ def read_cases(path: str | Path) -> list[Case]:
 
     A table ``[[sweep]]`` contains lists of equal length, combined entry by entry; several tables give consecutive runs.
     ``realisations = 24`` in a table computes each of its cases for 24 realisations of the surface.
-    A pattern such as ``"surface.file" = "scans/*.sur"`` stands for the list of matching files. Without a sweep there is
-    one case.
+    A pattern such as ``"surface.file" = "scans/*.sur"`` means the list of matching files. Without a sweep there is one
+    case.
 
     Parameters
     ----------
@@ -380,7 +386,7 @@ def _changed(data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path |
 
 
 def _as_stated(error: InputError, data: Mapping[str, Any]) -> InputError:
-    """Return an error about tables in SI in terms of the tables as stated: texts with units, and files of columns."""
+    """Return an error about tables in SI with the text of the study and the CSV file of the table."""
     table, _, _ = error.key.rpartition(".")
     for where in (error.key, table):
         file = value_at(data, f"{where}.file", None)
@@ -394,7 +400,7 @@ def _as_stated(error: InputError, data: Mapping[str, Any]) -> InputError:
 
 
 def _checksums(face: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the checksum of the scan or the recipe of a face, and that of its surface card.
+    """Return the checksums of the scan or recipe of a face and of its surface card.
 
     Title and provenance of a card do not count.
     """

@@ -29,7 +29,7 @@ class History(NamedTuple):
     Attributes
     ----------
     control : {"load", "approach", "pressure"}
-        What it prescribes.
+        Prescribed quantity.
     times, values : list of float
         Times from zero [s], and values [N, m or Pa].
     note : str
@@ -62,7 +62,7 @@ def read_program(
     time : str
         Name of the time column. The time of the first row becomes zero.
     load, approach, pressure : str, optional
-        Name of the prescribed column; give one of them. Default: ``load="load"``.
+        Name of the prescribed column; give one. Default: ``load="load"``.
     zero : float or str
         Value in the file that becomes zero: a tare, or the position of first touch. [N, m or Pa]
     factor : float
@@ -159,7 +159,7 @@ def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
 
 
 def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:
-    """Return a note on values below zero, which count as zero; refuse those that are no noise."""
+    """Return a note on values below zero, which count as zero; refuse values below the noise."""
     unit, largest, lowest = UNITS[control], max(float(values.max()), 0.0), float(values.min())
     if lowest < -_NOISE * largest:
         at = int(np.argmin(values))

@@ -96,15 +96,15 @@ def si_tables(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     Parameters
     ----------
     data : mapping
-        Tables as TOML has them.
+        Tables of the TOML file.
     folder : Path or None
         Folder of relative paths. Without one, paths are kept and not checked.
 
     Returns
     -------
     dict
-        The tables with absolute paths of scans, columns in place of the names of files, and numbers in place of texts
-        with a unit. Any other value is unchanged; the function that takes it refuses it.
+        The tables with absolute paths of scans, the content of CSV files, and numbers for texts with a unit. Any other
+        value is unchanged; the function that takes it refuses it.
     """
     refuse_unknown("", data, TABLES)
     for name in ("surface", "material"):
@@ -138,7 +138,7 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     Returns
     -------
     object
-        The value with numbers in place of texts with a unit. A text that is no quantity of the unit is unchanged.
+        The value with numbers for texts with a unit. Any other text is unchanged.
 
     Raises
     ------
@@ -244,7 +244,7 @@ def existing_file(where: str, file: Any, folder: Path | None) -> str:
     """Return the absolute path of a file that a study names relative to its folder."""
     if not isinstance(file, str | Path) or not str(file):
         raise InputError(key=where, found=file, expected="the path of a file")
-    if folder is None:  # a stored case: its file may have been moved since
+    if folder is None:  # a stored case, whose file may have been moved
         return str(file)
     path = (folder / Path(file).expanduser()).resolve()
     if not path.is_file():
@@ -266,7 +266,7 @@ def _with_paths(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
 
 
 def _with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
-    """Return a table of a material with the columns of its CSV file in place of the name of the file."""
+    """Return a table of a material with the columns of its CSV file, without the name of the file."""
     table = a_table(where, stated)
     for key in ("a", "b", "on"):
         if key in table:
@@ -298,7 +298,7 @@ def _with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any
 
 
 def _with_rows(where: str, stated: Any, folder: Path | None) -> Any:
-    """Return a segment of a program with the rows of a file in place of its name."""
+    """Return a segment of a program with the rows of its file, without the name of the file."""
     table = stated.get("table") if isinstance(stated, Mapping) else None
     if not isinstance(table, str) and not (isinstance(table, Mapping) and "file" in table):
         return stated
@@ -317,7 +317,7 @@ def _with_rows(where: str, stated: Any, folder: Path | None) -> Any:
 
 @contextmanager
 def _in_file(key: str, file: Any) -> Iterator[None]:
-    """Make errors about the content of a file errors about the key that names it."""
+    """Attribute errors in a file to the key that names the file."""
     try:
         yield
     except InputError as error:
@@ -328,7 +328,7 @@ def _in_file(key: str, file: Any) -> Iterator[None]:
 
 
 def _speeds(where: str, stated: Any) -> Any:
-    """Return speeds in SI in increasing order: one, a list, or a number of them between two ends. [m/s]"""
+    """Return speeds in increasing order: one, a list, or a number of speeds between two ends. [m/s]"""
     if isinstance(stated, list):
         return sorted(set(stated)) if all(isinstance(one, float) for one in stated) else stated
     if not isinstance(stated, Mapping):

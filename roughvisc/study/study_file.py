@@ -1,4 +1,4 @@
-"""Parts of a case, as the tables of a study file state them: surface, body, experiment and settings.
+"""Parts of a case from the tables of a study file: surface, body, experiment and settings.
 
 A table contains the arguments of one function, which checks them; see :mod:`roughvisc.arguments`. All tables here are
 in SI, as :func:`roughvisc.study.si_tables.si_tables` returns them.
@@ -101,7 +101,7 @@ def cells(shape: Any) -> tuple[int, int]:
 
 
 def raw_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
-    """Return the heights of a table of a surface as they are read or made. [m]"""
+    """Return the heights of a table of a surface before conditioning. [m]"""
     _, source = split(table, *STEPS, "second", "missing")
     if "generate" in table:
         return generate(source, where)
@@ -239,7 +239,7 @@ def _extended(program: Program, where: str, table: dict[str, Any]) -> Program:
     where = f"{where}.{kind}"
     arguments = a_table(where, value)
     if "control" in arguments:
-        raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"control beside {kind}")
+        raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"this key next to {kind}")
     added = call(PROGRAMS[kind], where, arguments | {"control": control})
     before = program.segments[-1] if program.segments else None
     if kind == "table" and before and arguments["values"][0] == 0 and (before.control, before.end) != (control, 0.0):
@@ -261,7 +261,7 @@ def experiment_of(tables: Mapping[str, Any]) -> Experiment:
 
 
 # ----------------------------------------------------------------------------------------------------------------
-# settings, and what is made of the result
+# settings, observables, audit
 
 
 def table_of(setting: str) -> str:
@@ -270,7 +270,7 @@ def table_of(setting: str) -> str:
 
 
 def stated_settings(tables: Mapping[str, Any]) -> Settings:
-    """Return the settings of the tables ``[solve]``, ``[keep]`` and ``[surface]`` as they are stated."""
+    """Return the settings that the tables ``[solve]``, ``[keep]`` and ``[surface]`` state."""
     names: dict[str, list[str]] = {"solve": [], "keep": ["precision"], "surface": []}
     for one in fields(Settings):
         names[table_of(one.name)].append(one.name)
@@ -289,7 +289,7 @@ def stated_settings(tables: Mapping[str, Any]) -> Settings:
 
 
 def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
-    """Return the settings of a case, with the boundary that ``auto`` stands for and the times of the program."""
+    """Return the settings of a case, with the boundary that ``auto`` resolves to and the times of the program."""
     settings = stated_settings(tables)
     boundary = known_boundary(settings, experiment.boundary, lambda: surface_boundary(tables["surface"]))
     if boundary is None:
@@ -344,7 +344,7 @@ def observed(tables: Mapping[str, Any], settings: Settings) -> dict[str, dict[st
 
 
 def audit_inputs(tables: Mapping[str, Any]) -> AuditInputs:
-    """Return what the table ``[audit]`` states."""
+    """Return the quantities of the table ``[audit]``."""
     stated = call(AuditInputs, "audit", a_table("audit", tables.get("audit", {})))
     if stated.base is not None and stated.thickness is None:
         raise InputError(key="audit.base", found=stated.base, expected="a thickness, too")

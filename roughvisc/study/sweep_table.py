@@ -65,7 +65,7 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
     ----------
     sweep : dict or list of dict
         ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
-        table. A value of ``[[sweep]]`` that is no list holds for its whole table.
+        table. A single value of ``[[sweep]]`` holds for its whole table.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
 
 
 def _with_files(table: Any, folder: Path) -> Any:
-    """Return a table of a sweep with the names of files in place of patterns such as ``"scans/*.sur"``."""
+    """Return a table of a sweep with the names of files for patterns such as ``"scans/*.sur"``."""
     if not isinstance(table, Mapping):
         return table
     return {
@@ -116,7 +116,7 @@ def _with_files(table: Any, folder: Path) -> Any:
 
 
 def _matching(key: str, value: Any, folder: Path) -> Any:
-    """Return names of files, sorted, in place of each pattern; the name of an existing file is no pattern."""
+    """Return names of files, sorted, for each pattern; the name of an existing file is kept."""
     stated = value if isinstance(value, list) else [value]
     found: list[Any] = []
     for one in stated:
@@ -186,7 +186,7 @@ def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the key leads through a value that is no table, or to an entry that a list does not have.
+        If the key leads through a plain value, or beyond the end of a list.
 
     Examples
     --------

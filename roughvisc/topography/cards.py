@@ -1,8 +1,8 @@
-"""Surface cards: a TOML file that says which surface, from where, and how it is conditioned.
+"""Surface cards: TOML files that name a surface, its origin and its conditioning.
 
 A card names either a scan ``file`` with its checksum and provenance, or a recipe to ``generate`` with its parameters.
-Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in one fixed order, whatever
-their order in the file: that of :data:`STEPS`.
+Quantities are numbers in SI or texts with a unit. The steps of ``[conditioning]`` act in the order of :data:`STEPS`,
+independent of their order in the file.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ def check_steps(steps: Mapping[str, Any], where: str = "") -> None:
     Parameters
     ----------
     steps, where
-        As :func:`condition` has them.
+        As in :func:`condition`.
     """
     for name, arguments in _stated(steps, where):
         with _named(steps, where, name):
