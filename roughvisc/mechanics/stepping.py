@@ -522,6 +522,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.motions and scene.keeps(last):
             slide = scene.motions[state.segment]
             apart = replace(apart, friction=friction_apart(scene, shown[1].point, shown[2].point, slide))
+        jumps = 0.0
         if scene.time_step is not None:
             break
         force, approach = largest_values(scene, state, first.point, second.point)
@@ -535,7 +536,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         share = added(scene, state, first.point, second.point, once.point, segment)
         factor = PLANNED * max(share, 1e-300) ** (-1 / ORDER)
         lands = scene.keeps(last) or middle == event
-        relative = apart.pressure / force / scene.stated[0], apart.approach / approach / scene.stated[1]
+        if lands and not scene.is_soft(taken):  # both solutions share errors of the cells that have entered
+            jumps = entering(scene, fine, second.point) * scene.compliance(taken) / scene.compliance(0.0)
+        relative = max(apart.pressure / scene.stated[0], jumps) / force, apart.approach / approach / scene.stated[1]
         at_end = max(relative) if lands and taken > LANDING_PAIR * (last - began) else 0.0
         # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
         opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
@@ -565,9 +568,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     after = replace(after, difference=apart)
     if last == end:
         after = entered(scene, after)
+    ends = accepted(after, shown[1].point, state.segment)
     return [
         inside_pair(state, shown[0].point, between, work),
-        accepted(after, shown[1].point, state.segment),
+        ends._replace(difference=replace(apart, pressure=apart.pressure + jumps)),
     ]
 
 
