@@ -11,6 +11,8 @@ from roughvisc.study.case import read_cases
 from roughvisc.views.sweep_figures.case_text import study_text
 
 WORKFLOWS = sorted((Path(__file__).parents[3] / "workflows").glob("*.toml"))
+#: Workflows that the short run tries.
+FIRST = ("quickstart", "friction")
 #: Texts that any text may replace.
 FREE = ("title", "file")
 #: A text of another unit than any key has, a table, a list, a switch and a word, each of which no key takes.
@@ -60,7 +62,10 @@ def mutations(stated):
         yield (*table, "nonsense"), changed
 
 
-@pytest.mark.parametrize("workflow", WORKFLOWS, ids=[one.stem for one in WORKFLOWS])
+@pytest.mark.parametrize(
+    "workflow",
+    [pytest.param(one, id=one.stem, marks=() if one.stem in FIRST else pytest.mark.thorough) for one in WORKFLOWS],
+)
 def test_mutation__is_refused_with_file_key_value_and_expectation(workflow, tmp_path):
     text = workflow.read_text(encoding="utf-8").replace("../surfaces", str(workflow.parents[1] / "surfaces"))
     stated, study = tomllib.loads(text), tmp_path / "study.toml"
