@@ -147,6 +147,17 @@ def test_python_files__that_pages_name_are_there():
             assert any((folder / name).exists() for folder in (ROOT, ROOT / "roughvisc")), f"{named(page)}: {name}"
 
 
+def test_functions_and_comments__that_pages_name_are_there():
+    named_there = re.compile(r'`([\w./-]+\.py)`:\s`([\w.]+)(?:\(\))?`((?:(?:,| and) "[^"]+")*)')
+    found = [one for page in PAGES for one in named_there.findall(page.read_text(encoding="utf-8"))]
+    assert len(found) > 20
+    for path, name, comments in found:
+        code = (ROOT / "roughvisc" / path).read_text(encoding="utf-8")
+        assert re.search(rf"(def|class) {name.split('.')[-1]}\b", code), f"{path}: {name}"
+        for comment in re.findall(r'"([^"]+)"', comments):
+            assert f"# {comment}" in code, f"{path}: {comment}"
+
+
 def test_links__lead_somewhere():
     for path in [README, *PAGES]:
         for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):

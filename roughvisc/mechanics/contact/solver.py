@@ -197,7 +197,7 @@ def solve_contact(
             pressure -= pressure.min()
             contact, previous = xp.flatnonzero(pressure), None
 
-        # Approach of the present contact, equation (7) of the paper, and the cells that may change, (13) and (14).
+        # Approach of the present contact, equation (7) of the paper, and the cells that may change, (14).
         level = float(separation[contact].sum()) / contact.size if under_load else level
         free = separation < level
         if present is not None:
@@ -256,7 +256,7 @@ def solve_contact(
             if beta > 0 and inner(conjugate, residual) > 0:
                 direction = conjugate
 
-        # Trial: cut at zero pressure, equation (12), and scaled to the load, (15).
+        # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15).
         slope = 0.0
         while stalled < PATIENCE and length >= SHORTEST_STEP:
             trial = xp.maximum(held - length * direction, 0)
