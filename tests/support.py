@@ -117,7 +117,7 @@ def scene(material, program, *, shape=(31, 28), size=1.6, **settings):
 
 def displaced(scene, step):
     """Displacement after a step. [m]"""
-    return scene.memory.present(step.point.history)[0]
+    return scene.memory.displacement(step.point.history)[0]
 
 
 STEP_LOAD = rv.Program().load(0.05, over=0).hold(2.0)

@@ -202,7 +202,7 @@ class LoadingRows(Rows):
         """
         scene, profile, domain, point = self._scene, self._profile, self._domain, step.point
         contact, grid = point.pressure > 0, scene.grid
-        present = scene.memory.present(point.history)
+        present = scene.memory.displacement(point.history)
         displacement, effective = present[0], present[-1]
         gap = np.maximum(scene.gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0

@@ -37,7 +37,7 @@ MARGIN, BEYOND = 1.2, 1.05
 RIM = 2
 #: Cells of the shorter side from which a part of a surface pays, and largest part of the cells.
 WORTH_CROPPING, LARGEST_PART = 96, 0.8
-#: Factor by which an outgrown domain becomes larger.
+#: Factor by which an indenter's surface becomes larger, and the approach that an outgrown domain is made for.
 GROWTH = 1.5
 #: An indenter's surface gets no more cells than these.
 MOST_CELLS = 4096**2

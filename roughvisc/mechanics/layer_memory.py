@@ -91,7 +91,7 @@ class LayerMemory(Memory):
         """Return the memory after a step, at whose end the pressure [Pa] is given; `unit` is not used."""
         return self.after_step(history, prediction, self.grid.spectrum(pressure)[None])
 
-    def present(self, history: History) -> Array:
+    def displacement(self, history: History) -> Array:
         """Return the displacement, shape (1, nx, ny). [m]"""
         total = self._response(history.fields[0], self.instantaneous)
         for mode, symbol in zip(history.modes, self.symbols, strict=True):

@@ -175,7 +175,7 @@ class Memory:
         needed = self.may_ring and self.is_stiff(LARGEST_GROWTH * prediction.step)
         return History(fields, prediction.modes, history.modes if needed else None, prediction.step)
 
-    def present(self, history: History) -> Array:
+    def displacement(self, history: History) -> Array:
         """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
         total = self.glassy * history.fields
         for compliance, mode in zip(self.compliances, history.modes, strict=True):

@@ -134,7 +134,7 @@ def assert_same_march(scene, other):
     assert len(others) == len(steps) > 5
     for step, there in zip(steps, others, strict=True):
         assert_equal(there.point.pressure, step.point.pressure)
-        assert_equal(other.memory.present(there.point.history), scene.memory.present(step.point.history))
+        assert_equal(other.memory.displacement(there.point.history), scene.memory.displacement(step.point.history))
         numbers, theirs = (
             [one.point.time, one.point.force, one.point.approach, one.work, *vars(one.difference).values()]
             for one in (step, there)

@@ -36,7 +36,9 @@ def marched(memory, steps, fields, grid, rule=None):
         unit = kernel.displacement(pressure)
         predicted = prediction.compliance * unit + prediction.carried
         history = memory.advance(history, prediction, unit, pressure)
-        np.testing.assert_allclose(memory.present(history)[0], predicted, rtol=1e-9, atol=1e-12 * abs(predicted).max())
+        np.testing.assert_allclose(
+            memory.displacement(history)[0], predicted, rtol=1e-9, atol=1e-12 * abs(predicted).max()
+        )
         found.append(predicted)
     return found, history
 
@@ -98,15 +100,15 @@ def test_at_once__is_the_response_to_a_jump():
 def test_roll__moves_the_displacement(cells, axis):
     memory = memory_of(PAIRS["fluid on rubber"])
     _, history = marched(memory, STEPS, pressures(len(STEPS)), memory.grid)
-    rolled = memory.present(memory.roll(history, cells, axis))[0]
-    np.testing.assert_allclose(rolled, np.roll(memory.present(history)[0], -cells, axis), rtol=1e-9, atol=1e-18)
+    rolled = memory.displacement(memory.roll(history, cells, axis))[0]
+    np.testing.assert_allclose(rolled, np.roll(memory.displacement(history)[0], -cells, axis), rtol=1e-9, atol=1e-18)
 
 
 def test_restart__forgets_the_last_step_alone():
     memory = memory_of(PAIRS["rubber on soft"])
     _, history = marched(memory, STEPS, pressures(len(STEPS)), memory.grid)
     again = memory.restart(history)
-    np.testing.assert_array_equal(memory.present(again), memory.present(history))
+    np.testing.assert_array_equal(memory.displacement(again), memory.displacement(history))
     assert memory.rule(again, 0.5) != "bdf2"
 
 

@@ -68,7 +68,7 @@ def test_memory_of_both_fields__knows_the_pressure_that_causes_the_displacement(
     settings = scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, keeps_pressure=True, tolerance=1e-8)
     alone = scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, tolerance=1e-8)
     for step, other in zip(march(settings), march(alone), strict=True):
-        displacement, effective = settings.memory.present(step.point.history)
+        displacement, effective = settings.memory.displacement(step.point.history)
         assert np.array_equal(displacement, displaced(alone, other))
         exact = settings.grid.displacement(effective)
         assert np.abs(displacement - exact).max() <= 1e-6 * np.abs(exact).max()

@@ -27,7 +27,7 @@ def history_after(memory, steps, unit_at, rule):
         unit = unit_at(time) * FIELD
         predicted = prediction.compliance * unit + prediction.carried
         history = memory.advance(history, prediction, unit, unit)
-        np.testing.assert_allclose(memory.present(history)[0], predicted, rtol=1e-12)
+        np.testing.assert_allclose(memory.displacement(history)[0], predicted, rtol=1e-12)
     return history
 
 
@@ -37,7 +37,7 @@ def test_linear_rule__is_exact_for_a_ramp(name):
     memory, time = Memory(SERIES[name], 10.0), 1.7
     history = history_after(memory, [0.1, 0.7, 0.05, 0.85], lambda t: t, "linear")
     exact = float(SERIES[name].contact_integral(time)) * FIELD
-    np.testing.assert_allclose(memory.present(history)[0], exact, rtol=1e-12)
+    np.testing.assert_allclose(memory.displacement(history)[0], exact, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", SERIES)
@@ -45,7 +45,7 @@ def test_constant_rule__is_exact_for_a_step(name):
     """Under ``v = 1`` the displacement is the compliance."""
     memory = Memory(SERIES[name], 10.0)
     history = history_after(memory, [0.01, 0.4, 3.0], lambda _: 1.0, "constant")
-    np.testing.assert_allclose(memory.present(history)[0], memory.compliance(3.41) * FIELD, rtol=1e-12)
+    np.testing.assert_allclose(memory.displacement(history)[0], memory.compliance(3.41) * FIELD, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", SERIES)
@@ -56,7 +56,7 @@ def test_bdf2__converges_at_second_order(name):
     fine = history_after(memory, np.full(4000, 1 / 4000), lambda t: t**2, "linear")
     for count in (20, 40):
         history = history_after(memory, np.full(count, 1 / count), lambda t: t**2, "bdf2")
-        errors.append(np.abs(memory.present(history)[0] - memory.present(fine)[0]).max())
+        errors.append(np.abs(memory.displacement(history)[0] - memory.displacement(fine)[0]).max())
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.3)
 
 
@@ -90,8 +90,8 @@ def test_error__relaxes_faster_than_it_creeps():
 def test_both_fields__are_the_same_recursion():
     both, alone = Memory(SERIES["fluid"], 10.0, keeps_pressure=True), Memory(SERIES["fluid"], 10.0)
     steps = [0.1, 0.4, 0.02]
-    found = both.present(history_after(both, steps, np.sin, "linear"))
-    expected = alone.present(history_after(alone, steps, np.sin, "linear"))
+    found = both.displacement(history_after(both, steps, np.sin, "linear"))
+    expected = alone.displacement(history_after(alone, steps, np.sin, "linear"))
     assert found.shape == (2, *SHAPE)
     np.testing.assert_array_equal(found, np.concatenate([expected, expected]))
 
@@ -100,5 +100,5 @@ def test_roll__moves_all_that_is_remembered():
     memory = Memory(SERIES["prony"], 10.0)
     history = history_after(memory, [0.1, 0.1], np.sin, "linear")
     rolled = memory.roll(history, 1, 0)
-    np.testing.assert_array_equal(memory.present(rolled)[0], np.roll(memory.present(history)[0], -1, 0))
+    np.testing.assert_array_equal(memory.displacement(rolled)[0], np.roll(memory.displacement(history)[0], -1, 0))
     np.testing.assert_array_equal(memory.roll(rolled, -1, 0).modes, history.modes)

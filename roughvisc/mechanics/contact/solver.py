@@ -189,7 +189,7 @@ def solve_contact(
     on_grid = Scatter(xp.zeros(gap.shape))
     contact = xp.flatnonzero(pressure)
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
-    requested_size, requested_gap = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
+    requested_size, requested_duality = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
     length, error, best, stalled, is_single = 1.0, math.inf, math.inf, 0, False
     for iteration in range(max_iterations + 1):
         # No gap is left under a given approach: the energy falls if all cells carry less.
@@ -221,7 +221,7 @@ def solve_contact(
         if size == 0:
             error = 0.0
         elif iteration:
-            error = requested_size * math.sqrt(duality / requested_gap) / max(total, 1e-300)
+            error = requested_size * math.sqrt(duality / requested_duality) / max(total, 1e-300)
         is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding)
         if is_solved and is_blind and 4 * contact.size > gap.size:
             error += load_error(grid, separation.reshape(gap.shape), contact, level, present, total)
@@ -243,7 +243,7 @@ def solve_contact(
             direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
         direction = without_mean(direction)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
-        requested_size, requested_gap = caution * float(abs(direction).sum()), max(duality, 1e-300)
+        requested_size, requested_duality = caution * float(abs(direction).sum()), max(duality, 1e-300)
         if iteration == 0:
             is_single = gap.size >= SINGLE_FROM and requested_size > FAR * tolerance * total
 
