@@ -231,8 +231,8 @@ def test_lengths__are_neutral(scale):
     assert counts[0] == pytest.approx(counts[1], rel=0.01)
     for name, power in (("pressure", 0), ("approach", 1), ("contact_area", 2), ("work", 3), ("gap", 1)):
         expected, found = one[name].values * scale**power, other[name].values
-        # rounding of the coordinates, 1e-14 of the kernel, comes through 200 steps of chosen length
-        assert np.abs(found - expected).max() <= 1e-7 * np.abs(expected).max(), name
+        # a hundredth of the tolerance: single precision magnifies rounding of the coordinates, 1e-14 of the kernel
+        assert np.abs(found - expected).max() <= 1e-6 * np.abs(expected).max(), name
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e12])
