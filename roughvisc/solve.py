@@ -243,24 +243,27 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     if not len(steps) or not steps["kept"].any():
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     kept = steps[steps["kept"]].sort_values("place", kind="stable").drop(columns=["kept", "place"])
-    dataset = kept.set_index(axis).to_xarray()
+    variables: dict[str, Any] = {name: (axis, kept[name].to_numpy()) for name in kept if name != axis}
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
-        dataset[name] = (axis, "x", "y"), field
+        variables[name] = (axis, "x", "y"), field
     origin = {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
+    variables["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
     if "filled" in height.coords:
-        dataset["filled"] = ("x", "y"), height["filled"].values
-    dataset = dataset.assign_coords(x=height["x"].values, y=height["y"].values)
-    dataset.attrs = {
-        "Conventions": "CF-1.11",
-        "boundary": settings.boundary,
-        "tolerance": settings.tolerance,
-        "history": str(height.attrs.get("history", "")),
-    }
+        variables["filled"] = ("x", "y"), height["filled"].values
+    dataset = xr.Dataset(
+        variables,
+        coords={axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values},
+        attrs={
+            "Conventions": "CF-1.11",
+            "boundary": settings.boundary,
+            "tolerance": settings.tolerance,
+            "history": str(height.attrs.get("history", "")),
+        },
+    )
     dataset = label(in_order(rows.finish(dataset)))
     if axis != "time":
         return dataset
-    histories = steps.set_index("time")[[name for name in STEPPED if name in steps]].to_xarray()
-    histories = label(histories.assign_attrs(title=TITLE)).drop_indexes("time").rename_dims(time="step")
-    return with_steps(dataset, histories)
+    stepped = {name: ("time", steps[name].to_numpy()) for name in STEPPED if name in steps}
+    histories = xr.Dataset(stepped, coords={"time": steps["time"].to_numpy()}, attrs={"title": TITLE})
+    return with_steps(dataset, label(histories).drop_indexes("time").rename_dims(time="step"))
