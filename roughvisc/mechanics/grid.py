@@ -13,6 +13,7 @@ CuPy.
 from __future__ import annotations
 
 import os
+import threading
 from functools import cached_property
 from typing import Any, Literal
 
@@ -21,7 +22,7 @@ import scipy
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
-from roughvisc.mechanics.threads import threads_of
+from roughvisc.mechanics.threads import on_threads, parts_of, threads_of
 
 try:
     import ducc0
@@ -239,31 +240,39 @@ class Grid:
             spectrum = fft.waves(field)
             self.multiply(spectrum, symbol)
             return fft.waves_back(spectrum, points)
-        # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache.
-        (nx, ny), count, threads = self.shape, points[1] // 2 + 1, self.threads
+        # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
+        (nx, ny), count, fft = self.shape, points[1] // 2 + 1, self._block_transforms
         spectrum = self._memory((nx, count), np.result_type(field.dtype, np.complex64))
-        rows, columns = threads * ROWS, threads * max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
+        found = self.xp.empty((nx, ny), field.dtype)
+        rows, columns = ROWS, min(max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS), count)
+        threads = self.threads
         if self.xp is not np:
-            rows, columns = nx, count
-        for part in (slice(first, first + rows) for first in range(0, nx, rows)):
+            rows, columns, threads = nx, count, 1
+
+        def transform_rows(part: slice) -> None:
             spectrum[part] = fft.rows(field[part], points[1])
-        room = self._memory((points[0], min(columns, count)), spectrum.dtype)
-        for part in (slice(first, min(first + columns, count)) for first in range(0, count, columns)):
-            waves = room[:, : part.stop - part.start]
+
+        def convolve_columns(part: slice) -> None:
+            waves = self._memory((points[0], columns), spectrum.dtype)[:, : part.stop - part.start]
             waves[:nx], waves[nx:] = spectrum[:, part], 0
             waves = fft.columns(waves)
             self.multiply(waves, symbol[:, part])
             spectrum[:, part] = fft.columns_back(waves)[:nx]
-        found = self.xp.empty((nx, ny), field.dtype)
-        for part in (slice(first, first + rows) for first in range(0, nx, rows)):
+
+        def rows_back(part: slice) -> None:
             found[part] = fft.rows_back(spectrum[part], points[1])[:, :ny]
+
+        on_threads(transform_rows, parts_of(nx, rows), threads)
+        on_threads(convolve_columns, parts_of(count, columns), threads)
+        on_threads(rows_back, parts_of(nx, rows), threads)
         return found
 
     def _memory(self, shape: tuple[int, int], number: Any) -> Array:
         """Return a complex array to work in, the same in each convolution: new memory takes up to a third more time."""
-        if shape not in self._memories:
-            self._memories[shape] = self.xp.empty(shape, np.complex128)
-        memory = self._memories[shape].reshape(-1).view(number)  # in either precision: one convolution at a time
+        key = shape, threading.get_ident()
+        if key not in self._memories:
+            self._memories[key] = self.xp.empty(shape, np.complex128)
+        memory = self._memories[key].reshape(-1).view(number)  # in either precision: one convolution at a time
         return memory[: shape[0] * shape[1]].reshape(shape)
 
     # ----------------------------------------------------------------------------------------------------- transforms
@@ -271,6 +280,10 @@ class Grid:
     @cached_property
     def _transforms(self) -> Transforms:
         return transforms(self.threads, self.xp)
+
+    @cached_property
+    def _block_transforms(self) -> Transforms:
+        return transforms(1, self.xp)
 
     def spectrum(self, field: Array) -> Array:
         """Return the transform of a field, zero beyond the cells."""
