@@ -245,7 +245,7 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
     if not lines:
         return ",", []
     last = lines[-1][1]  # a row of numbers; the first lines may belong to no table
-    if len(last.split()) > 1 and all(map(_BETWEEN_BLANKS.fullmatch, last.split())):
+    if len(_split(last)) > 1 and all(map(_BETWEEN_BLANKS.fullmatch, _split(last))):
         return " ", [_Row(i, _between_blanks(line)) for i, line in lines]
     separator = next((sign for sign in ";\t," if sign in last), ",")
     rows = []
@@ -259,8 +259,13 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
 
 
 def _between_blanks(line: str) -> list[str]:
-    cells = line.split()
+    cells = _split(line)
     return cells if all(map(_BETWEEN_BLANKS.fullmatch, cells)) else _HEADING_BETWEEN_BLANKS.findall(line)
+
+
+def _split(line: str) -> list[str]:
+    """Return what stands between blanks and tabs; a no-break space groups the digits of a number."""
+    return re.split(r"[ \t]+", line.strip(" \t"))
 
 
 def _fitting(heading: _Row, one: Wanted) -> list[int]:

@@ -75,6 +75,13 @@ def test_table__written_in_any_way_is_read_back(path, table, encoding):
     assert lines == [*range(last + 1 - len(lines), last + 1)]
 
 
+def test_no_break_space__groups_digits_also_in_the_last_row(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("time [s]\tz\u00fcge [N]\n0.5\t0\n1.5\t1\N{NO-BREAK SPACE}000.0\n", encoding="utf-8")
+    read, _ = read_table(path, PULL)
+    np.testing.assert_array_equal(read["z\u00fcge"], [0.0, 1000.0])
+
+
 @pytest.mark.parametrize("heading", ["# made by hand\ntime [s];load [N]", "time [ms],load [mN]\r\n\r\n"])
 def test_heading_without_rows__is_refused(heading, tmp_path):
     path = tmp_path / "empty.csv"
