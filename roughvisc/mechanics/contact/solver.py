@@ -217,6 +217,11 @@ def solve_contact(
             duality = abs(weighted - level * total) + total * (level - lowest)
         rounding = ROUNDING * total * (highest + grid.self_influence * largest(held))
 
+        if size == 0 and is_extrapolated:  # as with a single cell: no step would correct the given displacement
+            separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+            is_extrapolated = False
+            continue
+
         # The last requested change of pressure estimates the error, reduced as the duality gap has fallen since.
         if size == 0:
             error = 0.0

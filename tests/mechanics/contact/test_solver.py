@@ -249,6 +249,20 @@ def test_known_displacement__leaves_its_error_behind(boundary, known):
 
 
 @BOUNDARIES
+def test_known_displacement_of_a_single_cell__leaves_its_error_behind(boundary):
+    """The residual of one cell under a load vanishes, whatever its displacement is."""
+    operator, gap = Grid((15, 12), (1.0, 1.0), boundary), np.full((15, 12), 10.0)
+    gap[7, 5] = 0.0
+    pressure = np.zeros_like(gap)
+    pressure[7, 5] = 2.0
+    exact = operator.displacement(pressure)
+    found = solve_contact(operator, gap, load=2.0, start=pressure, start_displacement=1.001 * exact)
+    assert np.array_equal(found.pressure, pressure)
+    assert np.abs(found.displacement - exact).max() < 1e-14 * exact.max()
+    assert found.approach == pytest.approx(exact[7, 5], rel=1e-14)
+
+
+@BOUNDARIES
 def test_known_displacement__saves_a_convolution(boundary):
     operator, gap = Grid((31, 28), (1.0, 1.0), boundary), rough_gap((31, 28))
     start = solve_contact(operator, gap, load=30.0, tolerance=1e-6)
