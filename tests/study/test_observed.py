@@ -170,7 +170,7 @@ def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pic
         again = rv.observables.conductance(ds, (5.0, 0.0))
         xr.testing.assert_allclose(ds.thermal_conductance, again.thermal_conductance)
         assert list(ds.thermal_conductance.attrs["resistivity"]) == [5.0, 0.0]
-        asked = {"conductance": {"resistivity": [5.0, 0.0], "kind": "thermal"}}
+        asked = {"conductance": {"resistivity": ["5 K m/W", 0]}}  # as the study states it
         assert json.loads(ds.attrs["observed"]) == asked
 
 

@@ -93,7 +93,8 @@ def _row(ds, **true):
     stated = ds
     side = float(ds.x[1] - ds.x[0])
     return {"cells": float(ds.contact_area_counted[0]) / side**2} | {
-        name: (float(stated[f"grid_error_{name}"][0]), abs(float(error))) for name, error in true.items()
+        name: (float(stated[own if (own := f"grid_error_{name}") in stated else "grid_error"][0]), abs(float(error)))
+        for name, error in true.items()
     }
 
 
