@@ -158,7 +158,7 @@ def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
         assert row["bounded"] >= (2 / 3 if row["quantity"] == "area" else 1)
         assert row["middle"] > 0.8
         # one coarser solve overstates; a force shares its number with pressure and approach
-        assert row["middle"] < 16 or row["quantity"] == "force"
+        assert row["middle"] < 20 or row["quantity"] == "force"
     for row in module.main(small=True, constants=True):
         assert -0.08 < row["least"] <= row["largest"] < 0.03
 
