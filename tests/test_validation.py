@@ -74,6 +74,7 @@ def test_relaxation__load_then_constant_approach():
     assert ds.approach.values == pytest.approx(exact.approach, rel=3e-3)
 
 
+@pytest.mark.thorough
 def test_power_law_ramp__approach():
     material = rv.power_law(0.0, 1.0, 0.5)
     exact = references.power_law_ramp(1.0, 0.3, 0.25, 0.5)  # C = J/4

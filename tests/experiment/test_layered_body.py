@@ -21,6 +21,7 @@ def pressed(height, body, program, **settings):
     return rv.simulate(height, body, program, **{"progress": False, **settings})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("poissons", POISSONS)
 @pytest.mark.parametrize("wide", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("ratio", [0.01, 0.5, 100.0])

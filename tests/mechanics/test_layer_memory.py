@@ -112,6 +112,7 @@ def test_restart__forgets_the_last_step_alone():
     assert memory.rule(again, 0.5) != "bdf2"
 
 
+@pytest.mark.thorough
 def test_kernel_of_a_step__is_positive():
     memory = memory_of(PAIRS["rubber on polymer"], "free")
     kernel = memory.predict(memory.start(np.zeros(SHAPE)), DURATION).grid

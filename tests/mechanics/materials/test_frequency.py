@@ -37,6 +37,7 @@ def test_power_law__is_the_transform_of_its_creep():
     assert np.isinf(complex_compliance(material, 0.0))
 
 
+@pytest.mark.thorough
 def test_table_and_own_material__come_near_the_series_that_they_sample():
     exact = rv.zener(1.0, 0.5, 0.5)
     t = np.geomspace(1e-6, 1e6, 1200)
