@@ -1,5 +1,8 @@
 """Threads: the same bits on any number of them."""
 
+import multiprocessing
+import os
+
 import numpy as np
 import pytest
 
@@ -39,3 +42,25 @@ def test_on_threads__does_each_part_once_and_raises_what_one_raises(threads):
     with pytest.raises(ValueError, match="the last part"):
         threading.on_threads(work, threading.parts_of(1001, 64), threads)
     np.testing.assert_array_equal(field, 1)
+
+
+def doubled(queue):
+    field = np.ones(1000)
+    threading.on_threads(lambda part: np.multiply(field[part], 2, out=field[part]), threading.parts_of(1000, 64), 2)
+    queue.put(float(field.sum()))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a system without fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_on_threads__works_in_a_forked_process_too():
+    """A forked process has none of the threads of its parent."""
+    context = multiprocessing.get_context("fork")
+    queue = context.Queue()
+    doubled(queue)
+    assert queue.get(timeout=30) == 2000.0
+    child = context.Process(target=doubled, args=(queue,))
+    child.start()
+    try:
+        assert queue.get(timeout=30) == 2000.0
+    finally:
+        child.kill()
