@@ -170,8 +170,8 @@ def solve(
                 apart = np.abs(found["time"].values[:, None] - times)  # a slide has others, by half a longer cell
                 return found.isel(time=apart.argmin(axis=0))
 
-            dataset = with_grid_error(dataset, height, on_coarser)
-    return label(in_order(dataset)).drop_vars(needed)
+            dataset = label(in_order(with_grid_error(dataset, height, on_coarser))).drop_vars(needed)
+    return dataset
 
 
 @contextmanager

@@ -525,14 +525,15 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.motions and scene.keeps(last):
             slide = scene.motions[state.segment]
             apart = replace(apart, friction=friction_apart(scene, shown[1].point, shown[2].point, slide))
+        # error in the middle of the pair: what relaxation leaves of that before, and cells that have entered
+        left, unsure = remaining_part(scene, middle - fine.time, taken), entering(scene, fine, shown[0].point)
         shared = 0.0
         if scene.time_step is not None:
             break
         force, approach = largest_values(scene, state, first.point, second.point)
         in_middle = middle == event and scene.keeps(event)
-        entered_force, left = entering(scene, fine, shown[0].point), remaining_part(scene, middle - fine.time, taken)
-        doubtful = entered_force > UNCERTAIN * scene.tolerance * force
-        if in_middle and (doubtful or entered_force + left * state.difference.pressure > 0.8 * scene.tolerance * force):
+        doubtful = unsure > UNCERTAIN * scene.tolerance * force
+        if in_middle and (doubtful or unsure + left * state.difference.pressure > 0.8 * scene.tolerance * force):
             next_event, state = event, with_cost(state, solved)  # the pair ends here, so that its error is known
             del first, second, once, shown, solved  # their memory is free while the pair is tried again
             continue
@@ -566,9 +567,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     work, whole = work_of_pair(scene, fine, first.point, second.point)
     after = after_solves(scene, state, second, once, solved, whole, length)
-    left = remaining_part(scene, middle - fine.time, taken)
     between = state.difference.times(left).or_larger(apart)
-    between = replace(between, pressure=between.pressure + entering(scene, fine, shown[0].point))
+    between = replace(between, pressure=between.pressure + unsure)
     after = replace(after, difference=apart)
     if last == end:
         after = entered(scene, after)
