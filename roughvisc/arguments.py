@@ -159,7 +159,7 @@ def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
 
 
 def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
-    """Return a value that is one of some words, or refuse it."""
+    """Return the value if it is one of the allowed words; refuse it otherwise."""
     words = list(words)
     if value not in words:
         expected = f"one of {', '.join(words)}"
@@ -169,7 +169,7 @@ def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
 
 
 def a_table(where: str, value: Any) -> dict[str, Any]:
-    """Return a copy of a value that is a table, or refuse it."""
+    """Return a copy of the value if it is a table; refuse it otherwise."""
     if not isinstance(value, Mapping):
         raise InputError(key=where, found=value, expected="a table")
     return dict(value)
@@ -185,7 +185,7 @@ def located(error: InputError, where: str) -> InputError:
 
 
 def dotted(*names: str) -> str:
-    """Join the names of tables and keys, without those that are empty."""
+    """Join the names of tables and keys by dots; empty names are left out."""
     return ".".join(filter(None, names))
 
 

@@ -533,7 +533,7 @@ AXES: dict[str, Axis] = {
 
 
 def axis_of(names: Container[str]) -> str:
-    """Return the name of the axis of the rows of a result, by the names that it holds.
+    """Return the axis of the rows of a result, which the names of its variables tell.
 
     Examples
     --------

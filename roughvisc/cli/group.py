@@ -124,7 +124,7 @@ def _settings_of_process() -> Iterator[None]:
 
 
 class Commands(click.Group):
-    """Commands whose known errors end in one message and an exit status, never in a traceback."""
+    """Commands that print one message for a known error and return an exit status, without a traceback."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)  # in the order of their use

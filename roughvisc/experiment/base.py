@@ -69,7 +69,7 @@ def facts_of(body: Body, end: float, time_scale: float) -> dict[str, Any]:
     body : Body
         The body under the surface.
     end : float
-        Time till which the material creeps. [s]
+        Time at which the creep ends. [s]
     time_scale : float
         Shortest time in which the load or the approach changes; infinite in a steady state. [s]
     """
@@ -164,7 +164,7 @@ class Experiment(ABC):
     Attributes
     ----------
     axis : str
-        Name of the axis of its rows, one of :data:`roughvisc.variables.axes.AXES`.
+        Name of the axis of its rows, one of :data:`roughvisc.variables.AXES`.
     boundary : {"free", "periodic"} or None
         Boundary that ``auto`` stands for. None: that of the surface.
     """

@@ -1,4 +1,4 @@
-"""Error of the grid, one for each quantity, from the same on cells twice as long and the contact edge.
+"""Error of the grid in each quantity, from a solution on cells twice as long and from the edge of the contact.
 
 Both grids may agree by chance, and do so if the contact is too small for either to resolve its shape. Therefore no
 error is stated that is smaller than what the finer grid alone leaves open: the edge of the contact, which lies anywhere

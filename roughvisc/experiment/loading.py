@@ -263,7 +263,7 @@ class LoadingRows(Rows):
         return row, {name: fields[name] for name in names}
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result: costs of each row from the sums till then, nominal pressure, attributes.
+        """Return the result with the cost of each row, the nominal pressure and the attributes.
 
         The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
         """

@@ -104,7 +104,7 @@ def threads_for(asked: int | None) -> int:
 
 # ---------------------------------------------------------------------------------------------------- what a run needs
 
-#: Fields of the surface: heights, gaps, and the marks of present cells; and of one that is made or read.
+#: Fields of a surface in a run (heights, gaps and the mask of present cells), and of one that is generated or read.
 _SURFACE, _MADE = 2.1, 4.0
 #: Fields of a contact problem and of the step around it, and further ones of a contact on all cells.
 _SOLVE, _IN_CONTACT = 8.0, 12.0

@@ -133,7 +133,7 @@ def _matching(key: str, value: Any, folder: Path) -> Any:
 
 
 def _realisations(change: Mapping[str, Any], data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], int]]:
-    """Return the changes of each realisation of a case, with its number."""
+    """Return the changes that make each realisation of a case, and its number."""
     where, count = f"sweep.{REALISATIONS}", change[REALISATIONS]
     rest = {key: value for key, value in change.items() if key != REALISATIONS}
     if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
@@ -175,7 +175,7 @@ def _seeds(faces: Mapping[str, Mapping[str, Any]], count: int) -> dict[str, int]
 
 
 def _card_recipe(file: Any, folder: Path) -> Any:
-    """Return the recipe of a surface card; None for any other file."""
+    """Return the recipe that a surface card contains; None if the file is no card."""
     path = Path(folder, Path(str(file)).expanduser())
     return read_toml(path, "a surface card in TOML").get("generate") if is_card(path, None) and path.is_file() else None
 
