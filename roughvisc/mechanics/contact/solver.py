@@ -164,6 +164,9 @@ def solve_contact(
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
         raise ConvergenceError("the approach is that of full contact or beyond, which does not determine the load")
 
+    def separation_under(pressure: Array) -> Array:
+        return given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+
     # First guess: the given one, else uniform, or the overlap of the surfaces.
     if start is not None:
         pressure = (start if overwrite else start.copy()).reshape(-1)
@@ -181,7 +184,7 @@ def solve_contact(
         separation *= scale / unit
         separation += given
     else:
-        separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+        separation = separation_under(pressure)
 
     def without_mean(vector: Array) -> Array:
         return vector - vector.sum() / vector.size if under_load else vector
@@ -218,7 +221,7 @@ def solve_contact(
         rounding = ROUNDING * total * (highest + grid.self_influence * largest(held))
 
         if size == 0 and is_extrapolated:  # as with a single cell: no step would correct the given displacement
-            separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+            separation = separation_under(pressure)
             is_extrapolated = False
             continue
 
@@ -236,7 +239,7 @@ def solve_contact(
         if iteration == max_iterations:
             raise ConvergenceError(unsolved(iteration, error, tolerance))
         if is_solved:  # to be judged again in double precision
-            separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+            separation = separation_under(pressure)
             is_single, previous = False, None
             continue
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
@@ -279,7 +282,7 @@ def solve_contact(
             change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
             slope = inner(change, residual)
             if not slope < 0 and is_single:
-                separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+                separation = separation_under(pressure)
                 is_single = False
                 continue
             if not slope < 0:  # the minimum, to rounding
