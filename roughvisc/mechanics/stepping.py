@@ -284,7 +284,7 @@ class State:
         Work of the normal force since the start. [J]
     distance : float
         Length of the path of the slides so far. [m]
-    iterations, convolutions : int
+    convolutions : int
         Spent so far, rejected pairs included.
     """
 
@@ -297,7 +297,6 @@ class State:
     largest_approach: float = 0.0
     work: float = 0.0
     distance: float = 0.0
-    iterations: int = 0
     convolutions: int = 0
 
     @property
@@ -323,7 +322,7 @@ class Step(NamedTuple):
         From which a march continues after this step; None in the middle of a pair.
     distance : float
         Length of the path of the slides so far. [m]
-    iterations, convolutions : int
+    convolutions : int
         Spent so far.
     """
 
@@ -333,7 +332,6 @@ class Step(NamedTuple):
     work: float
     state: State | None
     distance: float = 0.0
-    iterations: int = 0
     convolutions: int = 0
 
 
@@ -341,7 +339,6 @@ class Solved(NamedTuple):
     """A step that is not yet accepted, and its cost."""
 
     point: Point
-    iterations: int = 0
     convolutions: int = 0
 
 
@@ -393,9 +390,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 def accepted(state: State, point: Point, segment: int) -> Step:
     """Return the step that has led to a state, with its point as a row shows it."""
-    return Step(
-        point, state.difference, segment, state.work, state, state.distance, state.iterations, state.convolutions
-    )
+    return Step(point, state.difference, segment, state.work, state, state.distance, state.convolutions)
 
 
 def inside_pair(state: State, point: Point, apart: Difference, work: float) -> Step:
@@ -404,7 +399,7 @@ def inside_pair(state: State, point: Point, apart: Difference, work: float) -> S
     Its cost is counted with the second one.
     """
     total = state.work + work
-    return Step(point, apart, state.segment, total, None, state.distance, state.iterations, state.convolutions)
+    return Step(point, apart, state.segment, total, None, state.distance, state.convolutions)
 
 
 def at_rest(scene: Scene) -> State:
@@ -690,7 +685,7 @@ def end_value(scene: Scene, here: Point, solved: Solved, control: Control, presc
     alone = replace(point, before=None, history=scene.memory.restart(point.history))
     found = take_step(scene, alone, point.time + ahead, control, value, rule="constant")
     shown = replace(found.point, time=point.time, approach=point.approach, before=point.before)
-    return Solved(shown, found.iterations, found.convolutions)
+    return Solved(shown, found.convolutions)
 
 
 def largest_values(scene: Scene, state: State, first: Point, second: Point) -> tuple[float, float]:
@@ -820,11 +815,7 @@ def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
 def with_cost(state: State, solved: list[Solved]) -> State:
     """Return the state with the cost of solves."""
     each = {id(one): one for one in solved}.values()
-    return replace(
-        state,
-        iterations=state.iterations + sum(one.iterations for one in each),
-        convolutions=state.convolutions + sum(one.convolutions for one in each),
-    )
+    return replace(state, convolutions=state.convolutions + sum(one.convolutions for one in each))
 
 
 def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
@@ -988,7 +979,7 @@ def take_step(
         found.error,
         found.approach_error,
     )
-    return Solved(point, found.iterations, found.convolutions)
+    return Solved(point, found.convolutions)
 
 
 def extrapolated(scene: Scene, here: Point, step: float) -> Guess:

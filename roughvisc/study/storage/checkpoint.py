@@ -51,7 +51,7 @@ _SPARSE_SIZE = 1024  # smaller arrays are not looked at for zeros
 #: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
 _WAITING = 8 << 20
 #: Raised by whoever changes what a checkpoint holds of a state.
-_LAYOUT = 3
+_LAYOUT = 4
 #: Writing checkpoints may take this part of the time.
 _SHARE = 0.05
 
