@@ -30,12 +30,12 @@ _NUMBER = {
     )
     for mark, other in (".,", ",.")
 }
-#: A number in a file whose separator is a blank, so that blanks group no digits.
-_BETWEEN_BLANKS = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
+#: A number in a file whose separator is a blank, so that only no-break blanks and apostrophes group digits.
+_BETWEEN_BLANKS = re.compile(r"[+-]?((\d+|[1-9]\d{0,2}(['\u00a0\u202f]\d{3})+)(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
 #: ``name [unit]`` or ``name (unit)``. A unit in square brackets may have parentheses, as in ``1/(Pa s)``.
 _HEADING = re.compile(r"(?P<name>.*?)\s*(\[\s*(?P<square>[^\[\]]*?)\s*\]|\(\s*(?P<round>[^()]*?)\s*\))")
 #: The same in a file whose separator is a blank.
-_HEADING_BETWEEN_BLANKS = re.compile(r"[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+_HEADING_BETWEEN_BLANKS = re.compile(r"[^ \t\[(]+(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))?")
 #: Number of rows in which the heading is searched.
 _FIRST = 200
 

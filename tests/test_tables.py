@@ -75,11 +75,14 @@ def test_table__written_in_any_way_is_read_back(path, table, encoding):
     assert lines == [*range(last + 1 - len(lines), last + 1)]
 
 
-def test_no_break_space__groups_digits_also_in_the_last_row(tmp_path):
+@pytest.mark.parametrize("separator", ["\t", "  "])
+@pytest.mark.parametrize("pulls", [["0", "1\N{NO-BREAK SPACE}000.0"], ["1\N{NO-BREAK SPACE}000.0", "0"]])
+def test_no_break_space__groups_digits_in_any_row(pulls, separator, tmp_path):
     path = tmp_path / "table.csv"
-    path.write_text("time [s]\tz\u00fcge [N]\n0.5\t0\n1.5\t1\N{NO-BREAK SPACE}000.0\n", encoding="utf-8")
+    rows = [["time [s]", "züge [N]"], ["0.5", pulls[0]], ["1.5", pulls[1]]]
+    path.write_text("\n".join(map(separator.join, rows)), encoding="utf-8")
     read, _ = read_table(path, PULL)
-    np.testing.assert_array_equal(read["z\u00fcge"], [0.0, 1000.0])
+    np.testing.assert_array_equal(read["züge"], [float(pull.replace("\N{NO-BREAK SPACE}", "")) for pull in pulls])
 
 
 @pytest.mark.parametrize("heading", ["# made by hand\ntime [s];load [N]", "time [ms],load [mN]\r\n\r\n"])
