@@ -1,6 +1,7 @@
 """Every study of the workflows with one thing wrong is refused, with its file, key, value and what was expected."""
 
 import copy
+import random
 import tomllib
 from pathlib import Path
 
@@ -84,3 +85,18 @@ def test_mutation__is_refused_with_file_key_value_and_expectation(workflow, tmp_
         assert error.key.split(".")[0] in (str(table).split(".")[0], f"{table}x", "sweep", "nonsense"), told
         assert error.key in str(error), told
     assert tried >= 40
+
+
+def test_wrong_studies__end_with_status_2_and_write_nothing(invoke, tmp_path):
+    drawn = random.Random(1)
+    study, out = tmp_path / "study.toml", tmp_path / "results"
+    for workflow in WORKFLOWS:
+        text = workflow.read_text(encoding="utf-8").replace("../surfaces", str(workflow.parents[1] / "surfaces"))
+        for path, changed in drawn.sample(list(mutations(tomllib.loads(text))), 20):
+            study.write_text(study_text(changed))
+            status, printed, refusal = invoke("run", study, "--out", out)
+            told = f"{workflow.stem}, {path}: {printed}{refusal}"
+            assert status == 2, told
+            assert str(study) in refusal, told
+            assert str(next(part for part in path if part not in ("sweep", 0))).split(".")[0] in refusal, told
+            assert [one.name for one in tmp_path.iterdir()] == [study.name], told
