@@ -149,16 +149,6 @@ def page():
             "",
         ]
         lines += [f"![{kind}](gallery/{name}-{kind}.png)\n" for kind in FIGURES[name]]
-        lines += [
-            "<details><summary>The study</summary>",
-            "",
-            "```toml",
-            text.rstrip(),
-            "```",
-            "",
-            "</details>",
-            "",
-        ]
     for name, figure in SCRIPTS.items():
         summary = (WORKFLOWS / f"{name}.py").read_text().split('"""')[1].strip().partition("\n")
         lines += [

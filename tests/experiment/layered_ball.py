@@ -1,6 +1,6 @@
 """Elastic balls on layers, from the surface to the result, against the Fredholm equation.
 
-``python tests/experiment/layered_ball.py 65 129`` prints the table of docs/validation.md.
+``python tests/experiment/layered_ball.py 129`` prints the table of docs/verification.md.
 """
 
 import math

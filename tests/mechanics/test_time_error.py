@@ -159,7 +159,7 @@ def test_going_on_from_any_state__states_the_same():
 
 
 def test_row_right_after_a_corner__is_judged():
-    """The program of docs/howto/indentation.md: pulled back from a hold, and asked a fifth of the way."""
+    """The program of docs/howto/programs.md: pulled back from a hold, and asked a fifth of the way."""
     times = (0.1, 0.3, 0.5, 0.6)
     program = rv.Program.table([0.0, 0.1, 0.5, 1.0], [0.0, 40e-6, 40e-6, 10e-6], control="approach")
     ball, rubber = rv.sphere(10e-3, 2.4e-3, 31), rv.zener(3e6, 1e6, 1e5)

@@ -286,7 +286,7 @@ CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
 
 if (
     __name__ == "__main__"
-):  # `PYTHONPATH=tests python -m references.closed_cases` prints the table of docs/validation.md
+):  # `PYTHONPATH=tests python -m references.closed_cases` prints the table of docs/verification.md
     for title, compare in CASES.values():
         for row, (what, error, expected) in enumerate(compare(129)):
             print(f"| {'' if row else title} | {what} | {error:.1e} | {expected:.1e} |")
