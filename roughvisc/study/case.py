@@ -73,6 +73,14 @@ class Case:
     varied: Mapping[str, Any] = field(default_factory=dict)
     written: Mapping[str, str] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Return title, surface, material and experiment in one line, and what a sweep has set."""
+        surface = self.surface
+        name = Path(surface["file"]).name if "file" in surface else surface.get("generate", "")
+        parts = [f"{self.title!r}, {name} on {self.tables['material'].get('model')}", repr(self._experiment)]
+        parts += [f"{key} = {self.written.get(key, value)}" for key, value in self.varied.items()]
+        return f"Case {'; '.join(parts)}"
+
     @property
     def title(self) -> str:
         """Title of the study."""

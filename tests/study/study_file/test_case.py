@@ -483,3 +483,9 @@ CASE = {
     "material": {"model": "elastic", "shear_modulus": 1e6},
     "program": [{"load": 1.0, "over": 0.0}],
 }
+
+
+def test_case__prints_as_one_line(study):
+    case = repr(vary(read_study(study()), {"program.1.hold": "3 s"}))
+    assert "\n" not in case
+    assert all(part in case for part in ("'A ball'", "sphere", "zener", "2 N", "program.1.hold = 3 s")), case
