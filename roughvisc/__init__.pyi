@@ -31,7 +31,7 @@ from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
-from roughvisc.study.budget.budget import budget as budget
+from roughvisc.study.budget import budget as budget
 from roughvisc.study.case import Case as Case
 from roughvisc.study.case import read_cases as read_cases
 from roughvisc.study.case import read_study as read_study
@@ -44,7 +44,7 @@ from roughvisc.study.plan import plan as plan
 from roughvisc.study.storage.results import open_results as open_results
 from roughvisc.study.storage.store import open_result as open_result
 from roughvisc.study.storage.table import to_table as to_table
-from roughvisc.study.trade.trade import trade as trade
+from roughvisc.study.trade import trade as trade
 from roughvisc.topography.conditioning import combine as combine
 from roughvisc.topography.conditioning import crop as crop
 from roughvisc.topography.conditioning import fill as fill

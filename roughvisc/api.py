@@ -285,6 +285,6 @@ def run(
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None:
         return run_stated(stated, out, progress=progress, threads=threads)
-    from roughvisc.study.budget import target
+    from roughvisc.study import target
 
     return target.run(stated, out, want=want, progress=progress is not False, threads=threads)

@@ -15,7 +15,6 @@ from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.trade.ladder import Setting
 
 HEAD = """
 title = "Every service"
@@ -250,8 +249,8 @@ def test_grid_error__is_stated_in_every_row(kind, done):
 
 @pytest.mark.thorough
 @plain_load_is_thorough
-def test_trade__measures_each_setting(kind, done):
-    ds = rv.trade(done.case, [Setting(0.1), Setting(1e-2), Setting(1e-2, coarsening=1.5)], progress=False)
+def test_trade__measures_each_setting(kind, done, tmp_path):
+    ds = rv.trade(done.case, [(0.1, 1), (1e-2, 1), (1e-2, 1.5)], out=tmp_path, progress=False)
     assert not any(ds.note.values)
     assert np.isfinite(ds.error).all()
     assert ("friction_coefficient" in ds.quantity) == kind.moves

@@ -13,7 +13,6 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.case import Case, vary
-from roughvisc.study.trade.ladder import Setting
 from roughvisc.variables import FIELDS
 
 USUAL = {
@@ -35,7 +34,6 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
     assert given | vars(given.pop("numerics")) == USUAL | {"threads": None, "progress": True}
     assert given.keys().isdisjoint(vars(Numerics()))
     assert vars(STUDY.settings) == USUAL | {"boundary": "free"}
-    assert Setting().tolerance == USUAL["tolerance"]
 
 
 @pytest.mark.parametrize(

@@ -26,12 +26,12 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     \b
     Example:
       roughvisc plot results/focus_variation-study --out figures
-      roughvisc plot results/focus_variation-study-trade/trade.nc
+      roughvisc plot results/focus_variation-study/trade/trade.nc
     """
     from rich.console import Console
 
     from roughvisc.study.storage.store import open_result, results_at
-    from roughvisc.study.trade.files import is_trade, open_trade
+    from roughvisc.study.trade import is_trade, open_trade
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import save_figures, save_sweep_figures, trade
     from roughvisc.views.sweep_figures.files import cases_in, results_of

@@ -128,8 +128,8 @@ def _choose(
     """Return the case with the chosen grid and tolerance, and its budgets; print what was chosen and why."""
     from functools import partial
 
-    from roughvisc.study.budget.target import choose, parse_targets
     from roughvisc.study.execution.monitor import watcher
+    from roughvisc.study.target import choose, parse_targets
 
     watch, tell = partial(watcher, not console.quiet, console, summary=False), partial(say, console)
     choice = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
@@ -235,7 +235,7 @@ def _fail_if_any(cases: Sequence[Case], outcomes: Mapping[str, Outcome], log: Pa
 
 @click.command()
 @click.argument("study", type=PATH)
-@click.option("--out", type=PATH, help="Folder for the measurements. [default: results/STUDY-trade]")
+@click.option("--out", type=PATH, help="Folder for the measurements. [default: trade in the results]")
 @click.option(
     "--accuracy", type=QUANTITY, metavar="PART", default="1%", help="Wanted relative error.", show_default=True
 )
@@ -255,16 +255,13 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
       roughvisc trade focus_variation-study.toml
       roughvisc trade focus_variation-study.toml --accuracy 0.1% --quantity mean_gap
     """
-    from dask.system import CPU_COUNT
     from rich.console import Console
-    from scipy import fft
 
-    from roughvisc.progress import reporting
     from roughvisc.study.case import read_study
+    from roughvisc.study.execution.run import result_folder
     from roughvisc.study.storage.store import write_dataset
-    from roughvisc.study.trade.files import trade_folder
-    from roughvisc.study.trade.recommend import main_quantities
-    from roughvisc.study.trade.trade import trade as measured
+    from roughvisc.study.trade import FOLDER
+    from roughvisc.study.trade import trade as measured
     from roughvisc.units import number
     from roughvisc.views.console.accuracy_tables import trade_table
     from roughvisc.views.figures.files import write_figure
@@ -272,21 +269,16 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
 
     part = number(accuracy, "1", "accuracy", above=0, below=1)
     case, console = read_study(study), Console(quiet=quiet)
-    folder = trade_folder(case, out)
-    with reporting(True, console=console, at=case.at) as report, fft.set_workers(CPU_COUNT):
-        dataset = measured(case, quantities=[quantity] if quantity else [], budget=budget, progress=report)
-    main = main_quantities(dataset)
-    console.print(trade_table(dataset, quantity or main[0], part))
+    folder = out or result_folder(case) / FOLDER
+    dataset = measured(case, quantity=quantity or (), budget=budget, out=folder, progress=not quiet)
+    console.print(trade_table(dataset, str(dataset["quantity"].values[0]), part))
     say_path(console, "Trade", write_dataset(dataset, folder / "trade.nc"))
-    drawn = list(dict.fromkeys([quantity or main[0], *main]))[:2]
-    say_path(console, "Figure", write_figure(figure(dataset, drawn), folder / "trade.png"))
+    say_path(console, "Figure", write_figure(figure(dataset), folder / "trade.png"))
 
 
 @click.command()
 @click.argument("study", metavar="STUDY|RESULT", type=PATH)
-@click.option(
-    "--quantity", "quantities", multiple=True, metavar="NAME", help="May be repeated. [default: contact_area]"
-)
+@click.option("--quantity", multiple=True, metavar="NAME", help="May be repeated. [default: contact_area]")
 @click.option(
     "--at", type=QUANTITY, multiple=True, metavar="VALUE", help="Time or speed; may be repeated. [default: all kept]"
 )
@@ -307,12 +299,12 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
 @_QUIET
 def budget(
     study: Path,
-    quantities: tuple[str, ...],
+    quantity: tuple[str, ...],
     at: tuple[Any, ...],
     out: Path | None,
     workers: int | None,
     quiet: bool,
-    **known: Any,
+    **errors: Any,
 ) -> None:
     """Estimate the total uncertainty of a number, by source.
 
@@ -327,13 +319,16 @@ def budget(
     """
     from rich.console import Console
 
-    from roughvisc.study.budget.budget import budgets, case_of
+    from roughvisc.study.budget import budgets, case_of
+    from roughvisc.study.case import read_study
+    from roughvisc.study.neighbours import Known
     from roughvisc.study.storage.store import open_result
 
     console = Console(quiet=quiet)
-    case, folder = case_of(open_result(study) if study.suffix == ".nc" else study, out)
-    names = list(quantities) or ["contact_area"]
-    found = budgets(case, names, at=list(at) or None, known=known, out=folder, workers=workers, progress=not quiet)
+    case = open_result(study) if study.suffix == ".nc" else read_study(study)
+    names, folder = list(quantity) or ["contact_area"], case_of(case, out)[-1]
+    known = Known(**errors)
+    found = budgets(case, names, known, at=list(at) or None, out=folder, workers=workers, progress=not quiet)
     for name, one in found.items():
         _show_budget(console, one, folder, name)
 

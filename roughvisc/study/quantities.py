@@ -1,10 +1,10 @@
-"""Quantities whose error is asked for: what each takes from a result, and how the grid's error of it behaves."""
+"""Quantities whose error is asked for: how each is read from a result, and how large its error may be."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -30,135 +30,121 @@ class Observable:
 
     Attributes
     ----------
-    name, units : str
+    name : str
         As in a result.
     derive : callable, optional
-        Gives it over the axis, from a result and the arguments of its observable. Default: the result holds it.
+        Gives it over the axis, from a result and the arguments of its observable. Default: the result contains it.
     fields : tuple of str
         Fields that it is derived from.
     grid_factor : float
-        Error of the grid over the difference to cells twice as long: Roache's factor of two grids, at the order 1.5.
-        The larger factors, and the next, were chosen on 45 rough surfaces, and what they hold was measured on 45 others
-        (workflows/benchmarks/whole_error.py).
+        Error of the grid over the difference to cells twice as long. Default: Roache's factor of two grids, at the
+        order 1.5. The larger factors, and the next, were chosen on 45 rough surfaces, and their coverage was measured
+        on 45 others (workflows/benchmarks/whole_error.py). [-]
     octave_factor : float
-        What the next octave of waves changes at most, over what the last one did.
-    stated : callable, optional
-        Error that the rows of a result state of it, in its unit. Default: the stated error of the row over the largest
-        value, which holds for any quantity that follows pressure or approach in proportion.
+        Change by the next octave of waves, at most, over the change by the last one. [-]
+    follows : {"pressure", "approach", "area", "gap"}
+        What its error follows.
     """
 
     name: str
-    units: str
     derive: Callable[[xr.Dataset, Observe], xr.DataArray] | None = None
     fields: tuple[str, ...] = ()
     grid_factor: float = 3 / (2**1.5 - 1)
     octave_factor: float = 1.1
-    stated: Callable[[xr.Dataset, Array], Any] | None = None
+    follows: Literal["pressure", "approach", "area", "gap"] = "pressure"
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
-        """Its values in a whole result of a case, over the axis, observed as the study says."""
-        if self.derive is None:
-            return np.asarray(result[self.name].values, dtype=float)
-        return np.asarray(self.derive(result, case.observed()).values, dtype=float)
+        """Return its values in a result of a case, over the axis."""
+        found = result[self.name] if self.derive is None else self.derive(result, case.observed())
+        return np.asarray(found.values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
-        """What steps and solver leave of its logarithm, as the rows of a result state it. [-]"""
-        error = None if self.stated is None else self.stated(result, values)
-        if error is None:
-            error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log1p(np.asarray(error, dtype=float) / np.abs(values))
+        """Return the error of its logarithm by steps and solver, from the stated errors of the rows. [-]
+
+        The mean gap of a periodic surface has the error of the approach. A leak rate changes by up to six times as
+        much as the mean gap, near the load that closes the gap. A conductance follows the contact area.
+        """
+        relative = np.zeros_like(values)
+        if self.follows == "area" and "contact_area_error" in result:
+            error = result["contact_area_error"].values
+            upper = result["contact_area"].values + error
+            np.divide(error, upper, out=relative, where=upper > 0)
+        elif self.follows == "gap" and "approach_error" in result:
+            gap = np.abs(result["mean_gap"].values)
+            np.divide(6 * result["approach_error"].values, gap, out=relative, where=gap > 0)
+        else:
+            if self.follows == "approach" and "approach_error" in result:
+                error = result["approach_error"].values
+            else:
+                error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                relative = error / np.abs(values)
+        return np.log1p(np.where(values == 0, np.nan, relative))
 
 
-def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    return leakage(result, **observe.get("leakage", {}))["leak_rate"]
-
-
-def _thermal(result: xr.Dataset, observe: Observe) -> xr.DataArray:
+def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     stated = dict(observe.get("conductance", {}))
     found = conductance(result, **stated) if stated else conductance(result, (1.0, 1.0), kind="thermal")
     if "thermal_conductance" not in found:
-        raise InputError(
-            "quantity is 'thermal_conductance': the study observes an electrical one: expected a thermal one"
-        )
+        expected = "a study that observes a thermal conductance, not an electrical one"
+        raise InputError(key="quantity", found="thermal_conductance", expected=expected)
     return found["thermal_conductance"]
 
 
-def _stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    return incremental_stiffness(result)["incremental_stiffness"]
-
-
-def _of_approach(result: xr.Dataset, values: Array) -> Any:
-    """The mean gap of a periodic surface is off by the error of the approach too."""
-    return result["approach_error"].values if "approach_error" in result else None
-
-
-def _of_area(result: xr.Dataset, values: Array) -> Any:
-    """In proportion to the contact area, whose error is stated."""
-    if "contact_area_error" not in result:
-        return None
-    error = result["contact_area_error"].values
-    upper = result["contact_area"].values + error
-    return np.abs(values) * np.divide(error, upper, out=np.zeros_like(upper), where=upper > 0)
-
-
-def _of_gap(result: xr.Dataset, values: Array) -> Any:
-    """A leak rate changes by up to six times as much as the mean gap, near the load that closes the gap."""
-    if "approach_error" not in result:
-        return None
-    gap = np.abs(result["mean_gap"].values)
-    return np.abs(values) * np.divide(6 * result["approach_error"].values, gap, out=np.zeros_like(gap), where=gap > 0)
-
-
-_CONDUCTED: dict[str, Any] = {"fields": ("pressure",), "grid_factor": 2.5, "octave_factor": 2.5, "stated": _of_area}
-#: name -> quantity
+#: Name -> quantity.
 QUANTITIES = {
     one.name: one
     for one in (
-        Observable("contact_area", "m^2", octave_factor=1.6, stated=_of_area),
-        Observable("mean_gap", "m", stated=_of_approach),
-        Observable("approach", "m", stated=_of_approach),
-        Observable("force", "N"),
-        Observable("friction_coefficient", "1", octave_factor=1.8),
-        Observable("leak_rate", "m^3/s", _leak_rate, ("gap",), stated=_of_gap),
-        Observable("thermal_conductance", "W/K", _thermal, **_CONDUCTED),
-        Observable("incremental_stiffness", "N/m", _stiffness, **_CONDUCTED),
+        Observable("contact_area", octave_factor=2.0, follows="area"),
+        Observable("mean_gap", follows="approach"),
+        Observable("approach", follows="approach"),
+        Observable("force"),
+        Observable("friction_coefficient", octave_factor=1.8),
+        Observable(
+            "leak_rate",
+            lambda result, observe: leakage(result, **observe.get("leakage", {}))["leak_rate"],
+            ("gap",),
+            follows="gap",
+        ),
+        Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, 2.5, "area"),
+        Observable(
+            "incremental_stiffness",
+            lambda result, observe: incremental_stiffness(result)["incremental_stiffness"],
+            ("pressure",),
+            2.5,
+            2.5,
+            "area",
+        ),
     )
 }
 
 
-def is_sliding(experiment: Experiment) -> bool:
-    """Return whether the surface slides."""
-    return not isinstance(experiment, Loading) or bool(experiment.program.slides)
+def quantities_of(case: Case) -> list[str]:
+    """Return the names of the quantities that the results of a case have."""
+    experiment = case.experiment()
+    slides = not isinstance(experiment, Loading) or bool(experiment.program.slides)
+    return [name for name in QUANTITIES if slides or name != "friction_coefficient"]
+
+
+def quantity_of(case: Case, name: str) -> Observable:
+    """Return a quantity by its name.
+
+    Raises
+    ------
+    InputError
+        If the results of the case have no such quantity.
+    """
+    if name not in (known := quantities_of(case)):
+        raise InputError(key="quantity", found=name, expected=f"one of {', '.join(known)}")
+    return QUANTITIES[name]
 
 
 def creep_time(experiment: Experiment, size: float) -> float:
-    """Return the time till which the material under a surface of a length [m] creeps.
+    """Return the time during which the material under a surface creeps. [s]
 
-    It is the end of the program, or the time in which the surface slides by its length at the lowest speed. [s]
+    It is the length of the program, or the time in which the surface slides by its `size` [m] at the lowest speed.
     """
     if isinstance(experiment, Loading):
         return experiment.program.duration
     assert isinstance(experiment, SteadySliding)
     return size / min(experiment.asked)
-
-
-def observables_of(case: Case) -> list[str]:
-    """Names of the quantities that the results of a case have."""
-    slides = is_sliding(case.experiment())
-    return [one for one in QUANTITIES if slides or one != "friction_coefficient"]
-
-
-def known_quantity(name: Any, case: Case) -> Observable:
-    """A quantity by its name, where the results of a case have it.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name, or the results do not hold it.
-    """
-    if name not in QUANTITIES:
-        raise InputError(key="quantity", found=name, expected=f"one of {', '.join(QUANTITIES)}")
-    if name == "friction_coefficient" and name not in observables_of(case):
-        raise InputError(key="quantity", found=name, expected="a number of a surface that does not slide")
-    return QUANTITIES[name]

@@ -10,9 +10,9 @@ from rich.text import Text
 
 from roughvisc.study.audit.audit import Audit
 from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, NOT_KNOWN
-from roughvisc.study.trade.recommend import WORDS, cheapest, choice, duration, pareto_front, percent
+from roughvisc.study.trade import cheapest, pareto_front
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 from roughvisc.views.console.tables import titled
 
 #: The words tell the verdicts apart; weight and colour help to find them.
@@ -69,14 +69,6 @@ def budget_table(dataset: xr.Dataset) -> Group:
     parts += [Text(), table]
     spent = float(dataset["case_cost"])
     notes = [f"The case itself took {spent:.2g} s. Errors are those of the {AXES[axis].rows}, least and largest."]
-    if "surrogate_ratio" in dataset:
-        ratio, kurtosis = dataset["surrogate_ratio"].values, dataset.attrs["kurtosis"]
-        if np.isfinite(ratio).any():
-            ends = dict.fromkeys(f"{one:.2g}" for one in (np.nanmin(ratio), np.nanmax(ratio)))
-            told = f"The number is {' to '.join(ends)} of the mean of its Gaussian surrogates, and not replaced by it"
-            notes.append(f"{told}. The heights have a kurtosis of {kurtosis:.2g} (3: Gaussian).")
-    if "own_note" in dataset.attrs:
-        notes.append(f"Warning: {dataset.attrs['own_note']}.")
     if dataset.attrs["open"]:
         notes.append("What is open is not in the interval.")
     title = f"{dataset.attrs['title'] or 'untitled'}: {name}"
@@ -106,23 +98,21 @@ def _short(half: float) -> str:
     return "0" if percent < 5e-4 else f"{percent:.2g}" if percent >= 0.01 else "<0.01"
 
 
-#: Errors that are shown, and their headings; so many of them, the first, have room in 80 characters.
-_ERRORS = {
-    "force": "force",
+#: Headings of quantities that are not their names.
+_HEADINGS = {
     "leak_rate": "leak",
     "thermal_conductance": "conductance",
     "incremental_stiffness": "stiffness",
     "friction_coefficient": "friction",
-    "pressure": "pressure",
-    "approach": "approach",
     "contact_area": "area",
     "mean_gap": "gap",
 }
+#: Number of errors that fit into 80 characters.
 _COLUMNS = 4
 
 
 def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
-    """Return cost and errors of every setting, the cheapest setting that is accurate enough, and what was not run.
+    """Return cost and errors of every setting, with a mark for the cheapest one that is accurate enough.
 
     Parameters
     ----------
@@ -133,35 +123,40 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     target : float
         Wanted relative error. [-]
     """
-    shown = dict([one for one in _ERRORS.items() if one[0] in dataset["quantity"]][:_COLUMNS])
+    shown = dataset["quantity"].values[:_COLUMNS].tolist()
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column()
     table.add_column("setting", min_width=18)
-    for heading in ("time", "transf.", *shown.values()):
+    for heading in ("time", "transf.", *(_HEADINGS.get(name, name) for name in shown)):
         table.add_column(heading, justify="right", no_wrap=True)
     best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
-    for i in range(dataset.sizes["setting"]):
+    for i in np.flatnonzero(np.isfinite(dataset["run_time"])):
         row = dataset.isel(setting=i)
-        if not np.isfinite(row["run_time"]):
-            continue
         errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
-        spent, transforms = duration(float(row["run_time"])), f"{float(row['transforms']):.0f}"
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         mark = (">" if i == chosen else "") + ("*" if best[i] else "")
+        spent, transforms = f"{float(row['run_time']):.2g} s", f"{float(row['transforms']):.0f}"
         table.add_row(mark, name, spent, transforms, *errors, style="bold" if i == chosen else "")
-    rows = dataset.attrs.get("rows", "kept times")
-    marks = f"* Pareto-optimal for {WORDS[quantity]}. > Cheapest for {percent(target)}."
-    parts = [table, Text(f"Errors in %, worst of all {rows}. {marks}", style="italic"), Text()]
+    words, wanted = VARIABLES[quantity].label.lower(), f"{_percent(target)} %"
+    marks = f"* Pareto-optimal for {words}. > Cheapest for {wanted}."
+    parts = [table, Text(f"Errors in %, worst of all {dataset.attrs['rows']}. {marks}", style="italic"), Text()]
     parts += [
         Text(f"Not run: {name}: {why}")
         for name, why in zip(dataset["setting"].values, dataset["note"].values, strict=True)
         if why
     ]
-    parts += [Text(f"Reference: {dataset.attrs['reference']}."), Text(choice(dataset, quantity, target))]
-    unsure = float(dataset["reference_grid_uncertainty"].sel(quantity=quantity))
-    if dataset.attrs["grid_is_data"] and np.isfinite(unsure):
-        parts.append(Text(f"Error by the spacing of the points of the scan: about {percent(unsure)}"))
-    return titled(dataset.attrs.get("title"), *parts)
+    unsure = (float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity)) for part in ("time", "grid"))
+    by_steps, by_grid = (f"{_percent(one)} %" if np.isfinite(one) else "unknown" for one in unsure)
+    reference = f"Reference: {dataset.attrs['reference']}. Its error of the {words}: by steps {by_steps}"
+    if dataset.attrs["grid_is_data"]:
+        parts += [Text(f"{reference}."), Text(f"By the spacing of the points of the scan: {by_grid}.")]
+    else:
+        parts.append(Text(f"{reference}, by the grid {by_grid}."))
+    if chosen is None:
+        parts.append(Text(f"No setting is known to have an error of at most {wanted}."))
+    else:
+        parts.append(Text(f"For {wanted} on {words}: {dataset['setting'].values[chosen]}."))
+    return titled(dataset.attrs["title"], *parts)
 
 
 def _percent(part: float) -> str:

@@ -11,8 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.study.trade.ladder import format_tolerance
-from roughvisc.study.trade.recommend import WORDS, main_quantities, pareto_front, uncertainty
+from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.variables import VARIABLES
 from roughvisc.views.figures import style
 
@@ -25,7 +24,7 @@ _GRIDS = {
 
 
 @style.apply
-def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figure:
+def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
     Errors that are smaller than the uncertainty of the reference lie in a grey band. A setting whose error is exactly
@@ -35,10 +34,8 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
     ----------
     dataset : xarray.Dataset
         Of :func:`roughvisc.trade`.
-    quantities : sequence of str, optional
-        One panel for each: ``friction_coefficient``, ``pressure``, ``approach``, ``contact_area``,
-        ``contact_area_counted``, ``mean_gap``, and what the trade holds beside these. Default: contact area and
-        pressure, where something slides friction coefficient and contact area.
+    quantity : str or sequence of str, optional
+        One panel for each. Default: the first two of the trade.
 
     Returns
     -------
@@ -51,12 +48,12 @@ def trade(dataset: xr.Dataset, quantities: Sequence[str] | None = None) -> Figur
     """
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
-    known = main_quantities(dataset)
-    quantities = known[:2] if quantities is None else list(quantities)
-    for name in quantities:
+    known = dataset["quantity"].values.tolist()
+    wanted = known[:2] if quantity is None else [quantity] if isinstance(quantity, str) else list(quantity)
+    for name in wanted:
         if name not in known:
-            raise InputError(key="quantities", found=name, expected=f"some of {', '.join(known)}")
-    shown = [name for name in quantities if np.isfinite(dataset["error"].sel(quantity=name)).any()]
+            raise InputError(key="quantity", found=name, expected=f"some of {', '.join(known)}")
+    shown = [name for name in wanted if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")
     figure = style.new_figure(0.6 + 3.3 * len(shown), 3.7)
@@ -108,7 +105,7 @@ def _draw(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
         low, high = axis.get_view_interval()
         style.plain_log_ticks(axis, fine=high < most * low, most=20)
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
-    ax.set_ylabel(f"Error of {WORDS[quantity]} [%]")
+    ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
     ax.grid(color="0.9", lw=0.5)
 
 

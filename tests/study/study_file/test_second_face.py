@@ -9,8 +9,8 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.study.case import Case, vary
+from roughvisc.study.neighbours import is_data, on_cells
 from roughvisc.study.si_tables import unit_of
-from roughvisc.study.trade.ladder import grid_change, is_data
 from roughvisc.views.report.treatment import treatment
 
 WORKFLOWS = Path(__file__).parents[3] / "workflows"
@@ -79,7 +79,8 @@ def test_second__runs_and_says_so(two, tmp_path):
 
 def test_second__is_data_of_which_a_trade_keeps_the_waves_that_a_coarser_grid_holds(two):
     assert is_data(two)
-    assert grid_change(two, (30, 40), 2.0) == ("surface.resample", [15, 20])
+    shape = two.height().shape
+    assert on_cells(two, two.height(), 2.0).surface["resample"] == [round(n / 2) for n in shape]
     assert unit_of("surface.second.offset") == unit_of("surface.second.radius") == "m"
 
 

@@ -8,9 +8,10 @@ import xarray as xr
 from support import refused
 
 import roughvisc as rv
-from roughvisc.study.budget.budget import budgets
-from roughvisc.study.budget.target import parse_targets
+from roughvisc.study.budget import budgets
 from roughvisc.study.case import Case
+from roughvisc.study.neighbours import Known
+from roughvisc.study.target import parse_targets
 
 BALL = """
 title = "Ball"
@@ -87,7 +88,7 @@ def states(found):
 
 def test_interval__holds_hertz(tmp_path):
     exact = {"contact_area": np.pi * RADIUS**2, "approach": RADIUS**2 / 1e-3, "force": 2e-4}
-    found = budgets(case(BALL, tmp_path), list(exact), out=tmp_path / "budget", workers=0, progress=False)
+    found = budgets(case(BALL, tmp_path), list(exact), Known(), out=tmp_path / "budget", workers=0, progress=False)
     for name, true in exact.items():
         one = found[name]
         assert (one["lower"] <= true * (1 + 1e-12)).all(), name
@@ -139,7 +140,7 @@ def test_missing_waves__count_on_one_side(tmp_path):
     """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
     study, names = case(ROUGH, tmp_path), ["contact_area", "mean_gap"]
     one, two = (
-        budgets(study, names, out=tmp_path / "b", known={"cutoff": cutoff}, workers=0, progress=False)
+        budgets(study, names, Known(cutoff=cutoff), out=tmp_path / "b", workers=0, progress=False)
         for cutoff in ("18 um", "9 um")
     )
     for name, side in (("contact_area", -1), ("mean_gap", 1)):
@@ -182,21 +183,6 @@ def test_sample__is_the_scatter_of_other_patches(tmp_path):
     scatter = np.std(np.log(gaps), ddof=1)
     assert 0.3 < width(ensemble, "sample") / (3.3 * scatter) < 3  # 6 and 12 draws
     assert ensemble["upper"][-1] > patch["upper"][-1]
-
-
-@pytest.mark.thorough
-def test_surface_with_plateaus__is_no_random_phase_surface(tmp_path):
-    """Cut off at its mean, a surface touches over far more area than random surfaces with its spectrum."""
-    rough = rv.self_affine((1e-3, 0.9e-3), (54, 50), hurst=0.8, rms_slope=0.2, rolloff=3e-4, shortcut=8e-5, seed=1)
-    text = ROUGH.replace(ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")], 'file = "scan.x3p"\n')
-    for stands, height in (("inside", rough), ("above", rough.copy(data=np.minimum(rough.values, 0.0)))):
-        folder = tmp_path / stands
-        folder.mkdir()
-        rv.save_scan(height, folder / "scan.x3p")
-        found = stated(case(text, folder), folder, population="ensemble")
-        meanings = found["standing"].attrs["flag_meanings"].split()
-        assert meanings[int(found["standing"][-1])] == stands
-        assert ("own_note" in found.attrs) == (stands == "above")
 
 
 def test_indenter__has_no_sample_and_no_further_waves(tmp_path):

@@ -1,0 +1,244 @@
+"""``budget``: the total uncertainty of a number, by source, from a few more solves of the same case."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.study.case import Case, read_study
+from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
+from roughvisc.study.neighbours import Known, Share, Source, share, solve, sources_of, together, with_rows
+from roughvisc.study.quantities import Array, Observable, quantity_of
+from roughvisc.study.storage.store import open_result, result_path
+from roughvisc.units import Quantity, in_si, quantities
+from roughvisc.variables import VARIABLES
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from roughvisc.study.neighbours import Population
+
+#: Folder of the further solves, in the folder of the results.
+FOLDER = "budget"
+
+
+@quantities(modulus_error="1", time_scale_error="1", cutoff="m")
+def budget(
+    case: Case | str | Path | xr.Dataset,
+    quantity: str | Sequence[str] = "contact_area",
+    *,
+    at: Sequence[Quantity] | Quantity | None = None,
+    modulus_error: Quantity | None = None,
+    time_scale_error: Quantity | None = None,
+    cutoff: Quantity | None = None,
+    population: Population | None = None,
+    out: str | Path | None = None,
+    client: Client | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    r"""Estimate the total uncertainty of a number of a case, by source.
+
+    Parameters
+    ----------
+    case : Case, path or xarray.Dataset
+        A case, its study file, or a result, whose attribute ``case`` contains the case.
+    quantity : str or sequence of str
+        ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate``,
+        ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or
+        what is conducted.
+    at : float, str, or a sequence of these, optional
+        Times or speeds. Default: all that the study keeps. [s] or [m/s]
+    modulus_error, time_scale_error : float or str, optional
+        Relative errors of the moduli of the material and of its times at 95 %: of a measured curve, or from batch to
+        batch. Without them these sources stay open. [-]
+    cutoff : float or str, optional
+        Shortest wavelength of the real surface, where it ends or no longer counts. Without it the waves that the scan
+        does not resolve stay open. [m]
+    population : {"patch", "ensemble"}, optional
+        Whether the number is of this patch, the default, or of the roughness that it is a sample of.
+    out : path, optional
+        Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
+    client, workers
+        As in :func:`roughvisc.sweep`.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``source`` and ``time`` or ``speed``: ``half_width``, of the logarithm at 95 %, missing if a source is
+        open [-]; ``direction``, 1 or -1 of an error that only raises or lowers the number. Over ``source``:
+        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, one of ``counted``, ``none`` (it does
+        not apply) and ``open`` (an input is missing). Over the times or speeds: ``value``, ``lower`` and ``upper``, in
+        the unit of the quantity, and ``case_cost`` [s]. Of several quantities, over ``quantity`` too.
+
+    Raises
+    ------
+    InputError
+        If the input is invalid, the result contains no case, or its case has no such quantity.
+    RoughviscError
+        If a solve fails.
+
+    Notes
+    -----
+    Sources are taken as independent, in logarithms: :math:`Q e^{\pm U}`, :math:`U^2 = \sum U_i^2`; one with a
+    direction counts on that side only. An open source is not counted. A number that is zero, as the leak rate of a
+    closed gap, has no logarithm, and its interval is missing.
+
+    See Also
+    --------
+    roughvisc.audit : what the model leaves out.
+    """
+    found = budgets(
+        case,
+        [quantity] if isinstance(quantity, str) else list(quantity),
+        Known(modulus_error, time_scale_error, cutoff, population),
+        at=at,
+        out=out,
+        client=client,
+        workers=workers,
+        progress=progress,
+    )
+    if isinstance(quantity, str):
+        return found[quantity]
+    names = xr.DataArray(list(found), dims="quantity", name="quantity")
+    over_all = xr.concat(list(found.values()), names, combine_attrs="drop_conflicts")
+    return over_all.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
+
+
+def budgets(
+    case: Case | str | Path | xr.Dataset,
+    names: Sequence[str],
+    known: Known,
+    *,
+    at: Sequence[Quantity] | Quantity | None = None,
+    out: str | Path | None = None,
+    client: Client | None = None,
+    workers: int | None = None,
+    progress: bool = True,
+) -> dict[str, xr.Dataset]:
+    """Return the budget of each of some quantities, from the same solves; see :func:`budget`."""
+    case, finished, folder = case_of(case, out)
+    if not names:
+        raise InputError(key="quantity", found=names, expected="at least one")
+    observed = [quantity_of(case, name) for name in names]
+    axis = case.experiment().axis
+    given = in_si(at, VARIABLES[axis].units, "at")
+    places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
+    base = with_rows(case, [field for one in observed for field in one.fields], places)
+    sources = sources_of(base, base.height(), known)
+    near = [one for source in sources.values() for one in source.neighbours]
+    own = _own_result(case, finished, base, places)
+    todo = [base] if own is None else []
+    watch = partial(watcher, progress)
+    results = solve([*todo, *(one.case for one in near)], folder, watch=watch, client=client, workers=workers)
+    if own is None:
+        own = at_rows(results[base.key], axis, places)
+    results[base.key] = own
+    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
+    seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
+    found = {}
+    for one in observed:
+        values = {key: one.of(result, base) for key, result in rows.items()}
+        stated = one.stated_error(own, values[base.key])
+        shares = {name: share(name, source, one, values, stated) for name, source in sources.items()}
+        found[one.name] = assembled(base, one, sources, shares, values[base.key], own[axis].values, seconds)
+    return found
+
+
+def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path, Path]:
+    """Return the case, the file of its result, and the folder of the further solves."""
+    if not isinstance(case, xr.Dataset):
+        stated = case if isinstance(case, Case) else read_study(case)
+        finished = result_path(result_folder(stated), stated.key)
+    elif "case" in case.attrs:
+        stated = Case.from_json(case.attrs["case"])
+        finished = Path(case.encoding.get("source") or result_path(result_folder(stated), stated.key))
+    else:
+        raise InputError(key="case", found="a result without a case", expected="a result of rv.run, or its study")
+    return stated, finished, Path(out).expanduser() if out is not None else finished.parent / FOLDER
+
+
+def _own_result(case: Case, finished: Path, base: Case, places: list[float] | None) -> xr.Dataset | None:
+    """Return the finished result of the case at some places, if it has all that is needed."""
+    if not set(base.settings.fields) <= set(case.settings.fields) or not is_result_of(case, finished):
+        return None
+    whole, axis = open_result(finished), case.experiment().axis
+    found = at_rows(whole, axis, places)
+    if unconverged(whole) or (places is not None and not np.allclose(found[axis], places, rtol=1e-9, atol=0)):
+        return None
+    return found
+
+
+def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
+    """Return the rows of a result nearest to some places of its axis; all rows if None."""
+    if places is None:
+        return result
+    apart = np.abs(result[axis].values[:, None] - np.asarray(places, dtype=float))
+    return result.isel({axis: apart.argmin(axis=0)})
+
+
+def assembled(
+    case: Case,
+    quantity: Observable,
+    sources: Mapping[str, Source],
+    shares: Mapping[str, Share],
+    value: Array,
+    places: Array,
+    seconds: Mapping[str, float],
+) -> xr.Dataset:
+    """Return the budget of a quantity of a case.
+
+    Parameters
+    ----------
+    case : Case
+    quantity : Observable
+    sources, shares : mapping
+        Name of each source -> the source, and the error of the quantity by it.
+    value, places : ndarray
+        Value of the quantity at each row, and the times [s] or speeds [m/s] of the rows.
+    seconds : mapping
+        Key of each case -> wall time of its solve. [s]
+    """
+    axis, shape = case.experiment().axis, value.shape
+    half_width = [
+        np.where(sources[name].state == "open", math.nan, np.broadcast_to(one.half_width, shape))
+        for name, one in shares.items()
+    ]
+    direction = [np.broadcast_to(one.direction, shape).astype("int8") for one in shares.values()]
+    state, method = ([getattr(one, what) for one in sources.values()] for what in ("state", "method"))
+    cost = [sum(seconds[one.case.key] for one in source.neighbours) for source in sources.values()]
+    with np.errstate(invalid="ignore"):
+        known = np.where(np.abs(value) > 0, value, math.nan)
+    lower, upper = (known * np.exp(side * together(shares.values(), side)) for side in (-1, 1))
+    over, units = ("source", axis), {"units": VARIABLES[quantity.name].units}
+    flags = {"flag_values": np.array([-1, 0, 1], dtype="int8"), "flag_meanings": "lowers both raises"}
+    return xr.Dataset(
+        {
+            "half_width": (over, half_width, {"units": "1", "long_name": "half-width of the logarithm at 95 %"}),
+            "direction": (over, direction, {"long_name": "direction of the error"} | flags),
+            "state": ("source", state, {"long_name": "whether a source counts"}),
+            "method": ("source", method, {"long_name": "how it was found"}),
+            "cost": ("source", cost, {"units": "s", "long_name": "wall time of the solves that it took"}),
+            "value": (axis, value, units | {"long_name": quantity.name.replace("_", " ")}),
+            "lower": (axis, lower, units | {"long_name": "lower bound at 95 %"}),
+            "upper": (axis, upper, units | {"long_name": "upper bound at 95 %"}),
+            "case_cost": ((), seconds[case.key], {"units": "s", "long_name": "wall time of the case itself"}),
+        },
+        coords={"source": list(sources), axis: (axis, places, {"units": VARIABLES[axis].units})},
+        attrs={
+            "quantity": quantity.name,
+            "case": case.to_json(),
+            "title": case.title,
+            "open": "; ".join(name for name, one in sources.items() if one.state == "open"),
+        },
+    )

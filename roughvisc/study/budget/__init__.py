@@ -1,1 +1,0 @@
-"""The whole error of one number, source by source."""

@@ -1,0 +1,372 @@
+"""Neighbours of a case: the case with one thing changed, solved by the ordinary sweep and compared with it.
+
+They show the sources of error of a number :math:`Q`. With other cells, fewer waves, another material or another patch
+its logarithm changes, and the error of a source is a weight times that change: :math:`\\ln Q \\pm U`.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError, RoughviscError
+from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.study.case import Case, vary
+from roughvisc.study.execution.monitor import Monitor
+from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.quantities import Observable, creep_time
+from roughvisc.study.storage.store import open_result, result_path
+from roughvisc.study.study_file import TEMPERATURE
+from roughvisc.topography.cards import FACE_STEPS
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.spectrum import last_octave, modes
+from roughvisc.units import number, unit_for
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+log = logging.getLogger("roughvisc")
+Array = NDArray[np.float64]
+Population = Literal["patch", "ensemble"]
+STEPS, GRID, SAMPLE, OCTAVE = "time steps and solver", "grid", "sample", "next octave of waves"
+MODULUS, TIME_SCALE = "modulus", "time scale"
+#: Recipes that give the same surface on any grid.
+_ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
+#: Relative change of a modulus or a time scale that shows the slope of a number.
+_CHANGE = 1.1
+#: Order with which the error of the grid vanishes.
+ORDER = 1.5
+#: Number of other patches. The mean of all patches lies within so many standard deviations of their logarithms in 95
+#: of 100 cases: Student's factor is 2.57, and the spectrum is that of one patch, whose longest waves scatter too.
+_PATCHES, _SAMPLE_FACTOR = 6, 3.3
+#: Factor by which the wavelength above which 99 % of the slope lie may exceed the shortest wavelength of the spectrum.
+_SAME = 1.15
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# changes
+
+
+def is_data(case: Case) -> bool:
+    """Return whether the grid of the surface is data, so that another grid is another surface."""
+    treated = any(case.surface.get(step, False) is not False for step in (*FACE_STEPS, "second"))
+    return case.surface.get("generate") not in _ANY_GRID or treated
+
+
+def is_sample(case: Case, height: xr.DataArray) -> bool:
+    """Return whether the surface stands for a larger one, so that other patches and shorter waves have a meaning."""
+    return case.settings.boundary != "free" and is_data(case) and bool(np.isfinite(height.values).all())
+
+
+def shortest_wave(height: xr.DataArray) -> float:
+    """Return the wavelength above which 99 % of the mean square slope lie, at least two cells; 0 without slopes. [m]
+
+    The grid resolves waves shorter than two cells along its diagonals only.
+    """
+    level = height.values - float(height.mean())
+    q_x, q_y, power, count = modes(level, spacing(height), "forward")
+    q = np.hypot(q_x, q_y)
+    begins = last_octave(q, count * power * q**2)
+    return max(math.pi / begins, 2 * max(spacing(height))) if begins else 0.0
+
+
+def shape_on(case: Case, height: xr.DataArray, coarsening: float) -> tuple[int, int]:
+    """Return the numbers of cells if each is `coarsening` times as long."""
+    shape = height.sizes["x"], height.sizes["y"]
+    return shape if coarsening == 1 else coarser_shape(shape, coarsening, not is_data(case))
+
+
+def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
+    """Return the case with the same waves on cells `coarsening` times as long.
+
+    A recipe without conditioning is generated on the new grid. Any other surface keeps the waves that the cells
+    resolve; finer cells add none.
+    """
+    if coarsening == 1:
+        return case
+    shape = list(shape_on(case, height, coarsening))
+    if not is_data(case):
+        return vary(case, {"surface.shape": shape})
+    changes: dict[str, Any] = {"surface.resample": [max(2, n) for n in shape]}
+    if coarsening < 1 and case.surface.get("resample"):
+        changes["surface.shortest_wave"] = max(case.surface.get("shortest_wave") or 0.0, 2 * max(spacing(height)))
+    return vary(case, changes)
+
+
+def stiffer(case: Case) -> Case:
+    """Return the case with all moduli larger by a tenth."""
+    return vary(case, {"material.modulus_factor": _CHANGE * case.tables["material"].get("modulus_factor", 1.0)})
+
+
+def slower(case: Case) -> Case:
+    """Return the case with all times of the material longer by a tenth."""
+    changes: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if key in case.tables["material"]}
+    return vary(case, changes | {"material.shift_factor": _CHANGE * case.shift_factor})
+
+
+def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = None) -> Case:
+    """Return a case that keeps these fields, at these places of its axis if given, and no error of the grid."""
+    changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
+    if places is not None and case.experiment().axis == "time":
+        changes["keep.times"] = sorted(set(places))
+    return vary(case, changes)
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# sources of error
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """A case with one thing changed.
+
+    Attributes
+    ----------
+    source : str
+        Source of error that it shows.
+    case : Case
+    weight : float
+        Half-width of the logarithm of a number at 95 %, over the change of the logarithm. [-]
+    against : Case
+        Case that it is compared with.
+    """
+
+    source: str
+    case: Case
+    weight: float
+    against: Case
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of error.
+
+    Attributes
+    ----------
+    method : str
+        How its error is found; the missing input if it is open.
+    neighbours : tuple of Neighbour
+        Solves that show it.
+    state : {"counted", "none", "open"}
+        Whether it is part of the total error: ``none`` if it does not apply, ``open`` if an input is missing.
+    """
+
+    method: str
+    neighbours: tuple[Neighbour, ...] = ()
+    state: Literal["counted", "none", "open"] = "counted"
+
+
+@dataclass(frozen=True)
+class Known:
+    """Errors that the user states.
+
+    Attributes
+    ----------
+    modulus_error, time_scale_error : float or None
+        Relative errors of the moduli and of the times of the material at 95 %. [-]
+    cutoff : float or None
+        Shortest wavelength of the real surface. [m]
+    population : {"patch", "ensemble"}
+        Whether the number is of this patch, or of the roughness that it is a sample of.
+
+    Raises
+    ------
+    InputError
+        If a value is invalid.
+    """
+
+    modulus_error: Any = None
+    time_scale_error: Any = None
+    cutoff: Any = None
+    population: Population | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("modulus_error", "time_scale_error"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, number(value, "1", name, least=0, below=1))
+        if self.cutoff is not None:
+            object.__setattr__(self, "cutoff", number(self.cutoff, "m", "cutoff", above=0))
+        if self.population not in (None, *get_args(Population)):
+            expected = " or ".join(map(repr, get_args(Population)))
+            raise InputError(key="population", found=self.population, expected=expected)
+
+
+def sources_of(
+    base: Case, height: xr.DataArray, known: Known, coarsening: float = 1.0, three_grids: bool = False
+) -> dict[str, Source]:
+    """Return the sources of error of the numbers of a case, by name.
+
+    Parameters
+    ----------
+    base : Case
+        The case as it is solved.
+    height : xarray.DataArray
+        Its surface. [m]
+    known : Known
+        Errors that the user states.
+    coarsening : float
+        Length of the cells over the length of the cells of the case: the sources are those on this grid.
+    three_grids : bool
+        Whether the error of the grid takes a third grid even if the surface is a sample, of which two may agree by
+        chance. Default: the third grid of a sample would be another surface.
+    """
+    sample = is_sample(base, height)
+    own, coarse = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0))
+    grids, words = [Neighbour(GRID, coarse, 1.0, own)], "cells twice as long"
+    if three_grids or not sample:
+        grids.append(Neighbour(GRID, on_cells(base, height, 4 * coarsening), 2**-ORDER, coarse))
+        words = "cells twice and four times as long"
+    # the contact of an indenter has few cells: its material is compared on its own grid
+    compared = coarse if sample else own
+    found = {STEPS: Source("errors that the result states"), GRID: Source(words, tuple(grids))}
+    if not sample:
+        found[SAMPLE] = Source("the surface is the whole body, and no sample", state="none")
+    elif known.population != "ensemble":
+        words = "the number is of this patch; population 'ensemble' asks for its roughness"
+        found[SAMPLE] = Source(words, state="none")
+    else:
+        half = [max(2, round(n / (2 * coarsening))) for n in height.shape]
+        others = (
+            vary(base, {"surface.resample": half, "surface.realisation": number}) for number in range(1, _PATCHES + 1)
+        )
+        patches = tuple(Neighbour(SAMPLE, other, _SAMPLE_FACTOR, coarse) for other in others)
+        found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", patches)
+    found[OCTAVE] = _next_octave(own, height, known, sample)
+    creeps = float(base.material().contact_compliance(creep_time(base.experiment(), 1.0)))
+    for name, what, error, changed in (
+        (MODULUS, "moduli", known.modulus_error, stiffer),
+        (TIME_SCALE, "times of the material", known.time_scale_error, slower),
+    ):
+        if name == TIME_SCALE and creeps <= float(base.material().contact_compliance(0.0)):
+            found[name] = Source("the material does not creep", state="none")
+        elif error is None:
+            key = f"{name.replace(' ', '_')}_error"
+            found[name] = Source(f"state {key}, the relative error of the {what}", state="open")
+        elif error == 0:
+            found[name] = Source(f"{what} are exact")
+        else:
+            weight = math.log1p(error) / math.log(_CHANGE)
+            one = Neighbour(name, changed(compared), weight, compared)
+            found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
+    return found
+
+
+def _next_octave(own: Case, height: xr.DataArray, known: Known, sample: bool) -> Source:
+    """Return the source of the waves that the grid does not resolve."""
+    if not sample:
+        return Source("the surface is no sample of a roughness", state="none")
+    if known.cutoff is None:
+        return Source("state cutoff, the shortest wavelength that the real surface has", state="open")
+    end, shortest = unit_for(known.cutoff, "m").text(known.cutoff, 3), shortest_wave(height)
+    if shortest < _SAME * known.cutoff:
+        return Source(f"the grid holds all waves down to {end}")
+    octaves = math.log2(shortest / known.cutoff)
+    one = Neighbour(OCTAVE, vary(own, {"surface.shortest_wave": 2 * shortest}), octaves, own)
+    return Source(f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held", (one,))
+
+
+@dataclass(frozen=True)
+class Share:
+    """Error of a number by one source.
+
+    Attributes
+    ----------
+    half_width : ndarray
+        Of the logarithm at 95 %, at each row; 0 if the source is not counted. [-]
+    direction : ndarray or int
+        1 or -1 if the error only raises or lowers the number, 0 otherwise.
+    """
+
+    half_width: Array
+    direction: Any = 0
+
+
+def share(name: str, source: Source, quantity: Observable, values: Mapping[str, Array], stated: Array) -> Share:
+    """Return the error of a quantity by a source.
+
+    Parameters
+    ----------
+    name : str
+        Of the source.
+    source : Source
+    quantity : Observable
+    values : mapping
+        Key of each case -> values of the quantity at the rows that are judged.
+    stated : ndarray
+        Error of the logarithm by steps and solver at these rows. [-]
+    """
+    if name == STEPS:
+        return Share(stated)
+    if not source.neighbours:
+        return Share(np.zeros_like(stated))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = {key: np.log(one) for key, one in values.items()}
+        change = [one.weight * (logarithms[one.case.key] - logarithms[one.against.key]) for one in source.neighbours]
+        if name == SAMPLE:
+            return Share(np.std(change, axis=0, ddof=1))
+        half_width = np.max(np.abs(change), axis=0)
+    if name == OCTAVE:
+        return Share(quantity.octave_factor * half_width, np.sign(-np.nan_to_num(change[0])).astype("int8"))
+    return Share(quantity.grid_factor * half_width if name == GRID else half_width)
+
+
+def together(shares: Iterable[Share], side: int) -> Array:
+    """Return the half-width of independent sources together, on the upper (1) or the lower (-1) side. [-]"""
+    squares = [np.where(np.isin(one.direction, (0, side)), one.half_width, 0.0) ** 2 for one in shares]
+    return np.asarray(np.sqrt(np.sum(squares, axis=0)))
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# solves
+
+
+def solve(
+    cases: Iterable[Case],
+    folder: Path,
+    *,
+    watch: Callable[[], Monitor],
+    client: Client | None = None,
+    workers: int | None = 0,
+    threads: int | None = None,
+) -> dict[str, xr.Dataset]:
+    """Return the results of some cases by their keys; results that the folder contains are used again.
+
+    Parameters
+    ----------
+    cases : iterable of Case
+    folder : Path
+        Folder of the results.
+    watch : callable
+        Makes the display of the sweep.
+    client, workers, threads
+        As in :func:`roughvisc.sweep`.
+
+    Raises
+    ------
+    RoughviscError
+        If a case fails.
+    """
+    distinct = {case.key: case for case in cases}
+    outcomes = run_cases(
+        list(distinct.values()),
+        folder,
+        watch=watch(),
+        client=client,
+        workers=workers,
+        threads=threads,
+        retry_failed=True,
+    )
+    for key, outcome in outcomes.items():
+        if outcome.entry is None:
+            raise RoughviscError(f"a neighbouring case failed ({distinct[key].varied}): {outcome.message}")
+        if outcome.kind != "done":
+            log.warning("a neighbouring case (%s): %s: %s", distinct[key].varied, outcome.kind, outcome.message)
+    return {key: open_result(result_path(folder, key)) for key in outcomes}

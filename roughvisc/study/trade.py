@@ -1,0 +1,404 @@
+"""``trade``: one case under several tolerances and grids, each timed and compared with the finest run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError, RoughviscError
+from roughvisc.experiment.coarser import pressure_distance
+from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.loading import Loading
+from roughvisc.labels import label
+from roughvisc.mechanics.grid import transform_library
+from roughvisc.steps import steps_of
+from roughvisc.study.case import Case, read_study, vary
+from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.run import compute, is_result_of, result_folder, unconverged
+from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve
+from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
+from roughvisc.study.storage.store import NETCDF, result_path
+from roughvisc.topography.grid import spacing
+from roughvisc.units import Quantity, number, quantities
+from roughvisc.variables import AXES, RESULT_FORMAT, Variable, axis_of
+
+_RUNS = ("setting",)
+_OFF = "largest possible error, by Richardson extrapolation"
+#: Variables of a trade.
+VARIABLES = {
+    "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
+    "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
+    "tolerance": Variable(_RUNS, "1", "tolerance"),
+    "coarsening": Variable(_RUNS, "1", "length of a cell over that of the study's"),
+    "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
+    "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
+    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result"),
+    "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
+    "steps": Variable(_RUNS, "1", "accepted time steps, or speeds"),
+    "note": Variable(_RUNS, "", "why the setting was not measured; empty if it was", dtype="str"),
+    "error": Variable(
+        ("setting", "quantity"),
+        "1",
+        "relative error against the reference",
+        "the worst over the kept times; pressure: its absolute difference summed (L1) over the largest force; any "
+        "other: over its largest value",
+    ),
+    "reference_time_uncertainty": Variable(("quantity",), "1", "uncertainty of the reference due to time steps", _OFF),
+    "reference_grid_uncertainty": Variable(
+        ("quantity",), "1", "uncertainty of the reference due to the grid", f"{_OFF}; of a scan: what its spacing hides"
+    ),
+}
+#: Folder of the solves and of the table, in the folder of the results.
+FOLDER = "trade"
+#: Quantities that are compared without being requested, the most important first.
+_USUAL = ("friction_coefficient", "contact_area", "pressure", "approach", "mean_gap")
+#: Tolerances on the grid of the study; ``(coarsening, tolerance)`` of further settings.
+_TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
+_COARSER, _FINER = ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)), ((0.5, 1e-3), (0.25, 1e-3))
+#: Fewest cells a side of a coarser grid, and most of a finer one.
+_FEWEST, _MOST = 12, 1024
+#: The sharpest tolerance over the tolerance of the reference.
+_SHARPER = 5.0
+#: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
+_FEW = 9
+#: Wall times within this factor are taken as equal.
+_EQUAL = 1.1
+
+
+@quantities(budget="s")
+def trade(
+    case: Case | str | Path,
+    settings: Sequence[tuple[float, float]] | None = None,
+    *,
+    quantity: str | Sequence[str] = (),
+    budget: Quantity = 300.0,
+    out: str | Path | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Compute one case with several tolerances and grids, and measure cost and error of each.
+
+    Parameters
+    ----------
+    case : Case or path
+        A case, or its study file.
+    settings : sequence of (float, float), optional
+        Tolerances to measure, each with the length of the cells over that of the study's cells. Default: tolerances
+        from 1e-1 to 1e-3, and coarser grids; also finer grids if the surface is a recipe without conditioning. [-]
+    quantity : str or sequence of str
+        Numbers whose errors come first, or are compared on request: ``force``, ``leak_rate``, ``thermal_conductance``
+        or ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or what is conducted.
+    budget : float or str
+        Total wall time of all solves. A setting that would exceed it is not measured, which the result states. [s]
+    out : path, optional
+        Folder of the solves, which are kept and used again, with their times. Default: ``trade`` in the folder of the
+        results.
+    progress : bool
+        Show a progress bar.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along ``setting``: ``run_time``, ``transforms``, ``steps``, and the ``error`` of each ``quantity``. Along
+        ``quantity``: the uncertainty of the reference, ``reference_time_uncertainty`` and
+        ``reference_grid_uncertainty``. The attribute ``reference`` names the reference. ``rv.plot.trade`` draws the
+        result.
+
+    Raises
+    ------
+    InputError
+        If the study is invalid or contains a sweep, has no such quantity, or the time is too short for the reference.
+
+    Notes
+    -----
+    Settings are solved in this process one after the other, from the cheapest to the dearest. The reference is the
+    finest run: it has the finest grid of the settings that the time allows, and a fifth of their smallest tolerance.
+    Its own uncertainty follows from runs with that tolerance, and on grids two and four times coarser, by Richardson
+    extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells. In
+    a slide the profile moves by whole cells. Kept times within it are those at which it has moved by whole cells of
+    every grid, at least the beginning and the end.
+    """
+    if not isinstance(case, Case):
+        case = read_study(case)
+    if not budget > 0:
+        raise InputError(key="budget", found=budget, expected="a positive number of seconds")
+    asked = [quantity] if isinstance(quantity, str) else list(quantity)
+    derived = [quantity_of(case, name) for name in asked if name not in _USUAL or name == "friction_coefficient"]
+    names = list(dict.fromkeys([*asked, *(one for one in _USUAL if one in (*quantities_of(case), "pressure"))]))
+    height = case.height()
+    data, shape = is_data(case), (height.sizes["x"], height.sizes["y"])
+    rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
+    if not rungs:
+        raise InputError(key="settings", found=rungs, expected="at least one tolerance and grid")
+    for tolerance, grid in rungs:
+        number(tolerance, "1", "settings", above=0, below=1)
+        number(grid, "1", "settings", above=0)
+        if data and grid < 1:
+            raise InputError(
+                key="settings", found=(tolerance, grid), expected="cells at least as long as those of the scan"
+            )
+    finest = [1.0] if data else sorted({grid for _, grid in rungs if grid <= max(1.0, min(grid for _, grid in rungs))})
+    sharpest = min(tolerance for tolerance, _ in rungs)
+    wanted = {(sharpest / _SHARPER, part * grid) for grid in finest for part in (1.0, 2.0, 4.0)}
+    wanted |= {*rungs, *((sharpest, grid) for grid in finest)}
+    fields = [*case.settings.fields, *(field for one in derived for field in one.fields), "pressure"]
+    base = _with_common_rows(case, height, fields, {grid for _, grid in wanted})
+    folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
+
+    # work, in units of its own: the number of steps follows the root of the tolerance, iterations hardly change
+    power, spent, rate = (0.5 if base.experiment().axis == "time" else 0.1), 0.0, 0.0
+    work = {one: one[0] ** -power / one[1] ** 2 for one in wanted}
+    results: dict[tuple[float, float], xr.Dataset] = {}
+    notes: dict[tuple[float, float], str] = {}
+    for one in sorted(wanted, key=work.__getitem__):
+        changed = on_cells(vary(base, {"solve.tolerance": one[0]}), height, one[1])
+        if (expected := work[one] * rate) > budget - spent:
+            notes[one] = f"would take about {expected:.2g} s, {budget - spent:.0f} s are left of the budget"
+            continue
+        if not results and not is_result_of(changed, result_path(folder, changed.key)):
+            compute(changed, progress=False)  # the first solve of a process takes longer
+        try:
+            (result,) = solve([changed], folder, watch=partial(watcher, progress, summary=False)).values()
+        except RoughviscError as error:
+            notes[one] = str(error).removeprefix(f"{case.origin}: ")
+            continue
+        if complaint := unconverged(result):
+            notes[one] = complaint
+            continue
+        seconds = float(result["wall_time"].values[-1])
+        spent, rate = spent + seconds, seconds / work[one]
+        values = {
+            name: (axis_of(result.dims), QUANTITIES[name].of(result, base)) for name in names if name != "pressure"
+        }
+        results[one] = result.assign(values)
+    candidates = [(sharpest / _SHARPER, grid) for grid in finest]
+    reference = next((one for one in candidates if one in results), None)
+    if reference is None:
+        where = f"{case.origin}: " if case.origin else ""
+        raise InputError(f"{where}the reference run: {notes[candidates[-1]]}: expected a larger budget, or fewer cells")
+    return _compared(base, height, rungs, names, results, notes, reference)
+
+
+def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
+    """Return the settings that are measured by default."""
+    rungs = [(tolerance, 1.0) for tolerance in _TOLERANCES]
+    rungs += [(tolerance, grid) for grid, tolerance in _COARSER if min(shape) / grid >= _FEWEST]
+    return rungs if data else rungs + [(one, grid) for grid, one in _FINER if max(shape) / grid <= _MOST]
+
+
+def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], grids: set[float]) -> Case:
+    """Return the case with these fields, and rows that all settings have in common."""
+    changes: dict[str, Any] = {"solve.grid_error": False, "solve.boundary": case.settings.boundary}
+    changes["keep.fields"] = list(dict.fromkeys(fields))
+    experiment = case.experiment()
+    if isinstance(experiment, Loading):
+        times = case.settings.times or _FEW
+        if experiment.program.slides:
+            shapes = [shape_on(case, height, grid) for grid in grids]
+            sides = np.array(spacing(height)) * height.shape / np.array(shapes)
+            times = kept_times(experiment.program, times, *map(tuple, sides)) or "all"
+        changes["keep.times"] = list(times) if isinstance(times, tuple) else times
+    return vary(case, changes)
+
+
+def _compared(
+    case: Case,
+    height: xr.DataArray,
+    rungs: Sequence[tuple[float, float]],
+    names: Sequence[str],
+    results: dict[tuple[float, float], xr.Dataset],
+    notes: dict[tuple[float, float], str],
+    reference: tuple[float, float],
+) -> xr.Dataset:
+    """Return the cost and the errors of the settings that were solved."""
+    sharp, finest = reference
+    wanted, missing = results[reference], np.full(len(names), math.nan)
+
+    def apart(one: tuple[float, float], other: tuple[float, float]) -> NDArray[np.float64]:
+        return _differences(results[one], results[other], names) if {one, other} <= results.keys() else missing
+
+    second, third = ((sharp, part * finest) for part in (2.0, 4.0))
+    ratio = math.sqrt(wanted["x"].size * wanted["y"].size)
+    ratio /= math.sqrt(math.prod(results[second].sizes[side] for side in ("x", "y"))) if second in results else 1.0
+    near, far = apart(second, reference), apart(third, second)
+    moving = "friction_coefficient" in names
+    # the error follows the tolerance, unevenly: hence the larger safety factor
+    unsure = TWO_GRIDS * apart((sharp * _SHARPER, finest), reference) / (_SHARPER - 1)
+    rows, axis = [], axis_of(wanted.dims)
+    shapes = [shape_on(case, height, grid) for _, grid in rungs]
+    for one in rungs:
+        row: dict[str, Any] = {"run_time": math.nan, "transforms": math.nan, "steps": math.nan, "error": missing}
+        row["note"] = notes.get(one, "")
+        if one in results and one[1] < finest:
+            row["note"] = "finer than the reference, for which there is no time"
+        elif one in results:
+            found, error = results[one], apart(one, reference)
+            if np.isnan(error).all():
+                row["note"] = f"its {AXES[axis].rows} differ from those of the reference"
+            else:
+                steps = steps_of(found)
+                row["run_time"] = float(found["wall_time"][-1])
+                row["transforms"] = float(found["convolutions"].sum())
+                row["steps"] = found.sizes[axis] if steps is None else steps.sizes["step"]
+                row["error"] = error
+        rows.append(row)
+    coords = {
+        "setting": [_label(*one, shape) for one, shape in zip(rungs, shapes, strict=True)],
+        "quantity": list(names),
+        "tolerance": ("setting", [one for one, _ in rungs]),
+        "coarsening": ("setting", [grid for _, grid in rungs]),
+        "cells_x": ("setting", [nx for nx, _ in shapes]),
+        "cells_y": ("setting", [ny for _, ny in shapes]),
+    }
+    variables: dict[str, Any] = {
+        name: (("setting", "quantity")[: np.ndim(rows[0][name]) + 1], np.array([row[name] for row in rows]))
+        for name in rows[0]
+    }
+    variables["reference_time_uncertainty"] = ("quantity", unsure)
+    variables["reference_grid_uncertainty"] = (
+        "quantity",
+        [
+            float(grid_uncertainty(name, one, other, ratio, moving=moving))
+            for name, one, other in zip(names, near, far, strict=True)
+        ],
+    )
+    attributes = {
+        "Conventions": "CF-1.11",
+        "result_format": RESULT_FORMAT,
+        "title": case.title,
+        "source": f"roughvisc {metadata.version('roughvisc')}",
+        "comment": "One case computed under many settings, each timed and compared with 'reference'; attribute 'case' "
+        "states it (JSON, SI units).",
+        "case": case.to_json(),
+        "reference": f"finest run: {_label(*reference, shape_on(case, height, finest))}",
+        "grid_is_data": int(is_data(case)),
+        "rows": AXES[axis].rows,
+        "transforms": transform_library(),
+    }
+    return label(xr.Dataset(variables, coords), VARIABLES).assign_attrs(attributes)
+
+
+def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
+    """Return the differences of some quantities: the worst of the rows, over the largest value of the second result.
+
+    For the pressure it is the absolute difference summed (L1) over the largest force. It is missing if the rows are at
+    other times. A quantity that is missing in both results, such as the friction before the load, is equal there.
+    """
+    rows = axis_of(wanted.dims)
+    if found[rows].shape != wanted[rows].shape or not np.allclose(found[rows], wanted[rows], rtol=1e-9, atol=0):
+        return np.full(len(names), math.nan)
+    errors = []
+    for name in names:
+        if name == "pressure":
+            error, largest = pressure_distance(found, wanted), float(wanted["force"].max())
+        else:
+            one, other = found[name].values, wanted[name].values
+            error = np.abs(np.where(np.isnan(one) & np.isnan(other), 0.0, one - other))
+            largest = float(np.fmax.reduce(np.abs(other), initial=0.0))
+        errors.append(float(error.max()) / largest if largest else math.nan)
+    return np.array(errors)
+
+
+def format_tolerance(value: float) -> str:
+    """Return a tolerance as a study file states it.
+
+    Examples
+    --------
+    >>> [format_tolerance(one) for one in (0.03, 1e-3, 0.25)]
+    ['3e-2', '1e-3', '2.5e-1']
+    """
+    digits, power = f"{value:.1e}".split("e")
+    return f"{digits.removesuffix('.0')}e{int(power)}"
+
+
+def _label(tolerance: float, coarsening: float, shape: tuple[int, int]) -> str:
+    grid = "" if coarsening == 1 else f", {shape[0]} x {shape[1]} cells"
+    return f"tolerance = {format_tolerance(tolerance)}{grid}"
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# choice
+
+
+def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
+    """Return the Pareto front: settings that no other one beats in wall time without being beaten in accuracy.
+
+    Errors count to two digits.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`trade`.
+    quantity : str
+        Quantity whose error counts.
+    """
+    spent, wrong = dataset["run_time"].values, dataset["error"].sel(quantity=quantity).values
+    known = np.isfinite(spent) & np.isfinite(wrong)
+    wrong = np.array([float(f"{value:.1e}") for value in wrong])
+    best = np.zeros(len(spent), dtype=bool)
+    for i in np.flatnonzero(known):
+        no_worse = known & (spent <= spent[i]) & (wrong <= wrong[i])
+        better = no_worse & ((spent < spent[i]) | (wrong < wrong[i]))
+        best[i] = not better.any()
+    return best
+
+
+def uncertainty(dataset: xr.Dataset, quantity: str) -> float:
+    """Return the possible error of the reference; for a scan, on the grid of the scan. [-]"""
+    parts = ("time",) if dataset.attrs.get("grid_is_data") else ("time", "grid")
+    return float(sum(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity) for part in parts))
+
+
+def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
+    """Return the index of the fastest setting whose error is at most ``target``; None if there is none.
+
+    The error of a setting is the largest of its own and of all sharper tolerances on the same grid, so that a chance
+    agreement does not count, plus the uncertainty of the reference. Another grid than the scan's is another surface,
+    and not chosen. Among settings of nearly equal times, the first is chosen.
+    """
+    error, spent = dataset["error"].sel(quantity=quantity).values, dataset["run_time"].values
+    tolerance, coarsening = dataset["tolerance"].values, dataset["coarsening"].values
+    accurate = np.isfinite(error)
+    for i in np.flatnonzero(accurate):
+        sharper = (coarsening == coarsening[i]) & (tolerance <= tolerance[i])
+        accurate[i] = np.nanmax(error[sharper]) + uncertainty(dataset, quantity) <= target
+    if dataset.attrs.get("grid_is_data"):
+        accurate &= coarsening == 1
+    if not accurate.any():
+        return None
+    return int(np.flatnonzero(accurate & (spent <= _EQUAL * spent[accurate].min()))[0])
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# files
+
+
+def open_trade(path: str | Path) -> xr.Dataset:
+    """Open the file that ``roughvisc trade`` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file is absent or is something else.
+    """
+    if not is_trade(path):
+        raise InputError(key=str(path), found="no trade", expected="a file that roughvisc trade wrote (.nc)")
+    with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
+        return file.load()
+
+
+def is_trade(path: str | Path) -> bool:
+    """Return whether a file is one that ``roughvisc trade`` wrote."""
+    try:
+        with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
+            return "run_time" in file and "quantity" in file.dims
+    except (OSError, ValueError, RuntimeError):
+        return False

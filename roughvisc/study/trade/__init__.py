@@ -1,1 +1,0 @@
-"""Cost and error of one case under several tolerances and grids."""
