@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -113,11 +113,14 @@ def slower(case: Case) -> Case:
 
 
 def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = None) -> Case:
-    """Return a case that keeps these fields, at these places of its axis if given, and no error of the grid."""
+    """Return a case that keeps these fields, at these places of its axis if given, and no error of the grid.
+
+    They are not named among the values that vary, and so not in the title of the result.
+    """
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
     if places is not None and case.experiment().axis == "time":
         changes["keep.times"] = sorted(set(places))
-    return vary(case, changes)
+    return replace(vary(case, changes), varied=case.varied)
 
 
 # ----------------------------------------------------------------------------------------------------------------

@@ -208,7 +208,8 @@ def choose(
         tolerance = min(tolerance, case.settings.tolerance)
     level, grid = _coarsest(case, height), None
     while True:
-        base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
+        if (rounded := float(f"{tolerance:.2g}")) != base.settings.tolerance:
+            base = vary(base, {"solve.tolerance": rounded})
         found = _Grid.solved(base, height, known, level, observed, grid, solved)
         tell(f"{found.cells}: {found.in_words(targets)}")
         steps = max(found.error(name, [STEPS]) / math.log1p(part) for name, part in targets.items())
@@ -223,7 +224,7 @@ def choose(
         if level == _FINEST or (level == _FINEST + 1 and grid.next_misses(targets)):
             raise grid.refusal(case, targets, list(grid.sources), f"with {grid.cells}")
         level -= 1
-    chosen = grid.case_of(case)
+    chosen = grid.own
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
@@ -383,13 +384,6 @@ class _Grid:
             lines += [f"  {one}: open: {now.method}" for one, now in self.sources.items() if now.state == "open"]
         named = f"{case.origin}: " if case.origin else ""
         return InputError("\n".join([f"{named}{lines[0]}", *lines[1:]]), key=first, found=targets[first])
-
-    def case_of(self, case: Case) -> Case:
-        """Return the case on this grid, as a change of a case that does not name what the solves keep."""
-        hidden = {"keep.fields", "solve.grid_error"} - case.varied.keys()
-        if self.own.settings.tolerance == case.settings.tolerance:
-            hidden |= {"solve.tolerance"} - case.varied.keys()
-        return replace(self.own, varied={key: one for key, one in self.own.varied.items() if key not in hidden})
 
     def budget(self, quantity: str, chosen: Case) -> xr.Dataset:
         """Return the budget of a quantity."""
