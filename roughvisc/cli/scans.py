@@ -31,6 +31,9 @@ _READING = (
     click.option("--unit", help="Unit of length, if the file states none: um."),
     click.option("--height-unit", help="Unit of the heights, if it is another."),
     click.option("--spacing", type=_Sides(), help="Distance between points, if the file states none: 1um, or 1um,2um."),
+    click.option("--grid", type=QUANTITY, help="Side of the cells into which points x, y, z are sorted: 2um."),
+    click.option("--no-data", type=float, help="Number in the file that stands for a missing point: -9999."),
+    click.option("--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."),
     click.option("--channel", help="Name or number of the channel. [default: the height]"),
     click.option("--format", help="Format, if the suffix does not tell it; auto: detect it."),
 )
@@ -59,7 +62,8 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
     if (options["channel"] or "").isdecimal():
         options["channel"] = int(options["channel"])
     while True:
-        options["spacing"] = in_si(options["spacing"], "m", "spacing")
+        for key in ("spacing", "grid"):
+            options[key] = in_si(options[key], "m", key)
         try:
             return open_scan(file, **options)
         except InputError as error:

@@ -31,6 +31,9 @@ class RoughviscBackend(BackendEntrypoint):
         "unit",
         "height_unit",
         "spacing",
+        "grid",
+        "no_data",
+        "height_scale",
     )
 
     def open_dataset(
@@ -38,11 +41,7 @@ class RoughviscBackend(BackendEntrypoint):
         filename_or_obj: Any,
         *,
         drop_variables: str | Iterable[str] | None = None,
-        format: str | None = None,
-        channel: int | str | None = None,
-        unit: str | None = None,
-        height_unit: str | None = None,
-        spacing: float | tuple[float, float] | None = None,
+        **options: Any,
     ) -> xr.Dataset:
         """Read a scan, as :func:`roughvisc.open_scan` does.
 
@@ -52,7 +51,7 @@ class RoughviscBackend(BackendEntrypoint):
             As :func:`roughvisc.open_scan` takes it.
         drop_variables : str or iterable of str, optional
             Variables to leave out.
-        format, channel, unit, height_unit, spacing : optional
+        **options
             As for :func:`roughvisc.open_scan`.
 
         Returns
@@ -67,7 +66,6 @@ class RoughviscBackend(BackendEntrypoint):
         """
         from roughvisc.topography.scans import open_scan
 
-        options = {"format": format, "channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
         dataset = open_scan(filename_or_obj, **options).to_dataset(name="height")
         dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
         return dataset.drop_vars(dropped, errors="ignore")

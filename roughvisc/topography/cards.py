@@ -19,7 +19,7 @@ from roughvisc.arguments import a_table, call, check, dotted, located, one_of, r
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography import conditioning
-from roughvisc.topography.readers import existing, read_file, sha256
+from roughvisc.topography.readers import Reading, existing, read_file, sha256
 from roughvisc.topography.surrogates import surrogate
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES
 from roughvisc.units import in_si
@@ -60,7 +60,7 @@ FACE_STEPS = ("crop", "rotate90", "invert", "level", "outliers", "fill", "filter
 _KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")
 #: Keys of a card that change no height.
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
-_FILE = ("file", "sha256", "format", "channel", "unit", "height_unit", "spacing")
+_FILE = ("file", "sha256", "format", "channel", *Reading._fields)
 
 
 def is_card(path: Path, format: str | None) -> bool:
@@ -288,9 +288,8 @@ def _scan(card: Mapping[str, Any], folder: Path) -> xr.DataArray:
         raise InputError(
             f"the checksum of {path.name} is {found}, sha256 says {card['sha256']}: the file was changed or damaged"
         )
-    options = {key: card[key] for key in ("format", "channel", "unit", "height_unit") if key in card}
-    if "spacing" in card:
-        options["spacing"] = in_si(card["spacing"], "m", "spacing")
+    options = {key: card[key] for key in ("format", "channel", *Reading._fields) if key in card}
+    options |= {key: in_si(card[key], "m", key) for key in ("spacing", "grid") if key in card}
     if is_card(path, options.get("format")):
         return open_card(path, **{key: value for key, value in options.items() if key != "format"})
     return read_file(existing(path), **options)

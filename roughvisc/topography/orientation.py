@@ -9,6 +9,7 @@ _TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
     "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
     "di": _GWYDDION,
+    "esri": "verified: the definition of the format, whose first row is the top one",
     "ezd": _GWYDDION,
     "frt": _GWYDDION,
     "gwy": "Gwyddion's own format, whose first line is the top one; by no feature in a real file",
@@ -22,6 +23,7 @@ _TOP_FIRST = {
 }
 #: Formats that say themselves which way y goes.
 _STATED = {
+    "wyko": "each line is a column of the map from the bottom up, as Gwyddion reads it; by no feature in a real file",
     "nc": "verified: the coordinates in the file",
     "xyz": "verified: the coordinates in the file",
 }

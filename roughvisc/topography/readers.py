@@ -1,7 +1,6 @@
-"""Readers: an instrument file or a grid file becomes a labelled height grid.
+"""Scan files as labelled height grids: units, missing values, orientation and plausibility are decided here.
 
-The libraries parse; here is dispatch, labelling and checking. Whatever goes wrong is one
-:class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.
+Every problem is one :class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.
 """
 
 from __future__ import annotations
@@ -14,69 +13,232 @@ import warnings
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography import gridfiles, instruments
-from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair
+from roughvisc.topography.formats.registry import Channel, ScanFile, brief, forget, open_file, suffixes
+from roughvisc.topography.grid import checked, in_metres, labelled, noted, number, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.topography.instruments import Channel, Opened, Raw, brief, forget
-from roughvisc.topography.orientation import orientation
+from roughvisc.topography.orientation import orientation, top_line_first
+from roughvisc.topography.points import gridded, lattice
 from roughvisc.units import Quantity, quantities, quantity
 
-#: No scan is wider, no spacing finer, no height in a file further from zero. [m] Scans of 150 mm exist; absolute
-#: heights of 76 mm too.
+#: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
+#: of 76 mm too.
 WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
-#: Points from which heights are judged.
+#: Fewest points whose heights are judged.
 _FEWEST = 16
-#: No height in an array is further from zero: beyond, numbers stand for missing points. [m]
+#: Beyond this distance from zero, heights of an array stand for missing points. [m]
 FARTHEST = 1e3
-#: What to give if a file lacks it: the name is that of the argument, the option and the key.
-_UNIT, _SPACING = 'expected unit, such as "um"', 'expected spacing, such as "1 um"'
-_UNITS = f"{_UNIT}, and height_unit if heights have another"
+#: A number stands for missing points if it is the extreme of the heights, occurs at least so often, and is further from
+#: the next height than so many times the range of all others.
+_REPEATED, _FAR = 4, 10.0
 _READER = threading.RLock()
-#: Format of the grid files that are read through xarray.
-_GRID = "nc"
+
+
+class Reading(NamedTuple):
+    """How a user wants a file to be read.
+
+    Attributes
+    ----------
+    unit, height_unit : str or None
+        Unit of length where the file states none; of the heights if it differs.
+    spacing : tuple of float or None
+        Cell sides. [m]
+    grid : float or None
+        Side of the cells into which points are sorted. [m]
+    no_data : float or None
+        Number that stands for a missing height in the file.
+    height_scale : float or None
+        Factor of the heights.
+    """
+
+    unit: str | None = None
+    height_unit: str | None = None
+    spacing: Any = None
+    grid: Any = None
+    no_data: float | None = None
+    height_scale: float | None = None
 
 
 def read_file(
-    path: Path,
-    *,
-    format: str | None = None,
-    channel: int | str | None = None,
-    unit: str | None = None,
-    height_unit: str | None = None,
-    spacing: float | tuple[float, float] | None = None,
+    path: Path, *, format: str | None = None, channel: int | str | None = None, **options: Any
 ) -> xr.DataArray:
-    """Grid of an instrument or grid file; the options are those of :func:`roughvisc.open_scan`."""
-    given = {"unit": unit, "height_unit": height_unit}
-    lateral, vertical = (None if one is None else quantity(f"1 {one}", "m", key) for key, one in given.items())
-    sides = None if spacing is None else pair("spacing", spacing)
-    with _reading(path), closing(_opened(path, format)) as opened:
-        chosen = _chosen(opened, channel)
-        _refuse_another_unit(chosen, lateral, vertical)
-        if opened.format == _GRID:
-            h = checked(gridfiles.open_grid(path, chosen, lateral, vertical, sides), "grid")
-        else:
-            h = _labelled(opened.load(chosen), chosen.unit, lateral, vertical, sides)
-    for complaint in opened.complaints:
+    """Read one channel of an instrument or grid file; the options are those of :func:`roughvisc.open_scan`."""
+    how = _valid(Reading(**options))
+    with _reading(path), closing(open_file(path, format)) as file:
+        chosen = _chosen(file, channel)
+        h = _in_metres(file, chosen, how)
+    for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     _plausible(h, path)
-    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": opened.format, "channel": chosen.name}
-    others = [other.name for other in opened.channels if other.index != chosen.index]
-    attrs["orientation"] = orientation(opened.format)
-    attrs |= {"instrument": opened.instrument} if opened.instrument else {}
+    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
+    others = [other.name for other in file.channels if other is not chosen]
+    attrs["orientation"] = orientation(file.format)
+    attrs |= {"instrument": file.instrument} if file.instrument else {}
     attrs |= {"other_channels": ", ".join(others)} if others else {}
-    how = f", spacing {sides[0]:.6g} x {sides[1]:.6g} m as given" if sides else ""
-    how += "".join(f", {key} {one} as given" for key, one in given.items() if one)
-    h = noted(h, f"read {path.name} ({opened.format}), channel {chosen.name!r}{how}", **attrs)
+    given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
+    stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
+    h = noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
     finite(h, str(path))
     _low_enough(h, path)
     return h
+
+
+def _valid(how: Reading) -> Reading:
+    """Return the options with numbers in SI, after a check."""
+    for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
+        if unit is not None:
+            quantity(f"1 {unit}", "m", key)
+    if how.no_data is not None:
+        number("no_data", how.no_data, "-", low=-math.inf)
+    if how.height_scale is not None:
+        number("height_scale", how.height_scale, "-")
+    sides = None if how.spacing is None else pair("spacing", how.spacing)
+    return how._replace(spacing=sides, grid=None if how.grid is None else number("grid", how.grid, "m"))
+
+
+def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
+    """Return the heights of a channel over x and y. [m]"""
+    xy, z = _metres(channel, how)
+    raw = channel.load()
+    sides, spacing = channel.spacing, how.spacing
+    if channel.kind == "points":
+        raw, sides = _of_points(raw, xy, how, file.complaints)
+    elif how.grid is not None:
+        raise InputError("it holds a grid, not points: expected no grid", key="grid", found=how.grid)
+    values = np.asarray(raw.values if isinstance(raw, xr.DataArray) else raw, dtype=float)
+    values = _without_no_data(values, how.no_data, file.complaints)
+    values = values if z == 1.0 else values * z
+    values = values if how.height_scale is None else values * how.height_scale
+    if top_line_first(file.format):
+        values = values[:, ::-1]
+    if channel.positions is None or spacing is not None:
+        spacing = spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
+        if not all(math.isfinite(d) and d > 0 for d in spacing):
+            raise InputError('it states no size: expected spacing, such as "1 um"', key="spacing")
+        h = labelled(values, spacing)
+    else:
+        h = with_coordinates(values, *(at * xy for at in channel.positions))
+    if isinstance(raw, xr.DataArray):  # keep what a grid file states beside heights and coordinates
+        masks = {
+            name: one for name, one in raw.coords.items() if name not in ("x", "y") and set(one.dims) == {"x", "y"}
+        }
+        h = h.assign_coords({name: (("x", "y"), one.transpose("x", "y").values) for name, one in masks.items()})
+        h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
+    for axis in ("x", "y"):
+        if h.sizes[axis] > 1 and h[axis][0] > h[axis][-1]:
+            h = h.isel({axis: slice(None, None, -1)})
+    return checked(h, "grid", least=1)
+
+
+def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
+    """Return the metres in one unit of x and y, and of the heights: as the file states them, or else as given."""
+    stated = {
+        unit: quantity(f"1 {unit}", "m", "the unit in the file")
+        for unit in (channel.unit, channel.lateral_unit)
+        if unit
+    }
+    sized = channel.spacing is not None or channel.positions is not None or channel.kind == "points"
+    open_xy = sized and channel.lateral_unit is None and how.spacing is None
+    open_z = channel.unit is None
+    for key, given, serves in (
+        ("unit", how.unit, open_xy or (open_z and how.height_unit is None)),
+        ("height_unit", how.height_unit, open_z),
+    ):
+        for unit, metres in stated.items() if given is not None and not serves else ():
+            if not math.isclose(metres, quantity(f"1 {given}", "m")):
+                scale = f"{quantity(f'1 {given}', 'm') / metres:.6g}"
+                hint = f"; height_scale = {scale} if its numbers are in {given}" if channel.unit else ""
+                raise InputError(
+                    f"it states its unit as {unit!r}: expected no {key}{hint}", key=key, found=given, expected="none"
+                )
+    lacks = ["unit of its heights"] if open_z and how.unit is how.height_unit is None else []
+    lacks += ["unit of x and y"] if open_xy and how.unit is None else []
+    expected = ['unit, such as "um"'] if lacks else []
+    if not sized and how.spacing is None:
+        lacks.append("size")
+        expected.append('spacing, such as "1 um"')
+    if lacks:
+        key = expected[0].partition(",")[0]
+        text = f"it states no {' and no '.join(lacks)}: expected {', and '.join(expected)}"
+        both = ", and height_unit if heights have another" if len(lacks) == 2 and sized else ""
+        raise InputError(text + both, key=key, expected=f"{expected[0]}")
+    given = quantity(f"1 {how.unit}", "m") if how.unit else 1.0
+    z = stated[channel.unit] if channel.unit else quantity(f"1 {how.height_unit or how.unit}", "m")
+    return stated[channel.lateral_unit] if channel.lateral_unit else given, z
+
+
+def _of_points(
+    points: np.ndarray, metres: float, how: Reading, complaints: list[str]
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """Return heights and cell sides of points, in the unit of the file."""
+    spread = np.ptp(points[:, :2], axis=0)
+    if not spread.all():
+        raise InputError("its points lie on one line, a profile: expected an areal scan")
+    if how.grid is not None:
+        side = how.grid / metres
+        heights, empty = gridded(points, side)
+        if empty:
+            complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
+        return heights, (side, side)
+    found = lattice(points)
+    if found is None:
+        side = 2 * metres * math.sqrt(spread[0] * spread[1] / len(points))
+        raise InputError(
+            f'its {len(points)} points lie on no regular lattice: expected grid, such as "{side * 1e6:.2g} um"',
+            key="grid",
+            expected="the side of the cells into which the points are sorted",
+        )
+    return found
+
+
+def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
+    """Return heights with NaN where a number stands for a missing point: the given one, or one that is out of range."""
+    if no_data is not None:
+        return np.where(np.isclose(values, no_data, rtol=1e-6, atol=0.0), np.nan, values)
+    if values.size < _FEWEST:
+        return values
+    for extreme in (np.fmin, np.fmax):
+        number = extreme.reduce(values, axis=None)
+        marked = values == number
+        count, rest = int(marked.sum()), values[np.isfinite(values) & ~marked]
+        spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
+        if count >= _REPEATED and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
+            values = np.where(marked, np.nan, values)
+            complaints.append(
+                f"{count} points have the height {number:g} and all others lie within {rest.min():g} to "
+                f"{rest.max():g}: taken as missing; no_data = {number:g} states so"
+            )
+    return values
+
+
+def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
+    named = [f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels)]
+    if channel is None:
+        heights = [c for c in file.channels if c.is_height]
+        default = [c for c in heights if file.default is not None and c is file.channels[file.default]]
+        if not heights:
+            kinds = {c.kind for c in file.channels} or {"no areal height"}
+            raise InputError(
+                f"it holds {' and '.join(sorted(kinds))} (channels {', '.join(named) or 'none'}): expected heights "
+                "over x and y"
+            )
+        return (default + heights)[0]
+    for i, c in enumerate(file.channels):
+        if channel == c.name or (isinstance(channel, int) and channel == i):
+            if not c.is_height:
+                raise InputError(
+                    f"channel {channel!r} holds {c.kind}: expected another of {', '.join(named)}",
+                    key="channel",
+                    found=channel,
+                )
+            return c
+    raise InputError(key="channel", found=channel, expected=f"one of {', '.join(named)}")
 
 
 @quantities(spacing="m")
@@ -123,7 +285,7 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     Returns
     -------
     tuple of Channel
-        Index, name, whether it is a height, shape (nx, ny) and unit of each channel.
+        Name, whether it is a height, shape (nx, ny) and unit of each channel.
 
     Raises
     ------
@@ -131,12 +293,12 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
         If the file is absent, damaged or of an unknown format.
     """
     path = existing(path)
-    with _reading(path), closing(_opened(path, format)) as opened:
-        return opened.channels
+    with _reading(path), closing(open_file(path, format)) as file:
+        return tuple(file.channels)
 
 
 def supported_formats() -> dict[str, tuple[str, ...]]:
-    """Names of all formats, for ``format=``, with their usual suffixes.
+    """Return the names of all formats, for ``format=``, with their usual suffixes.
 
     Returns
     -------
@@ -145,7 +307,7 @@ def supported_formats() -> dict[str, tuple[str, ...]]:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the library's imports
-        return dict(sorted(instruments.suffixes().items()))
+        return dict(sorted(suffixes().items()))
 
 
 def sha256(path: Path) -> str:
@@ -156,93 +318,6 @@ def sha256(path: Path) -> str:
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _opened(path: Path, format: str | None) -> Opened:
-    """Header of an instrument file or of a grid file, which is not left open."""
-    if _is_grid(path, format):
-        return Opened(_GRID, gridfiles.grid_channels(path))
-    return instruments.open_instrument(path, format)
-
-
-def _labelled(
-    raw: Raw, stated: str | None, lateral: float | None, vertical: float | None, sides: tuple[float, float] | None
-) -> xr.DataArray:
-    """Grid of one channel of an instrument file. [m]
-
-    Parameters
-    ----------
-    raw : Raw
-        What is in the file.
-    stated : str or None
-        Unit of the channel.
-    lateral, vertical : float or None
-        Metres in the unit that a user gives for x and y, and in another one for heights.
-    sides : tuple of float or None
-        Cell sides that a user gives. [m]
-    """
-    no_size, known = raw.sides is None and sides is None, raw.units is not None
-    if stated is not None:
-        unit = quantity(f"1 {stated}", "m", "the unit in the file")
-    elif lateral is None and vertical is None:
-        if no_size:
-            text = f"it states no unit of its heights and no size: {_UNIT}, and {_SPACING[9:]}"
-            raise InputError(text, key="unit", expected=_UNIT)
-        if sides is None and not known:
-            raise InputError(f"it states no unit of x, y and its heights: {_UNITS}", key="unit", expected=_UNITS)
-        raise InputError(f"it states no unit of its heights: {_UNIT}", key="unit", expected=_UNIT)
-    else:
-        unit = lateral if vertical is None else vertical
-        if vertical is not None and sides is None and known and lateral is not None:
-            raise InputError(
-                "it states the unit of x and y only: expected the unit of its heights as unit, and no height_unit",
-                key="height_unit",
-                found=vertical,
-            )
-        if sides is None and not known and raw.sides is not None and lateral is None:
-            raise InputError(f"it states no unit of x and y: {_UNIT}", key="unit", expected=_UNIT)
-    values = raw.heights if unit == 1.0 else raw.heights * unit
-    if sides is None and raw.sides is not None:
-        metres = [quantity(f"1 {one}", "m", "the unit in the file") for one in raw.units or ()] or [lateral or unit] * 2
-        sides = tuple(float(f"{d * metre:.15g}") for d, metre in zip(raw.sides, metres, strict=True))
-    if sides is None or not all(math.isfinite(d) and d > 0 for d in sides):
-        raise InputError(f"it states no size: {_SPACING}", key="spacing", expected=_SPACING)
-    return labelled(values, sides)
-
-
-def _chosen(opened: Opened, channel: int | str | None) -> Channel:
-    listed = ", ".join(f"{c.index}: {c.name!r}{'' if c.is_height else ' (no areal height)'}" for c in opened.channels)
-    if channel is None:
-        heights = [c for c in opened.channels if c.is_height]
-        preferred = [c for c in heights if c.index == opened.default] + heights
-        if not preferred:
-            profiles = [c for c in opened.channels if len(c.shape) == 1 or 1 in c.shape]
-            kind = "a profile, not an areal scan" if profiles else "no areal height"
-            raise InputError(f"it holds {kind} (channels {listed or 'none'}): expected heights over x and y")
-        return preferred[0]
-    for c in opened.channels:
-        if channel == c.name or (isinstance(channel, int) and channel == c.index):
-            if not c.is_height:
-                raise InputError(
-                    f"channel {channel!r} is not an areal height: expected another of {listed}",
-                    key="channel",
-                    found=channel,
-                )
-            return c
-    raise InputError(key="channel", found=channel, expected=f"one of {listed}")
-
-
-def _refuse_another_unit(chosen: Channel, lateral: float | None, vertical: float | None) -> None:
-    """Refuse units that contradict the one in the file."""
-    if chosen.unit is not None:
-        stated = quantity(f"1 {chosen.unit}", "m", "the unit in the file")
-        for key, unit in (("unit", lateral), ("height_unit", vertical)):
-            if unit is not None and not math.isclose(stated, unit):
-                raise InputError(
-                    f"it states its unit as {chosen.unit!r}: expected no {key}; scale the heights afterwards",
-                    key=key,
-                    found=unit,
-                )
 
 
 def existing(path: Any) -> Path:
@@ -257,13 +332,6 @@ def existing(path: Any) -> Path:
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
     return path
-
-
-def _is_grid(path: Path, format: str | None) -> bool:
-    suffix = path.suffix.lower().removeprefix(".")
-    if format is None and suffix == "h5":  # a grid written by way of HDF5, or an instrument's
-        return gridfiles.is_labelled(path)
-    return format == _GRID or (format is None and suffix in instruments.ELSEWHERE[_GRID])
 
 
 @contextmanager
@@ -294,7 +362,8 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
         if n * d > WIDEST or d < FINEST:
             raise InputError(
                 f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
-                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing"
+                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing, and "
+                "height_scale if its heights are in another unit too"
             )
 
 
@@ -304,7 +373,8 @@ def _low_enough(h: xr.DataArray, path: Path) -> None:
     if count and h.size >= _FEWEST:
         raise InputError(
             f"{path}: {count} heights are like {example:.6g} m, which is not plausible (at most "
-            f"{HIGHEST:g} m from zero): expected heights in the unit that the file or `unit` states"
+            f"{HIGHEST:g} m from zero): expected height_scale if they are in another unit than the file or `unit` "
+            f"states, such as 1e-6, or no_data if the number stands for missing points"
         )
 
 
@@ -323,5 +393,5 @@ def finite(h: xr.DataArray, source: str) -> None:
     if count:
         raise InputError(
             f"{source}: {count} heights are like {example:.6g} m: expected none beyond {FARTHEST:g} m "
-            "(where they mark missing points, put NaN in their place and use from_array)"
+            "(NaN or no_data if the number stands for missing points)"
         )

@@ -11,7 +11,7 @@ from roughvisc.topography.readers import existing, finite, read_file
 from roughvisc.units import Quantity, quantities
 
 
-@quantities(spacing="m")
+@quantities(spacing="m", grid="m")
 def open_scan(
     path: str | os.PathLike[str],
     *,
@@ -20,6 +20,9 @@ def open_scan(
     unit: str | None = None,
     height_unit: str | None = None,
     spacing: Quantity | tuple[Quantity, Quantity] | None = None,
+    grid: Quantity | None = None,
+    no_data: float | None = None,
+    height_scale: float | None = None,
 ) -> xr.DataArray:
     """Open a scanned surface from an instrument file, a grid file or a surface card.
 
@@ -40,6 +43,14 @@ def open_scan(
         ``unit="mm", height_unit="um"``.
     spacing : float or str, or pair of them, optional
         Cell sides (dx, dy), instead of those in the file. [m]
+    grid : float or str, optional
+        Side of the square cells into which points x, y, z are sorted: each has the mean height of its points. Default:
+        the lattice on which the points lie, to a hundredth of its steps. [m]
+    no_data : float, optional
+        Number that stands for a missing point, in the unit of the file. Default: an extreme that at least four points
+        share, further from all other heights than ten times their range; a warning states it.
+    height_scale : float, optional
+        Factor of the heights, of a file that states a wrong unit: 1e-6 for micrometres in place of metres. [-]
 
     Returns
     -------
@@ -53,14 +64,16 @@ def open_scan(
     ------
     InputError
         If the file is absent, damaged, of an unknown format, not an areal height scan, without unit or size, or
-        implausible: wider than 1 m, cells below 10 pm, heights beyond 1 m.
+        implausible: wider than 1 m, cells below 10 pm, heights beyond 1 m; or if points lie on no lattice.
 
     Warns
     -----
     UserWarning
-        If the checksum in an X3P file is wrong.
+        If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
+        points, or cells of `grid` hold no point.
     """
-    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing}
+    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing, "grid": grid}
+    options |= {"no_data": no_data, "height_scale": height_scale}
     path = existing(path)
     if not is_card(path, format):
         return read_file(path, format=format, **options)

@@ -156,8 +156,9 @@ def _as_toml(steps: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _how_to_read(options: Mapping[str, Any], spacing: Callable[[Any], str]) -> dict[str, str]:
-    """Options that a file needs to be opened, as TOML; the spacing in a way of its own."""
-    ways = dict.fromkeys(("format", "channel", "unit", "height_unit"), _text) | {"spacing": spacing}
+    """Return the options that a file needs to be opened, as TOML; lengths as `spacing` writes them."""
+    ways = dict.fromkeys(("format", "channel", "unit", "height_unit"), _text) | {"spacing": spacing, "grid": spacing}
+    ways |= dict.fromkeys(("no_data", "height_scale"), json.dumps)
     return {key: way(options[key]) for key, way in ways.items() if options.get(key) is not None}
 
 

@@ -26,7 +26,8 @@ from scan_files import (
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.topography import conditioning, instruments, synthesis
+from roughvisc.topography import conditioning, synthesis
+from roughvisc.topography.formats import Channel, ScanFile, add_format, registry
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.readers import from_array, list_channels, supported_formats
 from roughvisc.topography.scans import open_scan
@@ -197,20 +198,24 @@ def test_refusal__profile(tmp_path):
     assert "profile" in refusal(tmp_path / "p.txt", unit="um")
 
 
-@pytest.mark.parametrize(
-    ("change", "fragment"),
-    [
-        (lambda z: z * np.nan, "all 117 points are missing"),
-        (lambda z: np.where(z > 1.2e-5, 1.8e302, z), "1.8e+302"),
-        (lambda z: np.where(z > 1.2e-5, -3.4e38, z), "-3.4e+38"),
-        (lambda z: np.where(z > 1.2e-5, np.inf, z), ""),
-    ],
-)
-def test_refusal__heights_that_are_none(change, fragment, tmp_path):
-    from_array(tilted(), CELL).copy(data=change(tilted())).to_netcdf(tmp_path / "scan.nc")
-    assert fragment in refusal(tmp_path / "scan.nc")
+def test_refusal__all_points_are_missing(tmp_path):
+    from_array(tilted(), CELL).copy(data=np.full(SHAPE, np.nan)).to_netcdf(tmp_path / "scan.nc")
+    assert "all 117 points are missing" in refusal(tmp_path / "scan.nc")
+
+
+@pytest.mark.parametrize("number", [1.8e302, -3.4e38, np.inf])
+def test_heights__that_are_none_are_missing_if_many_and_refused_if_few(number, tmp_path):
+    many, few = (np.where(tilted() > limit, number, tilted()) for limit in (1.2e-5, 1.35e-5))
+    missing = int((np.isnan(tilted()) | (tilted() > 1.2e-5)).sum())
+    from_array(tilted(), CELL).copy(data=many).to_netcdf(tmp_path / "many.nc")
+    with pytest.warns(UserWarning, match="points have the height"):
+        assert int(np.isnan(open_scan(tmp_path / "many.nc")).sum()) == missing
+    if np.isfinite(number):
+        assert int(np.isnan(open_scan(tmp_path / "many.nc", no_data=number)).sum()) == missing
+    from_array(tilted(), CELL).copy(data=few).to_netcdf(tmp_path / "few.nc")
+    assert "no_data" in refusal(tmp_path / "few.nc")
     with pytest.raises(InputError):
-        from_array(change(tilted()), CELL)
+        from_array(many, CELL)
 
 
 @pytest.mark.parametrize("cell", [(0.1, 1e-6), (1e-6, 5e-12)])
@@ -366,20 +371,20 @@ def test_shipped_card__opens_with_title_and_licence(path):
 
 
 def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(instruments, "READERS", dict(instruments.READERS))
+    monkeypatch.setattr(registry, "_ADDED", {})
     heights = np.arange(12.0).reshape(4, 3) * 1e-6
 
     def read(path):
-        channel = instruments.Channel(0, "height", True, heights.shape, "m")
-        return instruments.Opened("ours", (channel,), lambda _: instruments.Raw(heights, (1e-6, 2e-6), ("m", "m")))
+        channel = Channel("height", heights.shape, lambda: heights, "m", "m", (1e-6, 2e-6))
+        return ScanFile("ours", [channel])
 
-    instruments.add_format("ours", [".TXT", "our"], read)
+    add_format("ours", [".TXT", "our"], read)
     for name, format in (("a.our", None), ("a.txt", None), ("a.csv", "ours")):
         (tmp_path / name).write_text("x")
         assert np.array_equal(open_scan(tmp_path / name, format=format).values, heights)
     assert supported_formats()["ours"] == ("txt", "our")
-    instruments.add_format("ours", [], read)
+    add_format("ours", [], read)
     assert supported_formats()["ours"] == ()
     for format, suffixes in (("x3p", ["a"]), ("mine", ["toml"])):
         with pytest.raises(InputError, match=format):
-            instruments.add_format(format, suffixes, read)
+            add_format(format, suffixes, read)

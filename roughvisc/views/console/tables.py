@@ -279,7 +279,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
         ("Instrument", str(height.attrs.get("instrument", ""))),
         ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
         ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
-        *(_channel_row(channel) for channel in (channels if len(channels) > 1 else ())),
+        *(_channel_row(i, one) for i, one in enumerate(channels if len(channels) > 1 else ())),
         ("Orientation", str(height.attrs.get("orientation", ""))),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),
@@ -295,11 +295,11 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     return two_columns([row for row in rows if row[1]], name)
 
 
-def _channel_row(channel: Any) -> tuple[str, str]:
+def _channel_row(index: int, channel: Any) -> tuple[str, str]:
     kind = f"height in {channel.unit}" if channel.unit else "height without a unit"
     shape = " x ".join(map(str, channel.shape))
-    described = f"{channel.name}: {kind if channel.is_height else 'no areal height'}, {shape} points"
-    return f"Channel {channel.index}", described
+    described = f"{channel.name}: {kind if channel.is_height else channel.kind}, {shape} points"
+    return f"Channel {index}", described
 
 
 def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
-from pathlib import Path
 from statistics import mode
-from typing import TextIO
 
 from roughvisc.errors import InputError
-from roughvisc.tables import decimal_mark, name_and_unit, plain_number, read_text
+from roughvisc.tables import decimal_mark, name_and_unit, plain_number
 from roughvisc.units import is_quantity
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
@@ -27,34 +24,30 @@ _HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
 _MISSING = ("", "nan", "bad", "-", "#n/a", "n/a")
 
 
-def separated_by_blanks(path: Path) -> TextIO:
-    """A file of separated values as a text of numbers with decimal points and blanks between them.
+def separated_by_blanks(text: str) -> str:
+    """Return separated values as numbers with decimal points and blanks between them.
 
     Parameters
     ----------
-    path : path
+    text : str
         Values between blanks, commas, semicolons or tabs, with a decimal point or a decimal comma. Empty values are
         missing heights. A heading ``x [mm], y [mm], z [um]`` of points or ``height [um]`` of a matrix becomes comments
         that state the units. Lines of other text, such as ``# Width: 26 um``, stay as they are.
 
     Returns
     -------
-    file
-        The text in UTF-8, in memory.
+    str
 
     Raises
     ------
-    UnicodeError
-        If it is no text.
     InputError
         If a line of the matrix holds what is no number, the decimal mark is ambiguous, or x and y differ in their unit.
     """
-    text = read_text(path)
     lines = _units_as_comments(text.splitlines())
     text = "\n".join(lines) + "\n"
     if not all(_ROW[" "].fullmatch(line) or (line[:1] in ("#", "") and "," not in line) for line in lines):
         text = "\n".join(_rewritten(lines)) + "\n"
-    return io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8")
+    return text
 
 
 def _units_as_comments(lines: list[str]) -> list[str]:

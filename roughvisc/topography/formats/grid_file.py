@@ -1,0 +1,84 @@
+"""Grids in NetCDF and Zarr, through xarray: heights over coordinates x and y with units."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
+
+from roughvisc.errors import InputError
+from roughvisc.topography.formats.registry import Channel, ScanFile, affordable
+from roughvisc.topography.grid import metres_in, unit_of
+from roughvisc.units import is_quantity
+
+#: Names of the heights, in order of preference.
+_NAMES = ("height", "heights", "z", "h")
+#: First bytes of NetCDF-3 files: the classic format, and the one with offsets of 64 bits.
+_CLASSIC = (b"CDF\x01", b"CDF\x02")
+
+
+def read_grid(path: Path) -> ScanFile:
+    """Read the variables of at least two dimensions of a grid file."""
+    with _open(path) as dataset:
+        found = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim >= 2]
+        found.sort(key=lambda name: _NAMES.index(name) if name in _NAMES else len(_NAMES))
+        return ScanFile("nc", [_channel(path, name, dataset[name]) for name in found])
+
+
+def is_labelled(path: Path) -> bool:
+    """Return whether an HDF5 file holds a variable over x and y, as netCDF does."""
+    try:
+        return any(channel.is_height for channel in read_grid(path).channels)
+    # of another layout, or damaged: its own reader will say so
+    except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError):
+        return False
+
+
+def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
+    gridded = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
+    unit = unit_of(variable)
+    if not gridded or (unit is not None and not is_quantity(f"1 {unit}", "m")):
+        return Channel(name, variable.shape, lambda: None, unit, kind="no areal height")
+
+    def load() -> xr.DataArray:
+        with _open(path) as dataset:
+            affordable(path, int(np.prod(variable.shape, dtype=object)))
+            return dataset[name].astype(float).compute().transpose("x", "y")
+
+    shape = (variable.sizes["x"], variable.sizes["y"])
+    if not {"x", "y"} <= set(variable.coords):
+        return Channel(name, shape, load, unit)
+    units = [unit_of(variable[axis]) for axis in "xy"]
+    positions = [variable[axis].values.astype(float) for axis in "xy"]
+    if None in units:
+        if units[0] != units[1]:
+            raise InputError(f"its coordinates x and y have the units {units[0]!r} and {units[1]!r}: expected both")
+        return Channel(name, shape, load, unit, None, positions=(positions[0], positions[1]))
+    x, y = (at * metres_in(str(one), axis) for at, one, axis in zip(positions, units, "xy", strict=True))
+    return Channel(name, shape, load, unit, "m", positions=(x, y))
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[xr.Dataset]:
+    options: dict[str, Any] = {"decode_times": False}
+    if path.suffix.lower() == ".zarr":
+        if find_spec("zarr") is None:
+            raise InputError("it is in Zarr, which needs the package zarr: install it, or convert the file to netCDF")
+        with xr.open_dataset(path, engine="zarr", **options) as dataset:
+            yield dataset
+        return
+    with path.open("rb") as stream:
+        begins = stream.read(4)
+    if begins in _CLASSIC:  # netCDF's own library crashes on some damaged files; scipy holds no more than the content
+        with xr.open_dataset(io.BytesIO(path.read_bytes()), engine="scipy", **options) as dataset:
+            yield dataset
+    else:  # netCDF-4 is not safe in threads, and xarray would lock only the reading
+        with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, engine="netcdf4", lock=False, **options) as dataset:
+            yield dataset

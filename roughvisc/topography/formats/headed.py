@@ -1,0 +1,109 @@
+"""Text files of one maker, recognised by their first line.
+
+Each function takes the text of a file. Rows are taken to run along x and the first to be y = 0, if the format does not
+say otherwise.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.tables import decimal_mark, plain_number
+from roughvisc.topography.formats.registry import Channel, ScanFile
+
+#: Zygo: phase counts in one wave by the resolution in the header, and the counts from which a point is missing.
+_COUNTS, _MISSING = {0: 4096, 1: 32768, 2: 131072}, 2147483640
+
+
+def read_zygo_xyz(text: str) -> ScanFile:
+    """Read Zygo XYZ: column, row and height in micrometres of each point, or "No Data"."""
+    (x0, y0, columns, rows), _, _, side, sections = _zygo(text)
+    cells = [line.split() for line in sections[0].splitlines() if line.strip()]
+    known = np.array([cell for cell in cells if "No" not in cell], dtype=float)
+    heights = np.full((columns, rows), np.nan)
+    heights[known[:, 0].astype(int) - x0, known[:, 1].astype(int) - y0] = known[:, 2]
+    return _one("zygo", heights, "um", "m", side)
+
+
+def read_zygo_ascii(text: str) -> ScanFile:
+    """Read Zygo ASCII: intensities, then the phases of each row, in counts of a wave."""
+    (_, _, columns, rows), wave, resolution, side, sections = _zygo(text)
+    phases = [np.array(section.split(), dtype=float) for section in sections]
+    (counts,) = [phase for phase in phases if phase.size == columns * rows][-1:]
+    heights = np.where(counts < _MISSING, counts * (wave / _COUNTS[resolution]), np.nan)
+    return _one("zygo", heights.reshape(rows, columns).T, "m", "m", side)
+
+
+def _zygo(text: str) -> tuple[list[int], float, int, tuple[float, float] | None, list[str]]:
+    """Return rectangle, height of one wave [m], resolution of the phase, cell sides [m] and the sections of a file."""
+    header, *sections = re.split(r"^#\s*$", text, flags=re.MULTILINE)
+    lines = header.splitlines()
+    rectangle = [int(word) for word in lines[3].split()[:4]]
+    _, scale, wavelength, _, obliquity, _, side, *_ = (float(word) for word in lines[7].split())
+    resolution = int(lines[10].split()[0])
+    return rectangle, scale * wavelength * obliquity, resolution, (side, side) if side > 0 else None, sections
+
+
+def read_wyko(text: str) -> ScanFile:
+    """Read Wyko ASCII: each line of the file is one column of the map, from the bottom up.
+
+    Heights are in nanometres, or in waves if the second flag of the first line is 0. ``Pixel_size`` is the spacing
+    along x in millimetres, and ``Aspect`` the spacing along y over it.
+    """
+    header, _, data = text.partition("RAW_DATA")
+    lines = header.splitlines()
+    stated = {line.split()[0]: line.split()[-1] for line in lines[1:] if line.strip()}
+    columns, rows = (int(re.search(rf"^{axis} Size\s+(\d+)", header, re.MULTILINE)[1]) for axis in "XY")
+    words = data.split("\n", 1)[1].split()[: columns * rows]
+    heights = np.array(["nan" if word.lower() == "bad" else word for word in words], dtype=float)
+    heights = heights.reshape(columns, rows)
+    if lines[0].split()[-2] == "0":
+        heights = heights * (float(stated["Wavelength"]) / float(stated["Mult"]))
+    side = float(stated["Pixel_size"])
+    return _one("wyko", heights, "nm", "mm", (side, float(stated.get("Aspect", 1)) * side))
+
+
+def read_esri(text: str) -> ScanFile:
+    """Read an ESRI ASCII grid: size of the cells and number of missing points in the header, first row on top."""
+    header = {
+        key.lower(): float(value) for key, value in re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
+    }
+    columns, rows = int(header["ncols"]), int(header["nrows"])
+    sides = tuple(header.get(name, header.get("cellsize", np.nan)) for name in ("dx", "dy"))
+    data = np.array(text.split()[2 * len(header) :], dtype=float).reshape(rows, columns)
+    heights = np.where(data == header.get("nodata_value", np.nan), np.nan, data).T
+    return _one("esri", heights, None, None, (sides[0], sides[1]))
+
+
+def read_keyence(text: str) -> ScanFile:
+    """Read the CSV of a Keyence microscope: unit and spacing in its header, blank cells are missing points."""
+    separator = ";" if text.count(";") > text.count(",") else ","
+    lines = text.splitlines()
+    rows = list(csv.reader(lines[:100], delimiter=separator))
+    stated = {row[0]: row[1:] for row in rows if len(row) > 1}
+    shown = stated.get("Output image data", ["Height"])[0]
+    columns, count = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
+    first = next(at for at, row in enumerate(rows) if len(row) >= columns)
+    cells = list(csv.reader(lines[first : first + count], delimiter=separator))
+    mark = decimal_mark((cell for row in cells for cell in row), separator)
+    heights = np.empty((count, columns))
+    for at, row in enumerate(cells):
+        numbers = [plain_number(cell, mark) if cell.strip() else "nan" for cell in row[:columns]]
+        if None in numbers or len(numbers) < columns:
+            found = row[numbers.index(None)] if None in numbers else f"{len(numbers)} of {columns} values"
+            raise InputError(f"line {first + at + 1}: found {found!r} among numbers: expected {columns} numbers")
+        heights[at] = [float(number) for number in numbers]
+    size, unit = float(plain_number(stated["XY Calibration"][0], mark)), stated["XY Calibration"][1]
+    kind = "height" if shown == "Height" else "no areal height"
+    channel = Channel(shown, (columns, count), lambda: heights.T, stated["Unit"][0], unit, (size, size), kind=kind)
+    return ScanFile("keyence", [channel], 0, stated.get("Model", [""])[0])
+
+
+def _one(
+    format: str, heights: np.ndarray, unit: str | None, lateral: str | None, sides: tuple[float, float] | None
+) -> ScanFile:
+    return ScanFile(format, [Channel("height", heights.shape, lambda: heights, unit, lateral, sides)])

@@ -1,0 +1,136 @@
+"""Formats that libraries parse: x3pio, sdfio, NumPy and SurfaceTopography.
+
+x3pio and sdfio return rows along y, ascending, so ``height(x, y)`` is the transpose. SurfaceTopography returns
+``(x, y)``.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from contextlib import suppress
+from io import BytesIO, TextIOWrapper
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.topography.formats.registry import EXPANSION, Channel, ScanFile, affordable, brief, modest, suffixes
+from roughvisc.units import quantity
+
+#: Formats without compression: a point takes at least one byte.
+_PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metropro", "mi", "nms", "opd", "os3d", "plu"}
+_PLAIN |= {"wsxm"}
+
+
+def read_x3p(path: Path) -> ScanFile:
+    """Read X3P (ISO 5436-2): surfaces with one channel for each layer, or a point cloud."""
+    import x3pio
+
+    with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as parts:  # the reader says what is wrong with it
+        modest(sum(part.file_size for part in parts.infolist()), path.stat().st_size)
+    info = x3pio.info(path, verify=False)
+    affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)))
+    complaints: list[str] = []
+
+    def load(index: int) -> np.ndarray:
+        try:
+            content = x3pio.read(path)
+        except x3pio.X3pChecksumError as error:
+            complaints.append(f"its checksum is wrong ({brief(error)}): it was changed or damaged after it was written")
+            content = x3pio.read(path, verify=False)
+        layer = content.layers[index]
+        if kind == "points":
+            return np.stack([np.ravel(one) for one in (layer.x, layer.y, layer.z)], axis=1)
+        if not layer.is_regular_grid:
+            raise InputError("its points lie on no regular grid (absolute axes): expected equal steps in x and y")
+        return np.asarray(layer.z.T)
+
+    kind = {x3pio.FeatureType.POINT_CLOUD: "points", x3pio.FeatureType.PROFILE: "profile"}.get(
+        info.feature_type, "height" if len(info.shape) == 2 else "profile"
+    )
+    sides = (info.header.x.increment, info.header.y.increment) if kind == "height" else None
+    channels = [
+        Channel(f"layer {i}", info.shape[::-1], lambda i=i: load(i), "m", "m", sides, kind=kind)
+        for i in range(info.layer_count)
+    ]
+    maker = info.metadata.instrument if info.metadata else None
+    instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
+    return ScanFile("x3p", channels, 0, instrument, complaints)
+
+
+def read_sdf(path: Path) -> ScanFile:
+    """Read SDF (ISO 25178-71)."""
+    import sdfio
+
+    content = sdfio.read(path)
+    rows, columns = content.data.shape
+    sides = (content.header.x_scale, content.header.y_scale)
+    kind = "height" if rows > 1 else "profile"
+    channel = Channel("height", (columns, rows), lambda: content.data.T, "m", "m", sides, kind=kind)
+    return ScanFile("sdf", [channel], 0, content.header.manufacturer_id.strip())
+
+
+def read_npy(path: Path) -> ScanFile:
+    """Read a NumPy array, whose rows run along x."""
+    heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
+    kind = "height" if heights.ndim == 2 and heights.dtype.kind in "fiu" else "no areal height"
+    return ScanFile(
+        "npy", [Channel("array", heights.shape[::-1], lambda: np.array(heights.T, float, order="C"), kind=kind)]
+    )
+
+
+def read_with_surface_topography(path: Path, format: str, source: BytesIO | TextIOWrapper | None = None) -> ScanFile:
+    """Read any format of SurfaceTopography.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str
+        Name of the format.
+    source : stream, optional
+        Content to read instead of the file.
+    """
+    from SurfaceTopography.IO import lookup_reader_by_format
+
+    if format not in lookup_reader_by_format:
+        raise InputError(f"format is {format!r}: expected one of {', '.join(sorted(suffixes()))}, or 'auto'")
+    reader = lookup_reader_by_format[format](str(path) if source is None else source)
+
+    def load(found: Any, shape: tuple[int, ...]) -> np.ndarray:
+        affordable(path, int(np.prod(shape, dtype=object)), 1 if format in _PLAIN else EXPANSION)
+        if found.is_uniform is False:
+            raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
+        sized = found.physical_sizes is not None
+        topography = found.topography() if sized else found.topography(physical_sizes=shape)
+        return np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
+
+    channels = [_channel(found, load) for found in reader.channels]
+    described = reader.channels[0].info.get("instrument", {}) if channels else {}
+    instrument = described.get("name", "") if isinstance(described, dict) else ""
+    default = getattr(reader, "_default_channel_index", None)
+    return ScanFile(format, channels, default, str(instrument or ""), close=reader.close)
+
+
+def _channel(found: Any, load: Any) -> Channel:
+    from SurfaceTopography.Support.UnitConversion import is_length_unit
+
+    shape = tuple(int(n) for n in found.nb_grid_pts or ())
+    # a reader may take an odd unit for a length: phases of Bruker files come as heights in ('µm', None)
+    units = [unit for unit in (found.unit, found.data_unit) if unit is not None]
+    is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
+    if len(shape) == 1 or 1 in shape:
+        kind = "profile"
+    else:
+        kind = "height" if found.is_height_channel and found.dim == 2 and is_length else "no areal height"
+    unit = lateral = found.unit if kind == "height" else None
+    sides = None
+    if kind == "height" and found.physical_sizes is not None:
+        sides = tuple(float(size) / n for size, n in zip(found.physical_sizes, shape, strict=True))
+        header = found.info.get("raw_metadata", {})
+        if unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
+            lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
+            if lateral is not None and other != lateral:
+                sides = (sides[0], sides[1] * quantity(f"1 {other}", lateral))
+    return Channel(str(found.channel_id), shape, lambda: load(found, shape), unit, lateral, sides or None, kind=kind)

@@ -1,0 +1,245 @@
+"""Formats by name and suffix, and what a reader returns."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roughvisc.errors import InputError
+
+#: Format -> suffixes without the dot, and the function that reads it, of formats that SurfaceTopography does not read
+#: here. Formats without a suffix are recognised by their first line.
+_OWN: dict[str, tuple[tuple[str, ...], str]] = {
+    "x3p": (("x3p",), "libraries.read_x3p"),
+    "sdf": (("sdf",), "libraries.read_sdf"),
+    "npy": (("npy",), "libraries.read_npy"),
+    "nc": (("nc", "nc4", "cdf", "hdf5", "zarr"), "grid_file.read_grid"),
+    "csv": (("csv",), "text.read_csv"),
+    "xyz": (("xyz",), "text.read_points"),
+    "asc": ((), "text.read_matrix"),
+    "zygo": ((), "text.read_headed"),
+    "keyence": ((), "text.read_headed"),
+    "wyko": ((), "text.read_headed"),
+    "esri": ((), "text.read_headed"),
+    "tmd": (("tmd",), "truemap.read_truemap"),
+    "sur": (("sur",), "digital_surf.read_digital_surf"),
+}
+_TEXT = ("xyz", "asc")
+#: Formats to try, in this order, for suffixes that several formats share.
+_SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
+#: Formats that users added in this process.
+_ADDED: dict[str, tuple[tuple[str, ...], Callable[[Path], ScanFile]]] = {}
+#: Largest expansion of a deflated stream.
+EXPANSION = 1040
+#: Largest plausible expansion of measured heights, and the size below which any is accepted. [1, byte]
+_PLAUSIBLE, _SMALL = 100, 256 << 20
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a file.
+
+    Parameters
+    ----------
+    name : str
+        Name, as ``channel=`` of :func:`roughvisc.open_scan` takes it.
+    shape : tuple of int
+        Points along x and y; one number for a profile or for points.
+    load : callable
+        Returns the heights over (x, y), peaks up, NaN where missing, in `unit`: an array, or a DataArray whose
+        attributes and coordinates are kept; of points an array of shape (n, 3).
+    unit : str, optional
+        Unit of the heights; None if the file states none.
+    lateral_unit : str, optional
+        Unit of x and y; None if the file states none.
+    spacing : tuple of float, optional
+        Cell sides in `lateral_unit`; None if the file states none.
+    positions : tuple of ndarray, optional
+        Cell centres along x and y in `lateral_unit`, of files that state them.
+    kind : {"height", "points", "profile", ...}
+        ``"height"`` of an areal grid, ``"points"`` of points x, y, z; otherwise what the channel holds, in words.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    load: Callable[[], Any]
+    unit: str | None = None
+    lateral_unit: str | None = None
+    spacing: tuple[float, float] | None = None
+    positions: tuple[np.ndarray, np.ndarray] | None = None
+    kind: str = "height"
+
+    @property
+    def is_height(self) -> bool:
+        """Whether the channel holds heights over x and y."""
+        return self.kind in ("height", "points")
+
+
+@dataclass(frozen=True)
+class ScanFile:
+    """A file whose header was read.
+
+    Parameters
+    ----------
+    format : str
+        Name of the format.
+    channels : sequence of Channel
+        All channels of the file.
+    default : int or None
+        Position of the channel to take if none is named; by default the first height.
+    instrument : str
+        Maker and model if known.
+    complaints : list of str
+        Faults of the file that do not prevent reading; ``load`` of a channel may add some.
+    close : callable
+        Closes the file.
+    """
+
+    format: str
+    channels: Sequence[Channel]
+    default: int | None = None
+    instrument: str = ""
+    complaints: list[str] = field(default_factory=list)
+    close: Callable[[], None] = lambda: None
+
+
+def open_file(path: Path, format: str | None) -> ScanFile:
+    """Read the header of a scan file, by the name of its format, its content (``"auto"``) or its suffix (None)."""
+    if format == "auto":
+        format = _detected(path)
+    names = (format,) if format else formats_of(path)
+    if len(names) == 1:
+        return _reader(names[0])(path)
+    failures: dict[str, Exception] = {}
+    for name in names:
+        try:
+            return _reader(name)(path)
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001  (each reader has its own kinds, struct.error and KeyError among them)
+            forget(error)
+            failures[name] = error
+    raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
+
+
+def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
+    """Make a format known to :func:`roughvisc.open_scan` in this process; one of the same name is replaced.
+
+    Parameters
+    ----------
+    format : str
+        Name, as ``format=`` takes it.
+    suffixes : sequence of str
+        Suffixes of its files, without the dot. May be empty.
+    read : callable
+        ``read(path)`` returns a :class:`ScanFile`. Any exception is reported as an
+        :class:`~roughvisc.errors.InputError` that names the file.
+
+    Raises
+    ------
+    InputError
+        If the name or a suffix belongs to a format that roughvisc reads itself.
+    """
+    known = {name: theirs for name, (theirs, _) in _OWN.items()} | {"card": ("toml",)}
+    theirs = {suffix for suffixes in known.values() for suffix in suffixes}
+    given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
+    if format in known or theirs & set(given):
+        raise InputError(
+            f"format {format!r} with suffixes {', '.join(given) or 'none'}: expected others than the formats "
+            f"{', '.join(sorted(known))} and their suffixes {', '.join(sorted(theirs))}"
+        )
+    _ADDED[format] = given, read
+
+
+def suffixes() -> dict[str, tuple[str, ...]]:
+    """Return the suffixes of each format, without the dot."""
+    from SurfaceTopography.IO import readers
+
+    theirs = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
+    theirs["di"] = (*theirs["di"], "di", "000 to 999")
+    own = {name: suffixes for name, (suffixes, _) in (_OWN | _ADDED).items() if suffixes or name not in theirs}
+    return {**theirs, **own, "card": ("toml",)}
+
+
+def formats_of(path: Path) -> tuple[str, ...]:
+    """Return the formats to try for the suffix of a file, in order."""
+    suffix = path.suffix.lower().removeprefix(".")
+    for name, (theirs, _) in (_ADDED | _OWN).items():
+        if suffix and suffix in theirs:
+            return (name,)
+    if suffix in _SHARED:
+        return _SHARED[suffix]
+    if len(suffix) == 3 and suffix.isdigit():
+        return ("di",)
+    if suffix == "h5":  # a grid in HDF5, or an instrument's file
+        from roughvisc.topography.formats.grid_file import is_labelled
+
+        if is_labelled(path):
+            return ("nc",)
+    found = tuple(name for name, theirs in suffixes().items() if suffix and suffix in theirs)
+    if not found:
+        known = sorted({s for theirs in suffixes().values() for s in theirs})
+        raise InputError(
+            f'the suffix {path.suffix!r} is not known: expected format, or "auto" to detect it; known suffixes are '
+            f"{', '.join(known)}",
+            key="format",
+        )
+    return found
+
+
+def _reader(name: str) -> Callable[[Path], ScanFile]:
+    if name in _ADDED:
+        return _ADDED[name][1]
+    module, _, function = _OWN.get(name, ((), ""))[1].partition(".")
+    if module:
+        return getattr(import_module(f"roughvisc.topography.formats.{module}"), function)
+    from roughvisc.topography.formats.libraries import read_with_surface_topography
+
+    return lambda path: read_with_surface_topography(path, name)
+
+
+def _detected(path: Path) -> str:
+    """Return the format of a file by its content."""
+    from SurfaceTopography.Exceptions import CannotDetectFileFormat
+    from SurfaceTopography.IO import detect_format
+
+    try:
+        return detect_format(str(path))
+    except CannotDetectFileFormat as error:
+        raise InputError("no reader knows its content: expected the name of its format", key="format") from error
+
+
+def brief(error: BaseException) -> str:
+    """Return the first line of an error, shortened, or its type if it has no text."""
+    text = str(error).strip().split("\n")[0].strip()
+    return (text if len(text) < 200 else text[:197] + "...") or type(error).__name__
+
+
+def forget(error: BaseException | None) -> None:
+    """Clear the traceback of an error, so that files opened by a failed reader are closed."""
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__context__
+
+
+def affordable(path: Path, points: int, expansion: float = EXPANSION) -> None:
+    """Refuse a header that claims more points than the file can hold, before they are allocated."""
+    held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
+    if points > max(held * expansion, 1024):
+        raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
+    modest(8 * points, held)
+
+
+def modest(size: int, held: int) -> None:
+    """Refuse content that is far larger in memory than measured heights in a file of this size. [byte]"""
+    if size > max(_PLAUSIBLE * held, _SMALL):
+        raise InputError(
+            f"it would take {size:.3g} bytes in memory, {size / held:.0f} times as many as the file has: expected "
+            f"measured heights, at most {_PLAUSIBLE} times"
+        )

@@ -1,0 +1,93 @@
+"""Points x, y, z as a grid: by the lattice on which they lie, or in cells of a given size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from roughvisc.errors import InputError
+from roughvisc.topography.grid import MOST_CELLS
+
+#: Largest distance of a point from its lattice, in steps, and gaps within one line of it, in largest gaps.
+_OFF, _GAP = 0.01, 0.1
+#: Most nodes of a lattice for each point.
+_SPARSE = 64
+
+
+def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
+    """Return heights and steps of the lattice on which points lie, to a hundredth of a step; None if there is none.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height, in any order of the points.
+
+    Returns
+    -------
+    heights : ndarray, shape (nx, ny)
+        NaN at nodes without a point.
+    steps : tuple of float
+        Along x and y, in the unit of the points.
+    """
+    if len(points) < 4 or not np.isfinite(points[:, :2]).all():
+        return None
+    nodes, steps = [], []
+    for at in points[:, :2].T:
+        ordered = np.sort(at)
+        gaps = np.diff(ordered)
+        starts = np.append(0, np.flatnonzero(gaps > _GAP * gaps.max()) + 1)
+        lines = np.add.reduceat(ordered, starts) / np.diff(np.append(starts, ordered.size))
+        if lines.size < 2:
+            return None
+        between = np.diff(lines)
+        step = (lines[-1] - lines[0]) / np.round(between / np.median(between)).sum()
+        node = np.round((at - lines[0]) / step)
+        off = node - node.mean()  # least squares
+        step = float(f"{off @ at / (off @ off):.12g}")
+        if np.abs(at - at.mean() - off * step).max() > _OFF * step:
+            return None
+        nodes.append(node.astype(int))
+        steps.append(step)
+    shape = (int(nodes[0].max()) + 1, int(nodes[1].max()) + 1)
+    if shape[0] * shape[1] > _SPARSE * len(points):
+        return None
+    if np.unique(np.ravel_multi_index(nodes, shape)).size < len(points):
+        return None
+    heights = np.full(shape, np.nan)
+    heights[nodes[0], nodes[1]] = points[:, 2]
+    return heights, (steps[0], steps[1])
+
+
+def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
+    """Return the mean height of the points in each square cell, and the number of cells without a point.
+
+    Cells without a point are missing. If there are fewer points than cells, all cells have the height between the
+    points, linear over triangles, and those outside the points are missing.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height.
+    side : float
+        Side of the cells, in the unit of the points.
+
+    Returns
+    -------
+    heights : ndarray, shape (nx, ny)
+    empty : int
+    """
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    shape = np.maximum(np.ceil((high - low) / side - 1e-9), 1)
+    if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
+        raise InputError(key="grid", found=side, expected=f"cells of which {high - low} holds two at least each way")
+    nx, ny = (int(n) for n in shape)
+    i, j = np.minimum((points[:, :2] - low) / side, shape - 1).astype(int).T
+    count = np.bincount(i * ny + j, minlength=nx * ny).reshape(nx, ny)
+    empty = int((count == 0).sum())
+    if len(points) >= nx * ny:
+        total = np.bincount(i * ny + j, points[:, 2], nx * ny).reshape(nx, ny)
+        return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0), empty
+    from scipy.interpolate import griddata  # slow to import
+
+    x, y = (start + (np.arange(n) + 0.5) * side for start, n in zip(low, (nx, ny), strict=True))
+    return griddata(points[:, :2], points[:, 2], (x[:, None], y[None]), "linear"), empty

@@ -1,0 +1,345 @@
+"""Exports of instruments and programs that are easily misread, each with its right value.
+
+The heights of the small files in `misread/` are those of :func:`waves`, rounded, unless a test says otherwise.
+"""
+
+import struct
+import warnings
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from scan_files import CELL, SCANS, card, real, tilted, write_x3p
+from support import refused
+
+from roughvisc.cli.group import main
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.points import lattice
+from roughvisc.topography.readers import list_channels, sha256
+from roughvisc.topography.scans import open_scan
+
+FILES = Path(__file__).parent / "misread"
+ROUGH = np.random.default_rng(4).normal(0, 1, (20, 24))
+
+
+def matrix(path, values, **options):
+    pd.DataFrame(values).to_csv(path, **options)
+    return path
+
+
+# -- files of one maker ------------------------------------------------------------------------------------------------
+
+
+def test_wyko__lines_are_columns_and_aspect_is_along_y():
+    h = open_scan(FILES / "wyko1.asc")
+    assert h.shape == (24, 16)
+    np.testing.assert_allclose(spacing(h), (2e-6, 2.5e-6), rtol=1e-12)
+    assert int(np.isnan(h).sum()) == 1
+    np.testing.assert_allclose(h[0, :3], [320.409e-9, 210.304e-9, 1.93816e-9], rtol=1e-12)  # the first line
+    np.testing.assert_allclose(h[1, :2], [524.443e-9, 467.537e-9], rtol=1e-12)  # the second line
+
+
+def test_wyko__heights_in_waves(tmp_path):
+    text = (
+        (FILES / "wyko1.asc")
+        .read_text()
+        .replace("Format 0\t1\t1", "Format 0\t0\t1")
+        .replace("Mult\t7\t4\t1", "Mult\t7\t4\t2")
+    )
+    (tmp_path / "waves.asc").write_text(text)
+    np.testing.assert_allclose(
+        open_scan(tmp_path / "waves.asc"), 300 * open_scan(FILES / "wyko1.asc"), rtol=1e-12
+    )  # 600 nm over 2
+
+
+def test_zygo_xyz__is_in_micrometres_at_the_resolution_of_the_camera():
+    h = open_scan(FILES / "zygo.xyz")
+    assert h.shape == (24, 16)
+    np.testing.assert_allclose(spacing(h), 5.067e-6, rtol=1e-12)
+    assert np.argwhere(np.isnan(h.values)).tolist() == [[4, 3], [6, 5]]
+    np.testing.assert_allclose(h[:3, 0], [0.32041e-6, 0.52444e-6, 0.73719e-6], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("resolution", "counts"), [(0, 4096), (1, 32768), (2, 131072)])
+def test_zygo_ascii__phases_become_heights(resolution, counts, tmp_path):
+    """Heights are phase counts times S W O / R (MetroPro Reference Guide, ASCII data format)."""
+    phases = np.arange(12).reshape(3, 4) * 1000
+    phases[1, 2] = 2147483640
+    head = ["Zygo ASCII Data File - Format 2", '1 8 3 4 "today"', "0 0 2 2 1 255", "0 0 4 3", '""', '""', '""']
+    head += ["0 0.5 6.328e-07 0 1.5 0 5e-06 1787677163", '4 3 0 0 0 0 ""', "0 0 0 0 0 0 0 0.0 1 1"]
+    head += [f"{resolution} 1 20 2 0 0 0 0 0", '0 ""', "1 0", '""']
+    rows = [" ".join(map(str, row)) for row in phases]
+    (tmp_path / "phase.asc").write_text("\n".join([*head, "#", "7 8 9 10", "#", *rows, "#"]) + "\n")
+    h = open_scan(tmp_path / "phase.asc")
+    expected = np.where(phases < 2147483640, phases * 0.5 * 6.328e-7 * 1.5 / counts, np.nan).T
+    np.testing.assert_allclose(h, expected, rtol=1e-12)
+    np.testing.assert_allclose(spacing(h), 5e-6, rtol=1e-12)
+
+
+@pytest.mark.parametrize("german", [False, True])
+def test_keyence__unit_and_spacing_are_those_of_the_header(german, tmp_path):
+    text = (FILES / "keyence_vk.csv").read_text()
+    if german:
+        text = text.replace(",", ";").replace(".", ",")
+    (tmp_path / "vk.csv").write_text(text.replace('"0' + (",737" if german else ".737") + '"', '""'))
+    h = open_scan(tmp_path / "vk.csv")
+    assert h.shape == (24, 16)
+    np.testing.assert_allclose(spacing(h), 138.9e-9, rtol=1e-12)
+    assert np.argwhere(np.isnan(h.values)).tolist() == [[2, 0]]
+    np.testing.assert_allclose(h[:2, 0], [0.320e-6, 0.524e-6], rtol=1e-12)
+    (tmp_path / "vk.csv").write_text(text.replace("524", "five"))
+    with pytest.raises(Exception, match="line 20: found '0.five'".replace(".", "[.,]")):
+        open_scan(tmp_path / "vk.csv")
+
+
+def test_esri__has_its_first_row_on_top_and_states_missing_points():
+    with refused("unit"):
+        open_scan(FILES / "esri.asc")
+    h = open_scan(FILES / "esri.asc", unit="mm")
+    assert h.shape == (30, 20)
+    np.testing.assert_allclose(spacing(h), 0.5e-3, rtol=1e-12)
+    assert int(np.isnan(h).sum()) == 1
+    np.testing.assert_allclose(h[:3, -1], [1e-3, 1.2474e-3, 1.4794e-3], rtol=1e-12)  # the first row of the file
+    assert h.attrs["orientation"].startswith("verified")
+
+
+@pytest.mark.parametrize("comment", [b"", b"GelSight Mobile 1X", b"Created by TrueMap v6\r\n"])
+def test_truemap__may_have_any_comment(comment, tmp_path):
+    content = (FILES / "tmd_empty.tmd").read_bytes()
+    at = content.index(b"\0") + 1
+    (tmp_path / "a.tmd").write_bytes(content[:at] + comment + content[at:])
+    h = open_scan(tmp_path / "a.tmd")
+    assert h.shape == (12, 8)
+    np.testing.assert_allclose(spacing(h), 1e-5, rtol=1e-6)
+    np.testing.assert_allclose(h[0, -1], 1e-3 * struct.unpack("<f", content[57:61])[0], rtol=1e-9)  # top left
+
+
+@real
+@pytest.mark.parametrize("streams", [1, 3])
+def test_digital_surf__compressed_is_read_as_uncompressed(streams, tmp_path):
+    content = (SCANS / "sur-2.sur").read_bytes()
+    begin = 512 + sum(struct.unpack_from("<2H", content, 334))
+    parts = np.array_split(np.frombuffer(content[begin : begin + 563 * 484 * 4], "u1"), streams)
+    packed = [zlib.compress(part.tobytes()) for part in parts]
+    sizes = b"".join(struct.pack("<2I", len(part), len(small)) for part, small in zip(parts, packed, strict=True))
+    whole = b"DSCOMPRESSED" + content[12:begin] + struct.pack("<I", streams) + sizes + b"".join(packed)
+    (tmp_path / "c.sur").write_bytes(whole)
+    np.testing.assert_array_equal(open_scan(tmp_path / "c.sur"), open_scan(SCANS / "sur-2.sur"))
+    (tmp_path / "c.sur").write_bytes(whole[:-500])
+    with refused():
+        open_scan(tmp_path / "c.sur")
+
+
+# -- index rows and columns --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("header", "index"), [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize("suffix", ["csv", "txt"])
+def test_index__that_pandas_writes_is_no_height(header, index, suffix, tmp_path):
+    path = matrix(tmp_path / f"m.{suffix}", ROUGH, header=header, index=index)
+    with pytest.warns(UserWarning, match="taken as an index"):
+        h = open_scan(path, unit="um", spacing="2 um")
+    np.testing.assert_allclose(h, 1e-6 * ROUGH.T, rtol=1e-12)
+    with refused("spacing"):
+        open_scan(path, unit="um")
+
+
+@real
+def test_index__of_the_shared_file():
+    with pytest.warns(UserWarning, match="index"):
+        h = open_scan(SCANS / "misread" / "pandas_default.csv", unit="um", spacing="1.5625 um")
+    assert h.shape == (128, 128)
+    assert not np.isnan(h).any()
+
+
+@pytest.mark.parametrize("corner", ["", "0"])
+def test_index__of_lengths_is_the_spacing(corner, tmp_path):
+    x, y = 0.5 * np.arange(24), 0.25 * np.arange(20)
+    path = matrix(tmp_path / "m.csv", pd.DataFrame(ROUGH, y, x), index_label=corner)
+    with pytest.warns(UserWarning, match="taken as coordinates"):
+        h = open_scan(path, unit="um")
+    np.testing.assert_allclose(h, 1e-6 * ROUGH.T, rtol=1e-12)
+    np.testing.assert_allclose(spacing(h), (0.5e-6, 0.25e-6), rtol=1e-12)
+    matrix(path, pd.DataFrame(ROUGH[::-1], y[::-1], x), index_label=corner)  # the largest y first
+    with pytest.warns(UserWarning, match="taken as coordinates"):
+        np.testing.assert_array_equal(open_scan(path, unit="um"), h)
+
+
+def test_index__is_not_seen_in_heights(tmp_path):
+    """Planes rise by equal steps everywhere, and one smooth row does not rise by equal steps."""
+    i, j = np.mgrid[:20, :24]
+    for z in (i + 0.5 * j, ROUGH, np.sin(0.3 * j) + i, np.where(i + j > 5, 0.0, 1.0)):
+        np.savetxt(tmp_path / "m.csv", z, delimiter=",")
+        h = open_scan(tmp_path / "m.csv", unit="um", spacing="1 um")
+        np.testing.assert_allclose(h, 1e-6 * z.T, rtol=1e-12, atol=1e-20)
+
+
+# -- numbers for missing points, and scales ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [-9999.0, 32767.0, -1e6, 1.7e38])
+@pytest.mark.parametrize("kind", ["csv", "npy", "x3p"])
+def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
+    z = ROUGH.copy()
+    z[3:5, 4:9] = number
+    path = tmp_path / f"m.{kind}"
+    options = {"unit": "um", "spacing": "1 um"}
+    if kind == "csv":
+        np.savetxt(path, z, delimiter=",")
+    elif kind == "npy":
+        np.save(path, z)
+    else:
+        write_x3p(path, z.T)
+        options = {"height_scale": 1e-6}
+    with pytest.warns(UserWarning, match=f"10 points have the height {number:g}".replace("+", r"\+")):
+        h = open_scan(path, **options)
+    np.testing.assert_allclose(h, 1e-6 * np.where(z == number, np.nan, z).T, rtol=1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
+
+
+def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):
+    for z in (np.minimum(ROUGH, 0.5), np.where(ROUGH > 0, 1.0, 0.0), np.where(ROUGH > 1, -5.0, ROUGH)):
+        np.save(tmp_path / "m.npy", z)
+        assert not np.isnan(open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")).any()
+
+
+def test_no_data__of_few_points_is_named_in_the_refusal(tmp_path):
+    z = ROUGH.copy()
+    z[0, :2] = 1e7
+    np.save(tmp_path / "m.npy", z)
+    with pytest.raises(Exception, match="no_data"):
+        open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
+    h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um", no_data=1e7)
+    assert int(np.isnan(h).sum()) == 2
+
+
+def test_height_scale__opens_a_file_that_states_a_wrong_unit():
+    path = FILES / "micron_5.x3p"
+    with pytest.raises(Exception, match="height_scale"):
+        open_scan(path)
+    with pytest.raises(Exception, match="height_scale"):
+        open_scan(path, spacing="0.645 um")
+    h = open_scan(path, spacing="0.645 um", height_scale=1e-6)
+    assert h.shape == (64, 64)
+    assert 1e-6 < float(h.std()) < 1e-5
+    with refused("height_scale", 0):
+        open_scan(path, spacing="0.645 um", height_scale=0)
+
+
+def test_keys__of_cards_and_options_of_the_command(tmp_path, monkeypatch):
+    path = write_x3p(tmp_path / "s.x3p", np.where(tilted() > 1.3e-5, -0.5, tilted()))
+    text = f'file = "s.x3p"\nsha256 = "{sha256(path)}"\nno_data = -0.5\nheight_scale = 0.5\n'
+    h = open_scan(card(tmp_path, text))
+    np.testing.assert_allclose(h, np.where(tilted() > 1.3e-5, np.nan, 0.5 * tilted()), rtol=1e-12)
+    monkeypatch.chdir(tmp_path)
+    options = ["--no-data", "-0.5", "--height-scale", "0.5", "--card"]
+    done = CliRunner().invoke(main, ["scan", "s.x3p", *options], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "no_data = -0.5\nheight_scale = 0.5" in done.output
+    assert "no_data = -0.5\nheight_scale = 0.5" in (tmp_path / "s.toml").read_text()
+
+
+# -- points and tables -------------------------------------------------------------------------------------------------
+
+
+def points(shape=(40, 30), jitter=0.0, seed=1):
+    """Points of a slowly varying surface off a lattice by a part of its steps, in any order."""
+    rng = np.random.default_rng(seed)
+    at = np.stack(np.mgrid[: shape[0], : shape[1]], axis=-1).reshape(-1, 2) * (2.0, 3.0)
+    at = at + rng.uniform(-jitter, jitter, at.shape) * (2.0, 3.0)
+    z = np.sin(0.2 * at[:, 0]) + np.cos(0.15 * at[:, 1])
+    return rng.permutation(np.column_stack([at, z]))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-6, 1e-3, 9e-3])
+def test_points__near_a_lattice_are_that_lattice(jitter, tmp_path):
+    np.savetxt(tmp_path / "p.xyz", points(jitter=jitter))
+    h = open_scan(tmp_path / "p.xyz", unit="um")
+    assert h.shape == (40, 30)
+    np.testing.assert_allclose(spacing(h), (2e-6, 3e-6), rtol=1e-3 * (jitter > 0) + 1e-9)
+    x, y = np.mgrid[:40, :30] * np.reshape([2.0, 3.0], (2, 1, 1))
+    np.testing.assert_allclose(h, 1e-6 * (np.sin(0.2 * x) + np.cos(0.15 * y)), atol=1e-6 * jitter)
+
+
+@real
+def test_points__of_the_shared_file():
+    h = open_scan(SCANS / "misread" / "jj_1e-06.xyz", unit="um")
+    assert h.shape == (60, 40)
+    assert not np.isnan(h).any()
+    np.testing.assert_allclose(spacing(h), 2e-6, rtol=1e-7)
+
+
+def test_points__absent_from_the_lattice_are_missing(tmp_path):
+    some = points()[:1100]
+    np.savetxt(tmp_path / "p.xyz", some, header="x y z", comments="")
+    assert int(np.isnan(open_scan(tmp_path / "p.xyz", unit="um")).sum()) == 100
+
+
+def test_points__off_any_lattice_ask_for_a_grid_and_count_empty_cells(tmp_path):
+    np.savetxt(tmp_path / "p.csv", points(jitter=0.3), delimiter=",")
+    with refused("grid"):
+        open_scan(tmp_path / "p.csv", unit="um")
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        h = open_scan(tmp_path / "p.csv", unit="um", grid="4 um")
+    empty = int(np.isnan(h).sum())
+    assert empty > 0
+    assert f"{empty} of {h.size} cells" in str(said[0].message)
+    np.testing.assert_allclose(spacing(h), 4e-6, rtol=1e-12)
+    x, y = 1e6 * h.x.values[:, None] - 0.6, 1e6 * h.y.values - 0.9
+    assert np.nanmax(np.abs(1e6 * h - np.sin(0.2 * x) - np.cos(0.15 * y))) < 0.6  # half a cell times the slope
+    with pytest.warns(UserWarning, match="hold no point"):
+        fine = open_scan(tmp_path / "p.csv", unit="um", grid="1 um")
+    x, y = 1e6 * fine.x.values[:, None] - 0.6, 1e6 * fine.y.values - 0.9
+    off = np.abs(1e6 * fine - np.sin(0.2 * x) - np.cos(0.15 * y))
+    assert float(off[6:-6, 6:-6].max()) < 0.15  # linear between points; the triangles at the border are long
+    assert float(np.isnan(fine).mean()) < 0.05
+
+
+def test_points__two_at_one_node_are_no_lattice(tmp_path):
+    some = points()
+    np.savetxt(tmp_path / "p.xyz", np.vstack([some, some[:1] + np.array([0, 0, 1.0])]))
+    with refused("grid"):
+        open_scan(tmp_path / "p.xyz", unit="um")
+    assert open_scan(tmp_path / "p.xyz", unit="um", grid="6 um").shape == (13, 15)
+
+
+def test_lattice__of_random_points_or_beyond_a_hundredth_of_a_step_is_none():
+    assert lattice(np.random.default_rng(2).random((5000, 3))) is None
+    assert lattice(points(jitter=0.03)) is None
+
+
+def test_grid__is_refused_for_a_map(tmp_path):
+    np.save(tmp_path / "m.npy", ROUGH)
+    with refused("grid"):
+        open_scan(tmp_path / "m.npy", unit="um", spacing="1 um", grid="2 um")
+
+
+def test_x3p__point_cloud_is_points_and_not_a_profile(tmp_path):
+    x3pio = pytest.importorskip("x3pio")
+    x3pio.write_points(tmp_path / "c.x3p", 1e-6 * points(jitter=1e-3))
+    assert [c.kind for c in list_channels(tmp_path / "c.x3p")] == ["points"]
+    assert open_scan(tmp_path / "c.x3p").shape == (40, 30)
+    x3pio.write_points(tmp_path / "c.x3p", 1e-6 * points(jitter=0.3))
+    with refused("grid"):
+        open_scan(tmp_path / "c.x3p")
+
+
+def test_table__of_force_curves_is_no_map(tmp_path):
+    table = np.random.default_rng(1).random((300, 4))
+    np.savetxt(tmp_path / "fd.csv", table, delimiter=",", header="height,force,time,separation", comments="")
+    with pytest.raises(Exception, match="a table of 4 columns"):
+        open_scan(tmp_path / "fd.csv", unit="um", spacing="1 um")
+    np.save(tmp_path / "narrow.npy", table)
+    assert open_scan(tmp_path / "narrow.npy", unit="um", spacing=CELL).shape == (4, 300)
+
+
+def test_auto__says_that_no_reader_knows_the_content(tmp_path):
+    (tmp_path / "a.bin").write_text("This is a letter, and no scan.\n" * 9)
+    with pytest.raises(Exception, match="no reader knows"):
+        open_scan(tmp_path / "a.bin", format="auto")
