@@ -11,9 +11,10 @@ import roughvisc as rv
 from roughvisc.arguments import arguments, units_of
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials.derived import stiffened
+from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
-from roughvisc.study.si_tables import COLUMNS, MODELS, unit_of
+from roughvisc.study.si_tables import COLUMNS, unit_of
 from roughvisc.study.study_file import KEPT, PROGRAMS, SEGMENTS
 from roughvisc.topography.cards import FACE_STEPS, STEPS
 from roughvisc.topography.surrogates import surrogate

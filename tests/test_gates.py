@@ -129,3 +129,29 @@ raised = 1e-6
 np.testing.assert_array_equal(rv.open_scan("card.toml").values, case.height().values)
 """
     added(edits, script, surface="raised = 1e-6", solve='boundary = "free"')
+
+
+def test_material__is_added_in_one_file(added):
+    edits = {
+        "mechanics/materials/models.py": {
+            "MODELS: dict[str, Callable[..., Material]] = {\n": '    "gel": gel,\n',
+            "from roughvisc.units import Quantity, quantities\n": """
+
+@quantities(modulus="Pa", drainage="s")
+def gel(modulus: Quantity, drainage: Quantity) -> Prony:
+    \"\"\"Gel that gives way twice as much after its drainage.\"\"\"
+    return Prony(glassy=1 / modulus, compliances=(1 / modulus,), times=(drainage,))
+""",
+        }
+    }
+    script = """
+assert case.material() == rv.Prony(glassy=1e-3, compliances=(1e-3,), times=(5.0,))
+assert rv.Case.from_json(case.to_json()).material() == case.material()
+try:
+    rv.vary(case, {"material.modulus": "3 kg"})
+except rv.InputError as error:
+    assert error.key == "material.modulus", error
+else:
+    raise AssertionError("a wrong unit is read")
+"""
+    added(edits, script, material='model = "gel"\nmodulus = "1 kPa"\ndrainage = "5 s"')

@@ -9,9 +9,10 @@ from test_docs import DOCS
 import roughvisc as rv
 from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.settings import Settings
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.si_tables import COLUMNS, MODELS, TABLES
+from roughvisc.study.si_tables import COLUMNS, TABLES
 from roughvisc.study.study_file import GEOMETRY, PROGRAMS, SEGMENTS, TEMPERATURE
 from roughvisc.topography.cards import STEPS
 from roughvisc.topography.synthesis import RECIPES

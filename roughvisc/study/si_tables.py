@@ -15,12 +15,7 @@ import numpy as np
 from roughvisc.arguments import a_table, arguments, call, located, one_of, refuse_unknown, units_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.mechanics.materials.creep import Material, power_law
-from roughvisc.mechanics.materials.derived import pair
-from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
-from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.relaxation import from_relaxation
-from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
+from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.materials.temperature import arrhenius, wlf
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
@@ -37,20 +32,6 @@ from roughvisc.units import number, quantity
 
 #: Tables of a study, without its sweep.
 TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep", "observe", "audit")
-#: Function of each model of a material.
-MODELS: dict[str, Callable[..., Material]] = {
-    "elastic": elastic,
-    "maxwell": maxwell,
-    "kelvin_voigt": kelvin_voigt,
-    "zener": zener,
-    "from_relaxation": from_relaxation,
-    "prony": Prony,
-    "power_law": power_law,
-    "creep_table": creep_table,
-    "relaxation_table": relaxation_table,
-    "dynamic_table": dynamic_table,
-    "pair": pair,
-}
 #: Largest number of speeds between two ends.
 _MOST_SPEEDS = 1000
 

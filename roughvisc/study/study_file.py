@@ -22,13 +22,13 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.derived import LARGEST_SHIFT, shift, stiffened
+from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.materials.temperature import arrhenius, wlf
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.si_tables import MODELS
 from roughvisc.topography.cards import (
     FACE_STEPS,
     STEPS,

@@ -9,10 +9,15 @@ with which it changes in time: see :func:`roughvisc.mechanics.materials.relaxati
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
+from roughvisc.mechanics.materials.creep import Material, power_law
+from roughvisc.mechanics.materials.derived import pair
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.relaxation import in_volume
+from roughvisc.mechanics.materials.relaxation import from_relaxation, in_volume
+from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
 from roughvisc.units import Quantity, quantities
 
 
@@ -213,3 +218,19 @@ def zener(
     kelvin_viscosity = check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
     shear = Prony(1 / modulus, 0.0, (1 / retarded,), (kelvin_viscosity / retarded,))
     return in_volume(shear, poisson, bulk_modulus)
+
+
+#: Function of each model of a material that a study may name; its arguments are the keys of the table.
+MODELS: dict[str, Callable[..., Material]] = {
+    "elastic": elastic,
+    "maxwell": maxwell,
+    "kelvin_voigt": kelvin_voigt,
+    "zener": zener,
+    "from_relaxation": from_relaxation,
+    "prony": Prony,
+    "power_law": power_law,
+    "creep_table": creep_table,
+    "relaxation_table": relaxation_table,
+    "dynamic_table": dynamic_table,
+    "pair": pair,
+}

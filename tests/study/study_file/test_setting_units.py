@@ -3,7 +3,8 @@
 import pytest
 
 from roughvisc.arguments import units_of
-from roughvisc.study.si_tables import MODELS, unit_of
+from roughvisc.mechanics.materials.models import MODELS
+from roughvisc.study.si_tables import unit_of
 from roughvisc.topography.synthesis import RECIPES
 
 CYCLES = {control: {"program": [{"cycle": {}, "control": control}]} for control in ("load", "approach")}
