@@ -30,7 +30,7 @@ from roughvisc.labels import warnings_text
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import Difference, Point, State, Step, at_rest, march
+from roughvisc.mechanics.stepping import Difference, Point, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.topography.grid import nominal_area
 from roughvisc.units import unit_for
@@ -138,14 +138,13 @@ class LoadingRows(Rows):
             If contact outgrows the domain: the run must begin again.
         """
         scene, start = self._scene, self._start
-        every, ends = scene.kept is None, set(scene.corners)
-        largest, reached = start.largest, start.march or at_rest(scene)
+        every, ends = scene.kept is None, set(scene.program.corners)
+        largest = start.largest
         for step in march(scene, start.march):
             point, before = step.point, largest
             self._check_border(step)
             largest = max(before[0], point.force), max(before[1], abs(point.approach))
-            reached = step.state or reached
-            of_all = max(reached.largest_force, point.force), max(reached.largest_approach, abs(point.approach))
+            of_all = max(step.state.largest_force, point.force), max(step.state.largest_approach, abs(point.approach))
             stated = error_columns(step, scene, self._choice.series_error, largest, of_all)
             if every:
                 kept = point.time in ends or meets_tolerance(step, scene, stated["stated_error"])
@@ -153,12 +152,12 @@ class LoadingRows(Rows):
                 kept = scene.keeps(point.time)
             # with hardly any instantaneous compliance a pressure that is not kept belongs to the whole step; a given
             # load is right all the same
-            began = point.before[0] if point.before else scene.corners[step.segment]
+            began = point.before[0] if point.before else scene.program.corners[step.segment]
             by_load = scene.program.segments[step.segment].control == "load"
             is_end_value = by_load or not scene.is_soft(point.time - began)
             largest = largest if kept else before
             state = None
-            if step.state is not None:
+            if step.is_end:
                 state = LoadingState(step.state, largest, start.enlarged, start.outgrown, self._border)
             if kept or (not every and is_end_value):
                 values, fields = self._row(step, stated, kept)
@@ -225,9 +224,9 @@ class LoadingRows(Rows):
         row: dict[str, Any] = {
             "force": point.force,
             "approach": point.approach,
-            "work": step.work,
+            "work": step.state.work,
             "time_error": stated["time_error"],
-            "convolutions": step.convolutions,
+            "convolutions": step.state.convolutions,
             "status": STATUS_MEANINGS.index(status),
             "contact_area": area,
             "contact_area_counted": counted,
@@ -238,7 +237,7 @@ class LoadingRows(Rows):
             slide = scene.motions[step.segment]
             friction = tangential_force(grid, point.pressure, displacement, slide)
             row |= {
-                "sliding_distance": step.distance,
+                "sliding_distance": step.state.distance,
                 "friction_force": friction,
                 "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
                 "friction_force_across": tangential_force(grid, point.pressure, displacement, slide, across=True),

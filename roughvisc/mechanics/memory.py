@@ -198,10 +198,6 @@ class Memory:
             total += compliance * mode[0]
         return total
 
-    def restart(self, history: History) -> History:
-        """Return the memory whose next step does not use the last one."""
-        return History(history.fields, history.modes)
-
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
 

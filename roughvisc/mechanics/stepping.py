@@ -15,18 +15,17 @@ controls the length, and a short additional step gives the pressure of a kept ro
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import History, Memory, Rule
-from roughvisc.mechanics.program import Control, Program, Segment, Slide, instant
+from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
 
 Array = Any  # an array of NumPy or CuPy
@@ -137,11 +136,6 @@ class Scene:
         return float(values.min() if self.present is None else values[self.present].min())
 
     @cached_property
-    def corners(self) -> list[float]:
-        """Start of the program and end of each segment. [s]"""
-        return self.program.corners
-
-    @cached_property
     def compliance(self) -> Any:
         """Contact compliance after a time [s], of which few are asked for again and again. [1/Pa]"""
         return lru_cache(maxsize=64)(self.memory.compliance)
@@ -161,6 +155,10 @@ class Scene:
         """Part of the difference between both solutions that is stated, of pressure and force, and of the approach."""
         return (STATED_SOFT, STATED_APPROACH_SOFT) if self.hardly_jumps else (STATED, STATED_APPROACH)
 
+    def prescribed(self, number: int, time: float, point: Point) -> float:
+        """Return what a segment prescribes at a time [s], of a solution that has a point in it. [N or m]"""
+        return self.program.segments[number].value(time - self.program.corners[number], point.start)
+
     @cached_property
     def motions(self) -> tuple[Slide, ...]:
         """Slide of each segment that friction refers to: its own, the last one, or the first; empty if none slides."""
@@ -174,7 +172,10 @@ class Scene:
 
     def keeps(self, time: float) -> bool:
         """Return whether a time is kept. [s]"""
-        return self.kept is None or time in self._kept
+        if self.kept is None:
+            return True
+        at = bisect_left(self.kept, time)
+        return at < len(self.kept) and self.kept[at] == time
 
     def next_kept(self, time: float) -> float:
         """Return the first kept time after a time; infinite if there is none. [s]"""
@@ -182,10 +183,6 @@ class Scene:
             return math.inf
         at = bisect_right(self.kept, time)
         return self.kept[at] if at < len(self.kept) else math.inf
-
-    @cached_property
-    def _kept(self) -> frozenset[float]:
-        return frozenset(self.kept or ())
 
 
 @dataclass(frozen=True)
@@ -252,14 +249,10 @@ class Difference:
     outside: float = 0.0
     friction: float = 0.0
 
-    def times(self, factor: float) -> Difference:
-        """Return a part of it."""
-        return Difference(*(factor * value for value in vars(self).values()))
-
-    def or_larger(self, other: Difference) -> Difference:
-        """Return the larger of both, part by part."""
+    def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
+        """Return the larger error of each kind: of this one, or a part of the other."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Difference(*(max(one, two) for one, two in pairs))
+        return Difference(*(max(one, part * two) for one, two in pairs))
 
 
 @dataclass(frozen=True)
@@ -316,30 +309,18 @@ class Step(NamedTuple):
         Error of the time steps.
     segment : int
         Index of the segment that the step belongs to.
-    work : float
-        Work of the normal force since the start. [J]
-    state : State or None
-        From which a march continues after this step; None in the middle of a pair.
-    distance : float
-        Length of the path of the slides so far. [m]
-    convolutions : int
-        Spent so far.
+    state : State
+        State after the step, from which a march continues; in the middle of a pair the one before the pair, with the
+        work and the path of the step.
+    is_end : bool
+        Whether a march may continue from the state: in the middle of a pair it may not.
     """
 
     point: Point
     difference: Difference
     segment: int
-    work: float
-    state: State | None
-    distance: float = 0.0
-    convolutions: int = 0
-
-
-class Solved(NamedTuple):
-    """A step that is not yet accepted, and its cost."""
-
-    point: Point
-    convolutions: int = 0
+    state: State
+    is_end: bool = True
 
 
 def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
@@ -367,48 +348,27 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     """
     segments = scene.program.segments
     if state is None:
-        state = at_rest(scene)
+        nothing = scene.grid.xp.zeros(scene.gap.shape)
+        given = bool(segments) and segments[0].control == "approach"
+        approach = 0.0 if given else scene.lowest(scene.gap)
+        state = State(Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing)))
         if segments and segments[0].duration > 0:
-            yield accepted(state, state.fine, 0)
+            yield Step(state.fine, state.difference, 0, state)
     while state.segment < len(segments):
         segment = segments[state.segment]
         if segment.duration == 0:
             is_start = state.fine.time == 0
             state = jump(scene, state, segment)
             if (scene.can_jump or is_start) and not jumps_next(scene, state):
-                yield accepted(state, state.fine, state.segment - 1)
+                yield Step(state.fine, state.difference, state.segment - 1, state)
             continue
         advance = pair_of_steps if segment.slide is None else pair_of_cells
         steps = advance(scene, state, segment)
-        assert steps[-1].state is not None, "the last step of a pair has the state"
         state = steps[-1].state
         if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
             steps = steps[:-1]
         yield from steps
         steps = []  # their memory is free while the next ones are computed
-
-
-def accepted(state: State, point: Point, segment: int) -> Step:
-    """Return the step that has led to a state, with its point as a row shows it."""
-    return Step(point, state.difference, segment, state.work, state, state.distance, state.convolutions)
-
-
-def inside_pair(state: State, point: Point, apart: Difference, work: float) -> Step:
-    """Return the first step of a pair that began at a state, with the work done in it. [J]
-
-    Its cost is counted with the second one.
-    """
-    total = state.work + work
-    return Step(point, apart, state.segment, total, None, state.distance, state.convolutions)
-
-
-def at_rest(scene: Scene) -> State:
-    """Return the state before the program begins."""
-    nothing = scene.grid.xp.zeros(scene.gap.shape)
-    given = bool(scene.program.segments) and scene.program.segments[0].control == "approach"
-    approach = 0.0 if given else scene.lowest(scene.gap)
-    point = Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing))
-    return State(point)
 
 
 def jumps_next(scene: Scene, state: State) -> bool:
@@ -422,34 +382,23 @@ def jumps_next(scene: Scene, state: State) -> bool:
 
 def jump(scene: Scene, state: State, segment: Segment) -> State:
     """Return the state after a jump; the next step takes it if there is no instantaneous compliance."""
-    fine, coarse = state.fine, state.coarse
-    value = segment.value(0.0, fine.start)
-    if not scene.can_jump:
-        if value == (fine.force if segment.control == "load" else fine.approach):
-            return entered(scene, state)
-        if segment.control == "approach":
-            raise InputError(
-                f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
-                "compliance: expected a ramp (over > 0), or a material that can jump"
-            )
-        after = entered(scene, state)
-        following = scene.program.segments[after.segment : after.segment + 1]
-        held = bool(following) and following[0].control == "load"
-        fine, coarse = (
-            replace(one, is_late=True, start=value if held else one.start) for one in (after.fine, after.coarse)
+    fine = state.fine
+    if scene.can_jump:
+        return single_step(scene, state, fine.time).state
+    after, value = entered(scene, state), segment.value(0.0, fine.start)
+    if value == (fine.force if segment.control == "load" else fine.approach):
+        return after
+    if segment.control == "approach":
+        raise InputError(
+            f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
+            "compliance: expected a ramp (over > 0), or a material that can jump"
         )
-        return replace(after, fine=fine, twice=None if after.twice is None else coarse)
-    new = take_step(scene, fine, fine.time, segment.control, value)
-    other = new
-    if coarse is not fine:
-        other = take_step(scene, coarse, fine.time, segment.control, value, moved(scene, new.point, coarse, fine))
-    stored = [at_once_stored(scene, one) for one in (new.point, fine)]
-    return entered(scene, after_solves(scene, state, new, other, [new, other], stored[0] - stored[1]))
-
-
-def at_once_stored(scene: Scene, point: Point) -> float:
-    """Return the energy stored in the instantaneous compliance: its change is the work of a jump. [J]"""
-    return 0.5 * float((point.pressure * scene.memory.at_once(point.history)).sum()) * scene.grid.cell_area
+    following = scene.program.segments[after.segment : after.segment + 1]
+    held = bool(following) and following[0].control == "load"
+    fine, coarse = (
+        replace(one, is_late=True, start=value if held else one.start) for one in (after.fine, after.coarse)
+    )
+    return replace(after, fine=fine, twice=None if after.twice is None else coarse)
 
 
 def entered(scene: Scene, state: State) -> State:
@@ -463,8 +412,7 @@ def entered(scene: Scene, state: State) -> State:
 
     def enter(point: Point) -> Point:
         start = point.force if given == "load" else point.approach
-        late = jumps and point.force > 0
-        return replace(point, start=start, before=None, is_late=late, history=scene.memory.restart(point.history))
+        return replace(without_past(point), start=start, is_late=jumps and point.force > 0)
 
     # a corner bends the histories and does not break them: the pairs may stay as long
     smooth = len(controls) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
@@ -473,104 +421,127 @@ def entered(scene: Scene, state: State) -> State:
     return replace(state, fine=enter(state.fine), twice=twice, segment=index, length=state.length if smooth else 0.0)
 
 
+def without_past(point: Point) -> Point:
+    """Return a point from which nothing is extrapolated, and whose next step does not use the last one."""
+    return replace(point, before=None, history=replace(point.history, earlier=None, step=0.0))
+
+
+def single_step(scene: Scene, state: State, time: float) -> Step:
+    """Return one step that both solutions take: a jump, or a step without contact or without memory."""
+    fine, coarse, grid, number = state.fine, state.coarse, scene.grid, state.segment
+    spent = grid.convolutions
+
+    def step(here: Point, guess: Guess | None = None) -> Point:
+        # of surfaces that stay apart the linear rule is exact
+        return take_step(scene, here, time, number, guess=guess, rule="linear" if here.is_open else None)
+
+    new = step(fine)
+    other = new if coarse is fine else step(coarse, moved(scene, new, coarse, fine))
+    work = trapezoid(scene, fine, new)
+    if scene.memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all of it
+        before, after = (float((at.pressure * scene.memory.at_once(at.history)).sum()) for at in (fine, new))
+        work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
+    reached = after_steps(scene, state, new, new, other, work, spent)
+    reached = replace(reached, difference=difference(scene, new, other))
+    if fine.is_open and new.force == 0:
+        twice = reached.twice and without_past(reached.twice)
+        reached = replace(reached, fine=without_past(new), twice=twice)
+    if time == scene.program.corners[number + 1]:
+        reached = entered(scene, reached)
+    return Step(new, reached.difference, number, reached)
+
+
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     """Return the next accepted steps of a segment: a pair, or one step; the last one has the state after them."""
-    fine, coarse, began = state.fine, state.coarse, scene.corners[state.segment]
-    end = scene.corners[state.segment + 1]
+    fine, coarse, number = state.fine, state.coarse, state.segment
+    began, end = scene.program.corners[number : number + 2]
     event = min(scene.next_kept(fine.time), end)
-
-    def prescribed(time: float, point: Point) -> float:
-        return segment.value(time - began, point.start)
-
     if fine.is_open:
-        event = closing_time(scene, fine, segment, began, event)
-        if event > fine.time:
-            return [single_step(scene, state, segment, event, prescribed)]
-        event = min(scene.next_kept(fine.time), end)
+        closes = closing_time(scene, state, segment, event)
+        if closes > fine.time:
+            return [single_step(scene, state, closes)]
     if scene.memory.is_elastic:
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
-        return [
-            single_step(
-                scene, state, segment, fine.time + (event - fine.time) / parts if parts > 1 else event, prescribed
-            )
-        ]
+        return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
 
-    length, next_event = pair_length(scene, state, segment), min(scene.next_kept(event), end)
+    spent, control, memory = scene.grid.convolutions, segment.control, scene.memory
+    length = 2 * scene.time_step if scene.time_step is not None else state.length
+    length = length or FIRST_PAIR * min(segment.duration, segment.period)
+    if segment.amplitude and scene.time_step is None:
+        length = min(length, segment.period / PAIRS_OF_A_CYCLE)
+    next_event = min(scene.next_kept(event), end)
     shortest = SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
     refused = refused_end = math.inf
-    control = segment.control
     while True:
+        # The pair, the same in one step, and the pressures of these instants.
         middle, last = pair_ends(fine.time, length, event, next_event)
-        taken, shares = (
-            last - fine.time,
-            [solver_share(scene, fine.time, middle), solver_share(scene, middle, last)],
+        taken = last - fine.time
+        is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
+        first = take_step(scene, fine, middle, number)
+        second = take_step(scene, first, last, number)
+        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine))
+        half, whole, other = (
+            end_value(scene, here, one, number) for here, one in ((fine, first), (first, second), (coarse, once))
         )
-        first = take_step(scene, fine, middle, control, prescribed(middle, fine), share=shares[0])
-        second = take_step(scene, first.point, last, control, prescribed(last, fine), share=shares[1])
-        once = take_step(
-            scene, coarse, last, control, prescribed(last, coarse), moved(scene, second.point, coarse, fine), shares[1]
-        )
-        shown = [
-            end_value(scene, here, one, control, prescribed)
-            for here, one in ((fine, first), (first.point, second), (coarse, once))
-        ]
-        solved = [first, second, once, *shown]
-        apart = error_at(scene, fine, second.point, once.point, shown[1].point, shown[2].point)
-        if scene.motions and scene.keeps(last):
-            slide = scene.motions[state.segment]
-            apart = replace(apart, friction=friction_apart(scene, shown[1].point, shown[2].point, slide))
-        # error in the middle of the pair: what relaxation leaves of that before, and cells that have entered
-        left, unsure = remaining_part(scene, middle - fine.time, taken), entering(scene, fine, shown[0].point)
-        shared = 0.0
+
+        # The error at the end, and of cells that have just entered, in the middle and in both solutions.
+        apart = error_at(scene, fine, second, once, whole, other)
+        left = 1.0 if is_soft else memory.remaining(middle - fine.time)
+        unsure, shared = entering(scene, fine, half), 0.0
         if scene.time_step is not None:
             break
-        force, approach = largest_values(scene, state, first.point, second.point)
-        in_middle = middle == event and scene.keeps(event)
-        doubtful = unsure > UNCERTAIN * scene.tolerance * force
-        if in_middle and (doubtful or unsure + left * state.difference.pressure > 0.8 * scene.tolerance * force):
-            next_event, state = event, with_cost(state, solved)  # the pair ends here, so that its error is known
-            del first, second, once, shown, solved  # their memory is free while the pair is tried again
-            continue
-        ratio = added(scene, state, first.point, second.point, once.point, segment)
+        if lands and not is_soft:
+            creep = scene.compliance(taken) / scene.compliance(0.0) - 1
+            shared = SHARED * creep**2 * entered_force(scene, fine, second)
+        force, approach = largest_values(scene, state, first, second)
+        ratio = added(scene, state, first, second, once, segment)
         factor = PLANNED * max(ratio, 1e-300) ** (-1 / ORDER)
-        lands = scene.keeps(last) or middle == event
-        if lands and not scene.is_soft(taken):
-            shared = shared_error(scene, fine, second.point)
         of_pressure = max(apart.pressure / scene.stated[0], apart.pressure + shared) / force
         of_approach = apart.approach / approach / scene.stated[1]
         at_end = max(of_pressure, of_approach) if lands and taken > LANDING_PAIR * (last - began) else 0.0
+
+        # Whether it is accepted, and the length to try otherwise.
+        in_middle, allowed = middle == event and scene.keeps(event), scene.tolerance * force
+        doubtful = unsure > UNCERTAIN * allowed or unsure + left * state.difference.pressure > 0.8 * allowed
         # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
-        opens = control == "approach" and fine.force > 0 and min(first.point.force, second.point.force) == 0
-        if opens and second.point.approach >= fine.approach and taken > shortest:
-            state, length = with_cost(state, solved), 0.2 * taken
-            del first, second, once, shown, solved
-            continue
+        opens = control == "approach" and fine.force > 0 and min(first.force, second.force) == 0
         too_long = ratio > REJECTED and ratio < REDUCED * refused
-        if not too_long and ratio > NEARLY_NOTHING and scene.tolerance < at_end < 0.9 * refused_end:
-            too_long, refused_end, factor = True, at_end, 0.5
-        if not too_long or taken <= shortest:
-            easy = ratio < NEARLY_NOTHING and not scene.memory.is_stiff(GROW_FAST * taken)
+        misses = not too_long and ratio > NEARLY_NOTHING and scene.tolerance < at_end < 0.9 * refused_end
+        if in_middle and doubtful:
+            next_event = event  # the pair ends here, so that its error is known
+        elif opens and second.approach >= fine.approach and taken > shortest:
+            length = 0.2 * taken
+        elif too_long and taken > shortest:
+            refused, length = ratio, taken * max(factor, 0.2)
+        elif misses and taken > shortest:
+            refused, refused_end, length = ratio, at_end, taken * 0.5
+        else:
+            easy = ratio < NEARLY_NOTHING and not memory.is_stiff(GROW_FAST * taken)
             was_cut, asked = taken < 0.9 * length, length
             length = taken * min(max(factor, SHRINK), GROW_FAST if easy else GROW)
-            if was_cut and factor >= 1 and not scene.memory.is_stiff(asked):  # an event has cut the pair
+            if was_cut and factor >= 1 and not memory.is_stiff(asked):  # an event has cut the pair
                 length = max(length, min(asked, factor * taken))
             break
-        refused = ratio
-        state, length = with_cost(state, solved), taken * max(factor, 0.2)
-        del first, second, once, shown, solved
+        del first, second, once, half, whole, other  # their memory is free while the pair is tried again
 
-    work, whole = work_of_pair(scene, fine, first.point, second.point)
-    after = after_solves(scene, state, second, once, solved, whole, length)
-    between = state.difference.times(left).or_larger(apart)
-    between = replace(between, pressure=between.pressure + unsure)
-    after = replace(after, difference=apart)
+    works = work_of_pair(scene, fine, first, second)
+    after = after_steps(scene, state, first, second, once, works[1], spent)
+    if scene.motions and scene.keeps(last):
+        apart = replace(apart, friction=friction_apart(scene, whole, other, scene.motions[number]))
+    between = apart.or_larger(state.difference, left)
+    after = replace(after, length=length, difference=apart)
     if last == end:
         after = entered(scene, after)
-    ends = accepted(after, shown[1].point, state.segment)
     return [
-        inside_pair(state, shown[0].point, between, work),
-        ends._replace(difference=replace(apart, pressure=apart.pressure + shared)),
+        Step(
+            half,
+            replace(between, pressure=between.pressure + unsure),
+            number,
+            replace(state, work=state.work + works[0]),
+            False,
+        ),
+        Step(whole, replace(apart, pressure=apart.pressure + shared), number, after),
     ]
 
 
@@ -580,43 +551,41 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
     The body moves backwards under the profile, by whole cells and without interpolation; then the step is an elastic
     contact problem. The coarse solution moves by two cells at once. The error falls with the cells alone.
     """
-    slide, grid = segment.slide, scene.grid
+    slide, grid, memory, fine, coarse = segment.slide, scene.grid, scene.memory, state.fine, state.coarse
     assert slide is not None
-    began, end = scene.corners[state.segment : state.segment + 2]
-    cells = slide.cells(grid.spacing)
-    taken = round((state.fine.time - began) / (end - began) * cells)
-    count = 1 if scene.memory.is_elastic else min(2, cells - taken)
-    times = [instant(began, end, taken + number, cells) for number in range(1, count + 1)]
+    began, end = scene.program.corners[state.segment : state.segment + 2]
+    cells, side, spent = slide.cells(grid.spacing), grid.spacing[slide.axis], grid.convolutions
+    taken = round((fine.time - began) / (end - began) * cells)
+    count = 1 if memory.is_elastic else min(2, cells - taken)
 
-    def over(point: Point, number: int, time: float, guess: Guess, share: float) -> Solved:
-        history = scene.memory.roll(point.history, slide.sense * number, slide.axis)
-        pressure = grid.xp.roll(point.pressure, -slide.sense * number, slide.axis)
-        body = replace(point, history=history, pressure=pressure, before=None)
-        return take_step(scene, body, time, segment.control, segment.value(time - began, point.start), guess, share)
+    def over(here: Point, number: int, time: float, guess: Guess) -> Point:
+        history = memory.roll(here.history, slide.sense * number, slide.axis)
+        pressure = grid.xp.roll(here.pressure, -slide.sense * number, slide.axis)
+        body = replace(here, history=history, pressure=pressure, before=None)
+        return take_step(scene, body, time, state.segment, guess=guess)
 
-    solved, point = [], state.fine
-    for time in times:
-        solved.append(over(point, 1, time, (point.pressure, scene.memory.unit(point.history)), SLIDING_SHARE))
-        point = solved[-1].point
-    once = solved[-1]
-    if not (scene.memory.is_elastic and state.coarse is state.fine) and not (count == 1 and state.coarse is state.fine):
-        guess = moved(scene, point, state.coarse, state.fine)
-        once = over(state.coarse, count, times[-1], guess, SLIDING_SHARE)
-    works = [trapezoid(scene, *pair) for pair in pairwise([state.fine, *(one.point for one in solved)])]
-    after = after_solves(scene, state, solved[-1], once, [*solved, once], sum(works))
-    apart = error_at(scene, state.fine, point, once.point, point, once.point)
-    apart = replace(apart, friction=friction_apart(scene, point, once.point, slide))
+    points, works = [fine], [0.0]
+    for number in range(1, count + 1):
+        here, time = points[-1], instant(began, end, taken + number, cells)
+        points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
+        works.append(works[-1] + trapezoid(scene, here, points[-1]))
+    first, last = points[1], points[-1]
+    once = last
+    if coarse is not fine or count == 2:
+        once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
+    apart = error_at(scene, fine, last, once, last, once)
+    apart = replace(apart, friction=friction_apart(scene, last, once, slide))
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
-    if cells == 1 and not scene.memory.is_elastic:  # no solution with longer steps is known
-        apart = replace(apart, friction=abs(friction_force(scene, point, slide)))
-    side = grid.spacing[slide.axis]
+    if cells == 1 and not memory.is_elastic:  # no solution with longer steps is known
+        apart = replace(apart, friction=abs(friction_force(scene, last, slide)))
+    after = after_steps(scene, state, first, last, once, works[-1], spent)
     after = replace(after, difference=apart, distance=state.distance + count * side)
-    if times[-1] == end:
+    if last.time == end:
         after = entered(scene, after)
-    between = state.difference.or_larger(apart)
-    first = inside_pair(state, solved[0].point, between, works[0])._replace(distance=state.distance + side)
-    return [*[first][: count - 1], accepted(after, point, state.segment)]
+    inside = replace(state, work=state.work + works[1], distance=state.distance + side)
+    ends = Step(last, apart, state.segment, after)
+    return [Step(first, apart.or_larger(state.difference), state.segment, inside, False), ends][-count:]
 
 
 def friction_force(scene: Scene, point: Point, slide: Slide) -> float:
@@ -635,8 +604,8 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
     force, approach = largest_values(scene, state, first, second)
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
     # errors are relative to the largest values, those of the next kept time included
-    began, end = scene.corners[state.segment : state.segment + 2]
-    now, then = (segment.value(time - began, second.start) for time in (second.time, min(following, end)))
+    end = scene.program.corners[state.segment + 1]
+    now, then = (scene.prescribed(state.segment, time, second) for time in (second.time, min(following, end)))
     ahead = max(then / now, 1.0) if now > 0 else 1.0
     force, approach = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
     soft = scene.is_soft(taken)
@@ -670,22 +639,19 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
     return ratio
 
 
-def end_value(scene: Scene, here: Point, solved: Solved, control: Control, prescribed: Any) -> Solved:
+def end_value(scene: Scene, here: Point, point: Point, number: int) -> Point:
     """Return the end of a step with the pressure of its instant, if that is kept and the step is soft.
 
     A short step, in which the load stays or the approach changes as before, gives this pressure.
     """
-    point, step = solved.point, solved.point.time - here.time
+    step = point.time - here.time
     if not (scene.keeps(point.time) and point.force > 0 and scene.is_soft(step)):
-        return solved
-    ahead = END_STEP * step
-    value = point.force
-    if control == "approach":
-        value = 2 * point.approach - prescribed(point.time - ahead, point)
-    alone = replace(point, before=None, history=scene.memory.restart(point.history))
-    found = take_step(scene, alone, point.time + ahead, control, value, rule="constant")
-    shown = replace(found.point, time=point.time, approach=point.approach, before=point.before)
-    return Solved(shown, found.convolutions)
+        return point
+    ahead, value = END_STEP * step, point.force
+    if scene.program.segments[number].control == "approach":
+        value = 2 * point.approach - scene.prescribed(number, point.time - ahead, point)
+    found = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
+    return replace(found, time=point.time, approach=point.approach, before=point.before)
 
 
 def largest_values(scene: Scene, state: State, first: Point, second: Point) -> tuple[float, float]:
@@ -697,11 +663,6 @@ def largest_values(scene: Scene, state: State, first: Point, second: Point) -> t
     rounding = ROUNDING * scene.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
     approach = max(state.largest_approach, abs(first.approach), abs(second.approach))
     return max(force, 1e-300), max(approach, rounding / scene.grid.cell_area, 1e-300)
-
-
-def remaining_part(scene: Scene, time: float, taken: float) -> float:
-    """Return the part of an error that relaxation leaves after a time, in a pair of a length. [s]"""
-    return 1.0 if scene.is_soft(taken) else scene.memory.remaining(time)
 
 
 def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:
@@ -743,62 +704,24 @@ def entering(scene: Scene, before: Point, after: Point) -> float:
     return ENTERED * creeping * entered_force(scene, before, after)
 
 
-def shared_error(scene: Scene, before: Point, after: Point) -> float:
-    """Return the force that both solutions of a pair may miss in the cells that have entered. [N]"""
-    creep = scene.compliance(after.time - before.time) / scene.compliance(0.0) - 1
-    return SHARED * creep**2 * entered_force(scene, before, after)
-
-
 def entered_force(scene: Scene, before: Point, after: Point) -> float:
     """Return the force of the cells that have entered the contact. [N]"""
     return float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
 
 
-def single_step(scene: Scene, state: State, segment: Segment, time: float, prescribed: Any) -> Step:
-    """Return one step that both solutions take: without contact, or without memory."""
-    fine, coarse = state.fine, state.coarse
-    new = take_step(scene, fine, time, segment.control, prescribed(time, fine), rule=exact_rule(fine))
-    other = new
-    if coarse is not fine:
-        value, rule = prescribed(time, coarse), exact_rule(coarse)
-        other = take_step(scene, coarse, time, segment.control, value, moved(scene, new.point, coarse, fine), rule=rule)
-    work = trapezoid(scene, fine, new.point)
-    if scene.memory.is_elastic:  # all of it is stored
-        work = at_once_stored(scene, new.point) - at_once_stored(scene, fine)
-    after = after_solves(scene, state, new, other, [new, other], work)
-    if fine.is_open and new.point.force == 0:
-        twice = after.twice and without_past(scene, after.twice)
-        after = replace(after, fine=without_past(scene, after.fine), twice=twice)
-    if time == scene.corners[state.segment + 1]:
-        after = entered(scene, after)
-    return accepted(after, new.point, state.segment)
-
-
-def without_past(scene: Scene, point: Point) -> Point:
-    """Return a point from which nothing is extrapolated."""
-    return replace(point, before=None, history=scene.memory.restart(point.history))
-
-
-def exact_rule(here: Point) -> Rule | None:
-    """Return the rule that is exact for surfaces that stay apart; None if they are in contact."""
-    return "linear" if here.is_open else None
-
-
-def after_solves(
-    scene: Scene, state: State, new: Solved, other: Solved, solved: list[Solved], work: float, length: float = 0.0
+def after_steps(
+    scene: Scene, state: State, middle: Point, fine: Point, coarse: Point, work: float, spent: int
 ) -> State:
-    """Return the state after accepted steps."""
-    fine, coarse = new.point, other.point
-    middle = solved[0].point
+    """Return the state after accepted steps, of whose convolutions the grid had counted some before."""
     return replace(
-        with_cost(state, solved),
+        state,
         fine=fine,
         twice=None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
-        length=length,
-        difference=difference(scene, fine, coarse),
+        length=0.0,
         largest_force=max(state.largest_force, middle.force, fine.force),
         largest_approach=max(state.largest_approach, abs(middle.approach), abs(fine.approach)),
         work=state.work + work,
+        convolutions=state.convolutions + scene.grid.convolutions - spent,
     )
 
 
@@ -810,12 +733,6 @@ def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
     pressure = float(abs(fine.pressure - coarse.pressure).sum()) * scene.grid.cell_area
     approach = abs(fine.approach - coarse.approach)
     return Difference(stated * pressure, stated * abs(fine.force - coarse.force), of_approach * approach)
-
-
-def with_cost(state: State, solved: list[Solved]) -> State:
-    """Return the state with the cost of solves."""
-    each = {id(one): one for one in solved}.values()
-    return replace(state, convolutions=state.convolutions + sum(one.convolutions for one in each))
 
 
 def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
@@ -855,31 +772,12 @@ def trapezoid(scene: Scene, before: Point, after: Point) -> float:
     """
     if before.force == 0 == after.force:
         return 0.0
-    begin, end = (
-        point.approach if point.force > 0 else max(point.approach, touching_level(scene, point))
-        for point in (before, after)
-    )
+    begin, end = before.approach, after.approach
+    if before.force == 0:
+        begin = max(begin, scene.lowest(scene.gap + scene.memory.displacement(before.history)[0]))
+    if after.force == 0:
+        end = max(end, scene.lowest(scene.gap + scene.memory.displacement(after.history)[0]))
     return 0.5 * (before.force + after.force) * (end - begin)
-
-
-def touching_level(scene: Scene, point: Point) -> float:
-    """Return the approach at which the surfaces would just touch. [m]"""
-    return scene.lowest(scene.gap + scene.memory.displacement(point.history)[0])
-
-
-def solver_share(scene: Scene, time: float, end: float) -> float:
-    """Return the part of the solver's tolerance in a step: that of the end of a soft step magnifies the residual."""
-    return MAGNIFIED if scene.keeps(end) and scene.is_soft(end - time) else 1.0
-
-
-def pair_length(scene: Scene, state: State, segment: Segment) -> float:
-    """Return the length of the pair to try first. [s]"""
-    if scene.time_step is not None:
-        return 2 * scene.time_step
-    length = state.length or FIRST_PAIR * min(segment.duration, segment.period)
-    if segment.amplitude:
-        length = min(length, segment.period / PAIRS_OF_A_CYCLE)
-    return length
 
 
 def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
@@ -902,12 +800,11 @@ def take_step(
     scene: Scene,
     here: Point,
     time: float,
-    control: Control,
-    value: float,
+    number: int,
+    value: float | None = None,
     guess: Guess | None = None,
-    share: float = 1.0,
     rule: Rule | None = None,
-) -> Solved:
+) -> Point:
     """Return the point a step ahead.
 
     Parameters
@@ -918,14 +815,12 @@ def take_step(
         Where the step begins.
     time : float
         End of the step. [s]
-    control : {"load", "approach"}
-        What is prescribed.
-    value : float
-        Its value at the end. [N or m]
+    number : int
+        Index of the segment.
+    value : float, optional
+        Load or approach at the end. Default: what the segment prescribes. [N or m]
     guess : tuple, optional
         First guess of the pressure and its displacement per unit compliance. Default: extrapolated.
-    share : float
-        Part of the usual tolerance of the contact solver.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
 
@@ -934,26 +829,28 @@ def take_step(
     ConvergenceError
         If the contact is not solved.
     """
-    memory, step, area = scene.memory, time - here.time, scene.grid.cell_area
+    memory, step, area, segment = scene.memory, time - here.time, scene.grid.cell_area, scene.program.segments[number]
+    by_load = segment.control == "load"
+    value = scene.prescribed(number, time, here) if value is None else value
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
-    alpha, gap = prediction.compliance, prediction.carried
+    alpha, gap, grid = prediction.compliance, prediction.carried, prediction.grid or scene.grid
     gap += scene.gap
     lowest = scene.lowest(gap)
     before = (here.time, here.pressure, memory.unit(here.history)) if step > 0 and not here.is_late else None
-    if value == 0 if control == "load" else value <= lowest:
-        nothing = scene.grid.xp.zeros(gap.shape)
-        approach = lowest if control == "load" else value
+    if value == 0 if by_load else value <= lowest:
+        nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
-        return Solved(Point(time, nothing, 0.0, approach, history, before, here.start))
+        return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
     pressure, unit = guess or extrapolated(scene, here, step)
     guess = None  # not needed while the contact is solved
     pressure, unit = alpha * pressure, None if unit is None else alpha * unit
+    share = SLIDING_SHARE if segment.slide else MAGNIFIED if scene.keeps(time) and scene.is_soft(step) else 1.0
     try:
         found = solve_contact(
-            prediction.grid or scene.grid,
+            grid,
             gap,
-            load=value * alpha / area if control == "load" else None,
-            approach=value if control == "approach" else None,
+            load=value * alpha / area if by_load else None,
+            approach=None if by_load else value,
             tolerance=max(SOLVER_SHARE * scene.tolerance * share, 1e-10),
             start=pressure,
             start_displacement=unit,
@@ -964,14 +861,16 @@ def take_step(
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
         ) from error
+    if grid is not scene.grid:
+        scene.grid.convolutions += found.convolutions
     pressure, unit = found.pressure, found.displacement
     pressure /= alpha
     unit /= alpha
-    point = Point(
+    return Point(
         time,
         pressure,
-        value if control == "load" else found.load / alpha * area,
-        value if control == "approach" else found.approach,
+        value if by_load else found.load / alpha * area,
+        found.approach if by_load else value,
         memory.advance(here.history, prediction, unit, pressure),
         before,
         here.start,
@@ -979,7 +878,6 @@ def take_step(
         found.error,
         found.approach_error,
     )
-    return Solved(point, found.convolutions)
 
 
 def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
@@ -1001,16 +899,13 @@ def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
     return second.pressure + (coarse.pressure - fine.pressure), unit + (of_coarse - of_fine)
 
 
-def closing_time(scene: Scene, here: Point, segment: Segment, began: float, event: float) -> float:
+def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:
     """Return the time up to which the surfaces, apart now, stay apart; the present time if they touch at once. [s]"""
-    now = here.time
+    here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.is_nothing(here.start) else now
     if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to the undeformed one
         return event
-
-    def prescribed(time: float) -> float:
-        return segment.value(time - began, here.start)
 
     def touching(time: float) -> float:
         return scene.lowest(scene.gap + scene.memory.after_rest(here.history, time - now))
@@ -1022,10 +917,10 @@ def closing_time(scene: Scene, here: Point, segment: Segment, began: float, even
         while pending:
             left, right = pending.pop()
             level = touching(right)
-            if max(prescribed(left), prescribed(right)) <= level:
+            if max(scene.prescribed(state.segment, end, here) for end in (left, right)) <= level:
                 continue
             if right - left <= CLOSING * (event - now):
-                if prescribed(right) > level:
+                if scene.prescribed(state.segment, right, here) > level:
                     return left if left - now > AT_ONCE * (event - now) else now
                 continue
             middle = 0.5 * (left + right)

@@ -46,7 +46,7 @@ def one_by_one():
         program += tapping(1)
     steps = list(march(sphere(program, times=(program.duration,), tolerance=1e-3)))
     assert contacts(steps) == CYCLES
-    return steps[-1].work
+    return steps[-1].state.work
 
 
 @pytest.mark.thorough
@@ -57,7 +57,7 @@ def test_taps__are_all_found_and_work_as_in_single_cycles(kept, one_by_one):
     times = tuple((PERIOD / kept * np.arange(kept * CYCLES + 1)).tolist()) if kept else (CYCLES * PERIOD,)
     steps = list(march(sphere(tapping(CYCLES), times=times, tolerance=1e-3)))
     assert contacts(steps) == CYCLES
-    assert steps[-1].work == pytest.approx(one_by_one, rel=5e-3)
+    assert steps[-1].state.work == pytest.approx(one_by_one, rel=5e-3)
 
 
 def test_taps__work_as_in_steps_eight_times_as_short():
@@ -67,7 +67,7 @@ def test_taps__work_as_in_steps_eight_times_as_short():
         for how in ({"tolerance": 1e-3}, {"time_step": PERIOD / 512, "tolerance": 1e-6})
     )
     assert contacts(found) == contacts(finer) == cycles
-    assert found[-1].work == pytest.approx(finer[-1].work, rel=5e-3)
+    assert found[-1].state.work == pytest.approx(finer[-1].state.work, rel=5e-3)
 
 
 def found_again(steps, after):

@@ -136,11 +136,11 @@ def assert_same_march(scene, other):
         assert_equal(there.point.pressure, step.point.pressure)
         assert_equal(other.memory.displacement(there.point.history), scene.memory.displacement(step.point.history))
         numbers, theirs = (
-            [one.point.time, one.point.force, one.point.approach, one.work, *vars(one.difference).values()]
+            [one.point.time, one.point.force, one.point.approach, one.state.work, *vars(one.difference).values()]
             for one in (step, there)
         )
         assert theirs == pytest.approx(numbers, rel=1e-9, abs=1e-12)
-        assert there.convolutions == step.convolutions
+        assert there.state.convolutions == step.state.convolutions
     return steps, others
 
 
@@ -166,7 +166,7 @@ def test_slide__is_the_same_on_a_device(xp):
     scene = scene_of(ZENER, program, kept=(0.0, 0.35))
     other = on_device(scene, xp)
     steps, others = assert_same_march(scene, other)
-    assert steps[-1].distance == pytest.approx(10.6)
+    assert steps[-1].state.distance == pytest.approx(10.6)
     for step, there in zip(steps, others, strict=True):
         motion = scene.motions[step.segment]
         one, two = (
@@ -269,7 +269,7 @@ def test_one_plain_array__is_refused_by_the_march(xp, field):
     scene = scene_of(ZENER, CYCLE, present=absent_cells())
     other = on_device(scene, xp)
     if field == "history":
-        step = next(step for step in march(other) if step.state is not None and step.point.time > 0)
+        step = next(step for step in march(other) if step.is_end and step.point.time > 0)
         history = replace(step.point.history, modes=step.point.history.modes.get())
         start = replace(step.state, fine=replace(step.state.fine, history=history))
     else:

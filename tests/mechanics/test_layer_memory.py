@@ -104,14 +104,6 @@ def test_roll__moves_the_displacement(cells, axis):
     np.testing.assert_allclose(rolled, np.roll(memory.displacement(history)[0], -cells, axis), rtol=1e-9, atol=1e-18)
 
 
-def test_restart__forgets_the_last_step_alone():
-    memory = memory_of(PAIRS["rubber on soft"])
-    _, history = marched(memory, STEPS, pressures(len(STEPS)), memory.grid)
-    again = memory.restart(history)
-    np.testing.assert_array_equal(memory.displacement(again), memory.displacement(history))
-    assert memory.rule(again, 0.5) != "bdf2"
-
-
 @pytest.mark.thorough
 def test_kernel_of_a_step__is_positive():
     memory = memory_of(PAIRS["rubber on polymer"], "free")

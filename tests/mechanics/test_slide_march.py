@@ -201,7 +201,7 @@ def test_held_approach__keeps_it_and_finds_the_force():
     program = rv.Program().load(2e-3, over=0).hold(1e-3, control="approach").slide(PERIOD, speed=0.1)
     found = scene(rough((36, 30)), rubber(), program, times=None)
     steps = list(march(found))
-    before = next(step for step in reversed(steps) if step.distance == 0)
+    before = next(step for step in reversed(steps) if step.state.distance == 0)
     assert steps[-1].point.approach == before.point.approach
     assert steps[-1].point.force > 1.05 * before.point.force, "the body has no time to give way"
 
@@ -226,12 +226,12 @@ def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():
     )
     found = scene(rough((20, 21)), rubber(), program, times=(1e-3, 2e-3, program.duration))
     whole = list(march(found))
-    for at in [number for number, step in enumerate(whole[:-1]) if step.state is not None][1::3]:
+    for at in [number for number, step in enumerate(whole[:-1]) if step.is_end][1::3]:
         again = list(march(found, whole[at].state))
         assert len(again) == len(whole) - at - 1
         assert [step.point.time for step in again] == [step.point.time for step in whole[at + 1 :]]
         np.testing.assert_array_equal(again[-1].point.history.modes, whole[-1].point.history.modes)
-        assert again[-1].distance == whole[-1].distance
+        assert again[-1].state.distance == whole[-1].state.distance
         assert again[-1].difference == whole[-1].difference
 
 
@@ -242,7 +242,7 @@ def test_two_strokes_in_a_row__are_one():
     found = [scene(height, material, program, tolerance=1e-7) for program in (one, two)]
     last = [list(march(one))[-1] for one in found]
     np.testing.assert_allclose(last[1].point.pressure, last[0].point.pressure, atol=1e-5 * last[0].point.pressure.max())
-    assert last[1].distance == pytest.approx(0.5e-3, rel=1e-12)
+    assert last[1].state.distance == pytest.approx(0.5e-3, rel=1e-12)
 
 
 def test_slide__is_of_whole_cells():
