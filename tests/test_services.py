@@ -262,7 +262,7 @@ def test_trade__measures_each_setting(kind, done, tmp_path):
 
 def test_threads__change_no_bit(kind, done, monkeypatch):
     """Fields of any size count as wide, which else have a million cells."""
-    monkeypatch.setattr("roughvisc.mechanics.threads.THREADED_FROM", 64)
+    monkeypatch.setattr("roughvisc.mechanics.grid.THREADED_FROM", 64)
     using, used = fft.set_workers, set()
     monkeypatch.setattr(fft, "set_workers", lambda number: used.add(number) or using(number))
     one, two = (computed(done.case, threads=number).drop_vars("wall_time") for number in (1, 2))

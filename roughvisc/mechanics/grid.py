@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import os
 import threading
-from functools import cached_property
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -22,7 +24,6 @@ import scipy
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
-from roughvisc.mechanics.threads import on_threads, parts_of, threads_of
 
 try:
     import ducc0
@@ -38,6 +39,8 @@ BOUNDARIES: tuple[Boundary, ...] = ("free", "periodic", "mirror")
 ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
 #: Cells from which periodic convolutions are done by blocks of columns too; below, whole fields are faster.
 BLOCKS_FROM = 1024**2
+#: Cells of a field from which several threads are faster than one (measured: slower at 512 squared, faster at 1024).
+THREADED_FROM = 1024**2
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
 
@@ -77,6 +80,10 @@ class Grid:
         Points of the transforms: in free space at least twice the cells.
     period : tuple of int
         Cells of a period, mirror images included; the cells in free space.
+    size : int
+        Number of cells.
+    cell_area : float
+        Area of a cell. [m2]
     symbol : array
         Transform of the kernel at non-negative wave numbers. [m]
     definite : bool
@@ -107,25 +114,17 @@ class Grid:
         self.workers, self.xp = workers, xp
         images = 2 if boundary == "mirror" else 1
         self.period = images * shape[0], images * shape[1]
+        self.size, self.cell_area = shape[0] * shape[1], spacing[0] * spacing[1]
         self.points = shape
         if boundary == "free":
-            self.points = 2 * _fast_length(shape[0]), 2 * _fast_length(shape[1])
+            fast = scipy.fft.next_fast_len
+            self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
         if symbol is None:
-            symbol = self._periodic_symbol if boundary != "free" else self.symbol_of(kernel)
+            symbol = self.symbol_of(kernel) if boundary == "free" else self._periodic_symbol()
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.convolutions = 0
         self._memories: dict[Any, Array] = {}
-
-    @property
-    def size(self) -> int:
-        """Number of cells."""
-        return self.shape[0] * self.shape[1]
-
-    @property
-    def cell_area(self) -> float:
-        """Area of a cell. [m2]"""
-        return self.spacing[0] * self.spacing[1]
 
     @property
     def threads(self) -> int:
@@ -167,16 +166,15 @@ class Grid:
         if self.boundary == "free":
             return free_space_symbol(kernel, self.points, self.spacing)
         waves = periodic_waves(self.period, self.spacing)
-        return self._without_shortest(np.asarray(kernel.transfer(*waves), dtype=float))
+        return self._distinct(np.asarray(kernel.transfer(*waves), dtype=float))
 
-    @cached_property
     def _periodic_symbol(self) -> np.ndarray:
-        """Transform of the kernel on the cells themselves, checked to be positive. [m]"""
-        return self._without_shortest(periodic_symbol(self.kernel, self.period, self.spacing))
+        """Return the transform of the kernel on the cells themselves, checked to be positive. [m]"""
+        return self._distinct(periodic_symbol(self.kernel, self.period, self.spacing))
 
-    def _without_shortest(self, symbol: np.ndarray) -> np.ndarray:
+    def _distinct(self, symbol: np.ndarray) -> np.ndarray:
         """Leave out the waves that change sign at every cell of a mirrored surface: their cosines vanish there."""
-        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]]) if self.boundary == "mirror" else symbol
+        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
 
@@ -217,8 +215,11 @@ class Grid:
         """
         if self.boundary == "mirror":
             return float(self.symbol.mean())
-        along_x, along_y = (self.xp.asarray(_counts(points)) / points for points in self.points)
-        return float((along_x[:, None] * self.symbol * along_y).sum())
+        parts = []  # of the waves that each non-negative wave number stands for
+        for points in self.points:
+            number = np.arange(points // 2 + 1)
+            parts.append(self.xp.asarray(np.where((number == 0) | (2 * number == points), 1.0, 2.0)) / points)
+        return float((parts[0][:, None] * self.symbol * parts[1]).sum())
 
     @cached_property
     def _single_symbol(self) -> Array:
@@ -226,8 +227,7 @@ class Grid:
 
     @cached_property
     def _inverse_symbol(self) -> Array:
-        known = self.boundary != "free"
-        symbol = self.symbol.copy() if known else self.xp.asarray(self._periodic_symbol)
+        symbol = self.xp.asarray(self._periodic_symbol()) if self.boundary == "free" else self.symbol.copy()
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
         return (1 / symbol).astype(np.float32)
 
@@ -241,7 +241,7 @@ class Grid:
             self.multiply(spectrum, symbol)
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
-        (nx, ny), count, fft = self.shape, points[1] // 2 + 1, self._block_transforms
+        (nx, ny), count, fft = self.shape, points[1] // 2 + 1, transforms(1, self.xp)
         spectrum = self._memory((nx, count), np.result_type(field.dtype, np.complex64))
         found = self.xp.empty((nx, ny), field.dtype)
         rows, columns = ROWS, min(max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS), count)
@@ -262,9 +262,9 @@ class Grid:
         def rows_back(part: slice) -> None:
             found[part] = fft.rows_back(spectrum[part], points[1])[:, :ny]
 
-        on_threads(transform_rows, parts_of(nx, rows), threads)
-        on_threads(convolve_columns, parts_of(count, columns), threads)
-        on_threads(rows_back, parts_of(nx, rows), threads)
+        on_threads(transform_rows, nx, rows, threads)
+        on_threads(convolve_columns, count, columns, threads)
+        on_threads(rows_back, nx, rows, threads)
         return found
 
     def _memory(self, shape: tuple[int, int], number: Any) -> Array:
@@ -280,10 +280,6 @@ class Grid:
     @cached_property
     def _transforms(self) -> Transforms:
         return transforms(self.threads, self.xp)
-
-    @cached_property
-    def _block_transforms(self) -> Transforms:
-        return transforms(1, self.xp)
 
     def spectrum(self, field: Array) -> Array:
         """Return the transform of a field, zero beyond the cells."""
@@ -317,15 +313,42 @@ class Grid:
         return self.xp.asarray(phases[:, None] if axis == 0 else phases)
 
 
-def _fast_length(cells: int) -> int:
-    """Return the next length from `cells` on that transforms fast."""
-    return int(scipy.fft.next_fast_len(cells, real=True))
+# ---------------------------------------------------------------------------------------------------------- threads
 
 
-def _counts(points: int) -> np.ndarray:
-    """Return the number of waves on these points at each non-negative wave number."""
-    number = np.arange(points // 2 + 1)
-    return np.where((number == 0) | (2 * number == points), 1.0, 2.0)
+def threads_of(size: int, workers: int | None = None) -> int:
+    """Return the number of threads for a field of a number of cells.
+
+    Parameters
+    ----------
+    size : int
+        Cells.
+    workers : int, optional
+        Threads for a large field. Default: those of ``scipy.fft.set_workers``.
+    """
+    if size < THREADED_FROM:
+        return 1
+    return scipy.fft.get_workers() if workers is None else workers
+
+
+def on_threads(work: Callable[[slice], Any], count: int, length: int, threads: int) -> None:
+    """Call a function for each part, of some length, of so many rows or columns, on a number of threads."""
+    parts = [slice(first, min(first + length, count)) for first in range(0, count, length)]
+    if threads == 1:
+        for part in parts:
+            work(part)
+    else:
+        for _ in _pool(threads).map(work, parts):  # raises what a part has raised
+            pass
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="roughvisc")
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 # ------------------------------------------------------------------------------------------------------- transforms

@@ -39,8 +39,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import largest
-from roughvisc.mechanics.grid import namespace, transforms
-from roughvisc.mechanics.threads import threads_of
+from roughvisc.mechanics.grid import namespace, threads_of, transforms
 
 Array = Any  # an array of NumPy or CuPy
 

@@ -9,7 +9,7 @@ import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.experiment import profile as domain
 from roughvisc.experiment.kept_times import kept_times
-from roughvisc.mechanics import threads as threads_module
+from roughvisc.mechanics import grid as grids
 from roughvisc.variables import FIELDS, VARIABLES
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
@@ -263,7 +263,7 @@ def test_contact_at_the_border_of_a_scan__is_refused():
 
 def test_threads__change_no_bit(monkeypatch):
     """Nor does the next run."""
-    monkeypatch.setattr(threads_module, "THREADED_FROM", 0)
+    monkeypatch.setattr(grids, "THREADED_FROM", 0)
     rough = rv.self_affine((1e-4, 1.1e-4), (41, 45), hurst=0.8, rms_slope=0.1, shortcut=8e-6, seed=3)
     found = []
     for threads in (1, 2, 2):

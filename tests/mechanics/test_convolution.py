@@ -8,7 +8,6 @@ from support import direct, refused
 
 import roughvisc as rv
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics import threads
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid, transform_library
 from roughvisc.mechanics.steady_sliding import Sliding
@@ -95,7 +94,7 @@ def test_inverse__inverts_what_is_far_from_the_border(boundary):
 @pytest.fixture
 def in_small_blocks(monkeypatch):
     """Blocks and threads as on a large grid."""
-    monkeypatch.setattr(threads, "THREADED_FROM", 1)
+    monkeypatch.setattr(grids, "THREADED_FROM", 1)
     for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
 

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics import threads as threading
 from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.grid import Grid
 
 
 @pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
 def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
-    monkeypatch.setattr(threading, "THREADED_FROM", 1)
+    monkeypatch.setattr(grids, "THREADED_FROM", 1)
     for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
     monkeypatch.setattr(solver, "BLOCKS_FROM", 1)
@@ -40,13 +39,13 @@ def test_on_threads__does_each_part_once_and_raises_what_one_raises(threads):
             raise ValueError("the last part")
 
     with pytest.raises(ValueError, match="the last part"):
-        threading.on_threads(work, threading.parts_of(1001, 64), threads)
+        grids.on_threads(work, 1001, 64, threads)
     np.testing.assert_array_equal(field, 1)
 
 
 def doubled(queue):
     field = np.ones(1000)
-    threading.on_threads(lambda part: np.multiply(field[part], 2, out=field[part]), threading.parts_of(1000, 64), 2)
+    grids.on_threads(lambda part: np.multiply(field[part], 2, out=field[part]), 1000, 64, 2)
     queue.put(float(field.sum()))
 
 
