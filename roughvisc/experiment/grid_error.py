@@ -24,7 +24,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser, pressure_distance
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary
-from roughvisc.topography.indenters import grown
+from roughvisc.topography.indenters import is_indenter
 from roughvisc.variables import GRID_ERROR, axis_of
 
 Array = NDArray[np.float64]
@@ -214,7 +214,7 @@ def _peak(height: xr.DataArray) -> float:
 
     Half of the way down to the lower neighbour along each axis: the flanks of a cone meet no higher.
     """
-    if "recipe" in height.attrs and grown(height, 1.0) is not None:
+    if is_indenter(height):
         return 0.0
     values = height.values
     at = np.unravel_index(int(np.nanargmax(values)), values.shape)

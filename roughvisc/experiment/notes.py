@@ -14,7 +14,7 @@ from roughvisc.mechanics.materials.creep import Creep
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
-from roughvisc.topography.indenters import grown
+from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import format_quantity
 from roughvisc.variables import NOT_CONVERGED
@@ -40,7 +40,7 @@ def surface_stands_alone(height: xr.DataArray) -> bool | None:
     """
     if "recipe" not in height.attrs:
         return None
-    if grown(height, 1.0) is not None:
+    if is_indenter(height):
         return True
     return False if is_analytic(height) else None
 

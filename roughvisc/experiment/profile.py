@@ -26,7 +26,7 @@ from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Settings
 from roughvisc.topography.grid import checked, spacing
-from roughvisc.topography.indenters import grown, highest
+from roughvisc.topography.indenters import grown, highest, is_indenter
 
 Array = NDArray[np.float64]
 #: Cells of the longer side of the estimate, and its tolerance.
@@ -216,17 +216,17 @@ def expected_contact(problem: Problem, program: Program, enlarged: int | None = 
     height, body, settings = problem.height, problem.body, problem.settings
     if settings.boundary != "free" or settings.edge != "error":
         return Expected(height)
-    larger = enlarged_indenter(height)
-    if larger is None and not (body.separates and not body.kernel.raises_surface):
+    if not is_indenter(height) and not (body.separates and not body.kernel.raises_surface):
         return Expected(height)  # it is neither enlarged nor cropped
     times = enlarged or 0
     for _ in range(times):
+        larger = enlarged_indenter(height)
         assert larger is not None, "it was enlarged before"
-        height, larger = larger, enlarged_indenter(larger)
+        height = larger
     compliance = float(complete(body.material).contact_compliance(program.duration))
     approach, at_border = estimated(height, body.kernel, compliance, program)
-    while enlarged is None and at_border and larger is not None:
-        height, larger, times = larger, enlarged_indenter(larger), times + 1
+    while enlarged is None and at_border and (larger := enlarged_indenter(height)) is not None:
+        height, times = larger, times + 1
         approach, at_border = estimated(height, body.kernel, compliance, program)
     return Expected(height, times, approach, at_border)
 

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.indenters import grown
+from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.synthesis import BOUNDARIES
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
@@ -115,7 +115,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
     ('free', 'periodic', None)
     """
-    if grown(h, 1.0) is not None:
+    if is_indenter(h):
         return "free"
     mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
     made = BOUNDARIES.get(_recipe_name(h)) == "periodic" or (mirrored and is_mirrored(h.values))
@@ -133,7 +133,7 @@ def is_analytic(h: xr.DataArray) -> bool:
     >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
     (True, False, True)
     """
-    return grown(h, 1.0) is not None or _recipe_name(h) == "wavy"
+    return is_indenter(h) or _recipe_name(h) == "wavy"
 
 
 def _recipe_name(h: xr.DataArray) -> str:

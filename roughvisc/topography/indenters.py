@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -102,6 +102,21 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     return _indenter("flat_punch", {"radius": number("radius", radius, "m")}, size, shape)
 
 
+def is_indenter(h: xr.DataArray) -> bool:
+    """Return whether heights are those of a sphere, cone or flat punch on cells of its grid, which can grow.
+
+    xarray keeps attributes through arithmetic, so the recipe is believed only if it reproduces the heights given.
+    """
+    known = _known(h)
+    if known is None:
+        return False
+    for axis, side in zip("xy", known[1], strict=True):
+        cells = h[axis].values / side - 0.5
+        if np.abs(cells - (np.arange(cells.size) + round(cells[0]))).max() > 1e-6:
+            return False
+    return True
+
+
 def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     """The same indenter on a larger grid: further cells all around, those that exist unchanged.
 
@@ -115,41 +130,27 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     Returns
     -------
     xarray.DataArray or None
-        None if `h` is no sphere, cone or flat punch. xarray keeps attributes through arithmetic, so the recipe is
-        believed only if it reproduces the heights given.
+        None if `h` is no sphere, cone or flat punch, see :func:`is_indenter`.
     """
-    known = _known(h)
+    known = _known(h) if is_indenter(h) else None
     if known is None:
         return None
     evaluate, cell, centre = known
     h = h.transpose("x", "y")
-    axes = [h[axis].values for axis in ("x", "y")]
-    first = [round(at[0] / d - 0.5) for at, d in zip(axes, cell, strict=True)]
-    margin = [(larger - n) // 2 for n, larger in zip(h.shape, grown_shape(h.shape, factor), strict=True)]
-    wider = []
-    for at, d, i, m in zip(axes, cell, first, margin, strict=True):
-        there = (np.arange(i - m, i + at.size + m) + 0.5) * d
-        if np.abs(there[m:-m] - at).max() > 1e-6 * d:
-            return None
-        there[m:-m] = at
+    wider, kept = [], []
+    for axis, side in zip("xy", cell, strict=True):
+        at = h[axis].values
+        margin = max(1, math.ceil(at.size * (factor - 1) / 2 - 1e-6))
+        there = (np.arange(-margin, at.size + margin) + round(at[0] / side - 0.5) + 0.5) * side
+        there[margin:-margin] = at
         wider.append(there)
+        kept.append(slice(margin, -margin))
     heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
-    heights[margin[0] : -margin[0], margin[1] : -margin[1]] = h.values
+    heights[kept[0], kept[1]] = h.values
     larger = with_coordinates(heights, *wider, h.attrs)
     return noted(
         larger, f"grown from {h.sizes['x']} x {h.sizes['y']} to {larger.sizes['x']} x {larger.sizes['y']} cells"
     )
-
-
-def grown_shape(shape: Sequence[int], factor: float) -> tuple[int, ...]:
-    """Numbers of cells of the grid that :func:`grown` makes of one.
-
-    Examples
-    --------
-    >>> grown_shape((32, 101), 1.5), grown_shape((5, 1), 1.0)
-    ((48, 153), (7, 3))
-    """
-    return tuple(n + 2 * max(1, math.ceil(n * (factor - 1) / 2 - 1e-6)) for n in shape)
 
 
 def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | None = None) -> xr.DataArray | None:
@@ -164,7 +165,7 @@ def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | 
     size : tuple of float, optional
         Sides of the domain; default: those that it was made for. [m]
     """
-    if grown(h, 1.0) is None:
+    if not is_indenter(h):
         return None
     recipe = json.loads(h.attrs["recipe"])
     return _indenter(recipe["name"], recipe["parameters"], recipe["size"] if size is None else size, shape)
@@ -188,20 +189,20 @@ def highest(h: xr.DataArray) -> float:
     (0.0, True, True)
     """
     known = _known(h)
-    if known is not None:
-        _, cell, centre = known
-        ends = [(h[axis].values[0] - d / 2, h[axis].values[-1] + d / 2) for axis, d in zip("xy", cell, strict=True)]
-        if all(low <= at <= high for (low, high), at in zip(ends, centre, strict=True)):
-            return 0.0
-    return float(np.nanmax(h.values))
+    is_within = known is not None
+    for axis, side, centre in zip("xy", *known[1:], strict=True) if known else ():
+        at = h[axis].values
+        is_within = is_within and at[0] - side / 2 <= centre <= at[-1] + side / 2
+    return 0.0 if is_within else float(np.nanmax(h.values))
 
 
-def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], list[float]] | None:
+def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
     """Height as a function of x and y from the apex, cell sides and the apex's place; None if the recipe fails. [m]"""
     try:
         recipe = json.loads(h.attrs["recipe"])
         evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
-        cell, centre = cell_of(recipe["size"], recipe["shape"]), [side / 2 for side in recipe["size"]]
+        (width, depth), cell = recipe["size"], cell_of(recipe["size"], recipe["shape"])
+        centre = width / 2, depth / 2
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
