@@ -278,8 +278,8 @@ class LoadingRows(Rows):
         warnings["material"] = table_note(body.materials)
         attributes = facts_of(body, self.end, scene.program.time_scale)
         if body.separates:  # of what was pressed, a series or not; of layers those of the top one
-            attributes["compliance_at_once"] = scene.compliance(0.0)
-            attributes["compliance_at_end"] = scene.compliance(self.end)
+            attributes["compliance_at_once"] = scene.memory.compliance(0.0)
+            attributes["compliance_at_end"] = scene.memory.compliance(self.end)
         attributes |= {
             "memory": choice.note,
             "series_error": choice.series_error,

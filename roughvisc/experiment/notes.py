@@ -196,7 +196,7 @@ def loading_warnings(
         End of the first step in which contact reached the border of a free surface. [s]
     """
     boundary, end = scene.grid.boundary, scene.program.duration
-    at_once, final = scene.compliance(0.0), scene.compliance(end)
+    at_once, final = scene.memory.compliance(0.0), scene.memory.compliance(end)
     each_row = "The approach meets the tolerance; each row states its own error of pressure, force and work."
     accuracy = edge = ""
     if at_once == 0:
@@ -247,7 +247,7 @@ def loading_warnings(
         if alone is None and "pressure" in dataset:
             alone = contact_stands_alone(dataset["pressure"][-1].values, axis)
         if alone:
-            left = {speed: creep_left(scene.compliance(min(period / speed, end)), final) for _, speed in runs}
+            left = {speed: creep_left(scene.memory.compliance(min(period / speed, end)), final) for _, speed in runs}
             wakes.append(wake_note(left, period))
 
     approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell

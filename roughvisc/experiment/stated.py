@@ -94,7 +94,7 @@ def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float
     if contact.any() and point.solver_error > 0:
         pressure = SOLVER_AT_EDGE * point.solver_error * float(point.pressure[contact].mean())
         began = point.before[0] if point.before else scene.program.corners[step.segment]
-        closed = pressure * scene.grid.self_influence * scene.compliance(max(point.time - began, 0.0))
+        closed = pressure * scene.grid.self_influence * scene.memory.compliance(max(point.time - began, 0.0))
         closing = ~contact & (gap <= closed)
         if scene.present is not None:
             closing &= scene.present

@@ -20,7 +20,7 @@ the present displacement is known.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -108,16 +108,14 @@ class Memory:
     def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
         factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
         self.series = series
+        #: Contact compliance after a time [s], of which few are asked for again and again. [1/Pa]
+        self.compliance = lru_cache(maxsize=64)(lambda time: float(series.contact_compliance(time)))
         self.glassy = factor * series.glassy
         flow = [series.fluidity] if series.fluidity else []
         self.compliances = factor * np.array([*series.compliances, *flow])
         self.times = np.array([*series.times, *([np.inf] if flow else [])])
         self.fields = 2 if keeps_pressure else 1
         self.may_ring = self.is_stiff(duration)
-
-    def compliance(self, time: float) -> float:
-        """Return the contact compliance after a time. [1/Pa]"""
-        return float(self.series.contact_compliance(time))
 
     @property
     def is_elastic(self) -> bool:
@@ -258,7 +256,8 @@ class Memory:
             new = np.where(flows, step / 2, one_less_mean_decay(ratio))
             before = np.where(flows, step / 2, -np.expm1(-ratio) - new)
             small = ratio < 0.3  # the difference cancels
-            before[small & ~flows] = _early_weight(ratio[small & ~flows])
+            early = ratio[small & ~flows, None] ** (_ORDERS - 1)
+            before[small & ~flows] = (_COEFFICIENTS * early).sum(axis=-1)
             return own, none, before, new
         if rule == "constant":
             return np.exp(-ratio), none, none, np.where(flows, step, -np.expm1(-ratio))
@@ -267,8 +266,3 @@ class Memory:
         divisor = 1 + beta * ratio
         own, earlier = (1 + growth) ** 2 / (1 + 2 * growth) / divisor, -(growth**2) / (1 + 2 * growth) / divisor
         return own, earlier, none, beta * np.where(flows, step, ratio) / divisor
-
-
-def _early_weight(ratio: np.ndarray) -> np.ndarray:
-    """Return ``(1 - (1 + x) exp(-x)) / x`` for small ``x``, without cancellation."""
-    return np.asarray((_COEFFICIENTS * ratio[:, None] ** (_ORDERS - 1)).sum(axis=-1))

@@ -18,7 +18,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from roughvisc.errors import ConvergenceError, InputError
@@ -136,14 +136,9 @@ class Scene:
         return float(values.min() if self.present is None else values[self.present].min())
 
     @cached_property
-    def compliance(self) -> Any:
-        """Contact compliance after a time [s], of which few are asked for again and again. [1/Pa]"""
-        return lru_cache(maxsize=64)(self.memory.compliance)
-
-    @cached_property
     def can_jump(self) -> bool:
         """Whether the body has an instantaneous compliance."""
-        return self.compliance(0.0) > 0
+        return self.memory.compliance(0.0) > 0
 
     @cached_property
     def hardly_jumps(self) -> bool:
@@ -168,7 +163,7 @@ class Scene:
 
     def is_soft(self, step: float) -> bool:
         """Return whether hardly any compliance of a step is instantaneous. [s]"""
-        return self.compliance(0.0) < SOFT * self.compliance(step)
+        return self.memory.compliance(0.0) < SOFT * self.memory.compliance(step)
 
     def keeps(self, time: float) -> bool:
         """Return whether a time is kept. [s]"""
@@ -441,14 +436,11 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     if scene.memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all of it
         before, after = (float((at.pressure * scene.memory.at_once(at.history)).sum()) for at in (fine, new))
         work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
-    reached = after_steps(scene, state, new, new, other, work, spent)
-    reached = replace(reached, difference=difference(scene, new, other))
+    apart, reached, coarse = difference(scene, new, other), new, other
     if fine.is_open and new.force == 0:
-        twice = reached.twice and without_past(reached.twice)
-        reached = replace(reached, fine=without_past(new), twice=twice)
-    if time == scene.program.corners[number + 1]:
-        reached = entered(scene, reached)
-    return Step(new, reached.difference, number, reached)
+        reached = without_past(new)
+        coarse = reached if other is new else without_past(other)
+    return Step(new, apart, number, after_steps(scene, state, [reached], coarse, apart, work, spent))
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
@@ -492,10 +484,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             break
         if lands and not is_soft:
-            creep = scene.compliance(taken) / scene.compliance(0.0) - 1
+            creep = scene.memory.compliance(taken) / scene.memory.compliance(0.0) - 1
             shared = SHARED * creep**2 * entered_force(scene, fine, second)
         force, approach = largest_values(scene, state, first, second)
-        ratio = added(scene, state, first, second, once, segment)
+        ratio = added(scene, state, second, once, force, approach)
         factor = PLANNED * max(ratio, 1e-300) ** (-1 / ORDER)
         of_pressure = max(apart.pressure / scene.stated[0], apart.pressure + shared) / force
         of_approach = apart.approach / approach / scene.stated[1]
@@ -526,21 +518,13 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         del first, second, once, half, whole, other  # their memory is free while the pair is tried again
 
     works = work_of_pair(scene, fine, first, second)
-    after = after_steps(scene, state, first, second, once, works[1], spent)
     if scene.motions and scene.keeps(last):
         apart = replace(apart, friction=friction_apart(scene, whole, other, scene.motions[number]))
     between = apart.or_larger(state.difference, left)
-    after = replace(after, length=length, difference=apart)
-    if last == end:
-        after = entered(scene, after)
+    after = after_steps(scene, state, [first, second], once, apart, works[1], spent, length)
+    inside = replace(state, work=state.work + works[0])
     return [
-        Step(
-            half,
-            replace(between, pressure=between.pressure + unsure),
-            number,
-            replace(state, work=state.work + works[0]),
-            False,
-        ),
+        Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
         Step(whole, replace(apart, pressure=apart.pressure + shared), number, after),
     ]
 
@@ -569,7 +553,7 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
         here, time = points[-1], instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
         works.append(works[-1] + trapezoid(scene, here, points[-1]))
-    first, last = points[1], points[-1]
+    last = points[-1]
     once = last
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
@@ -579,13 +563,10 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
         apart = apart.or_larger(state.difference)
     if cells == 1 and not memory.is_elastic:  # no solution with longer steps is known
         apart = replace(apart, friction=abs(friction_force(scene, last, slide)))
-    after = after_steps(scene, state, first, last, once, works[-1], spent)
-    after = replace(after, difference=apart, distance=state.distance + count * side)
-    if last.time == end:
-        after = entered(scene, after)
+    after = after_steps(scene, state, points[1:], once, apart, works[-1], spent, distance=count * side)
     inside = replace(state, work=state.work + works[1], distance=state.distance + side)
     ends = Step(last, apart, state.segment, after)
-    return [Step(first, apart.or_larger(state.difference), state.segment, inside, False), ends][-count:]
+    return [Step(points[1], apart.or_larger(state.difference), state.segment, inside, is_end=False), ends][-count:]
 
 
 def friction_force(scene: Scene, point: Point, slide: Slide) -> float:
@@ -598,10 +579,13 @@ def friction_apart(scene: Scene, fine: Point, coarse: Point, slide: Slide) -> fl
     return abs(friction_force(scene, fine, slide) - friction_force(scene, coarse, slide))
 
 
-def added(scene: Scene, state: State, first: Point, second: Point, once: Point, segment: Segment) -> float:
-    """Return what a pair adds to the error at the next kept time, over what it may add."""
+def added(scene: Scene, state: State, second: Point, once: Point, force: float, approach: float) -> float:
+    """Return what a pair adds to the error at the next kept time, over what it may add.
+
+    Errors are relative to the largest force [N] and approach [m].
+    """
     fine, coarse, memory, taken = state.fine, state.coarse, scene.memory, second.time - state.fine.time
-    force, approach = largest_values(scene, state, first, second)
+    control = scene.program.segments[state.segment].control
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
     # errors are relative to the largest values, those of the next kept time included
     end = scene.program.corners[state.segment + 1]
@@ -615,7 +599,7 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
     decays = {1.0} if soft else {1.0, memory.remaining(taken)}
     change = min(float(abs(after - part * before).sum()) for part in decays) * scene.grid.cell_area / force
     if soft:
-        remains = scene.compliance(taken) / scene.compliance(following - second.time + taken)
+        remains = scene.memory.compliance(taken) / scene.memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
         remains = max(memory.remaining(following - second.time), RECEDING if receding else LEAST_REMAINING)
@@ -629,10 +613,10 @@ def added(scene: Scene, state: State, first: Point, second: Point, once: Point, 
     # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
     carried = 0.0 if soft else state.difference.pressure / stated[0] / force * memory.remaining(following - fine.time)
     ratio = over_budget(change * remains, carried)
-    if segment.control == "load":
+    if control == "load":
         change = abs((second.approach - once.approach) - (fine.approach - coarse.approach)) / approach
         ratio = max(ratio, over_budget(change, state.difference.approach / stated[1] / approach))
-    if segment.control == "approach" or second.force == 0 or soft:
+    if control == "approach" or second.force == 0 or soft:
         surfaces = [memory.displacement(point.history)[0] for point in (second, once, fine, coarse)]
         surface = (surfaces[0] - surfaces[1]) - (surfaces[2] - surfaces[3])
         ratio = max(ratio, over_budget(float(abs(surface).max()) / approach * fades, 0.0))
@@ -660,7 +644,7 @@ def largest_values(scene: Scene, state: State, first: Point, second: Point) -> t
     Rounding cannot tell a smaller approach from none: all that a flat surface has under periodic boundaries.
     """
     force = max(state.largest_force, first.force, second.force)
-    rounding = ROUNDING * scene.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
+    rounding = ROUNDING * scene.memory.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
     approach = max(state.largest_approach, abs(first.approach), abs(second.approach))
     return max(force, 1e-300), max(approach, rounding / scene.grid.cell_area, 1e-300)
 
@@ -699,8 +683,8 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Poi
 
 def entering(scene: Scene, before: Point, after: Point) -> float:
     """Return the force that a step leaves uncertain in the middle of a pair, in cells that have entered. [N]"""
-    compliance = scene.compliance(after.time - before.time)
-    creeping = 1 - scene.compliance(0.0) / compliance if compliance > 0 else 0.0
+    compliance = scene.memory.compliance(after.time - before.time)
+    creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
     return ENTERED * creeping * entered_force(scene, before, after)
 
 
@@ -710,19 +694,51 @@ def entered_force(scene: Scene, before: Point, after: Point) -> float:
 
 
 def after_steps(
-    scene: Scene, state: State, middle: Point, fine: Point, coarse: Point, work: float, spent: int
+    scene: Scene,
+    state: State,
+    points: list[Point],
+    coarse: Point,
+    apart: Difference,
+    work: float,
+    spent: int,
+    length: float = 0.0,
+    distance: float = 0.0,
 ) -> State:
-    """Return the state after accepted steps, of whose convolutions the grid had counted some before."""
-    return replace(
-        state,
-        fine=fine,
-        twice=None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
-        length=0.0,
-        largest_force=max(state.largest_force, middle.force, fine.force),
-        largest_approach=max(state.largest_approach, abs(middle.approach), abs(fine.approach)),
-        work=state.work + work,
-        convolutions=state.convolutions + scene.grid.convolutions - spent,
+    """Return the state after accepted steps, of the next segment if they end theirs.
+
+    Parameters
+    ----------
+    scene, state : Scene, State
+        What is prescribed, and where the steps began.
+    points : list of Point
+        Fine solution at the end of each step.
+    coarse : Point
+        Coarse solution at the end of the last one.
+    apart : Difference
+        Between both there.
+    work : float
+        Of the steps. [J]
+    spent : int
+        Convolutions of the grid before the steps.
+    length : float
+        Of the next pair. [s]
+    distance : float
+        Of a slide. [m]
+    """
+    fine = points[-1]
+    reached = State(
+        fine,
+        None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
+        state.segment,
+        length,
+        apart,
+        max(state.largest_force, *(point.force for point in points)),
+        max(state.largest_approach, *(abs(point.approach) for point in points)),
+        state.work + work,
+        state.distance + distance,
+        state.convolutions + scene.grid.convolutions - spent,
     )
+    return entered(scene, reached) if fine.time == scene.program.corners[state.segment + 1] else reached
 
 
 def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
