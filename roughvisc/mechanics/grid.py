@@ -298,10 +298,10 @@ class Grid:
 
     def multiply(self, spectrum: Array, symbol: Array) -> None:
         """Multiply a transform in place by a symbol, which is the same for negative wave numbers along x."""
-        first = len(symbol)
-        spectrum[:first] *= symbol
-        if len(spectrum) > first:
-            spectrum[first:] *= symbol[len(spectrum) - first : 0 : -1]
+        count, first = spectrum.shape[-2], len(symbol)
+        spectrum[..., :first, :] *= symbol
+        if count > first:
+            spectrum[..., first:, :] *= symbol[count - first : 0 : -1]
 
     def turn(self, cells: int, axis: int) -> Array:
         """Return the factors by which the transform of a periodic field changes if the field moves back by `cells`."""

@@ -18,10 +18,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from roughvisc.mechanics.body import Kernel
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import LayerSeries
-from roughvisc.mechanics.memory import History, Memory, Prediction, Rule
+from roughvisc.mechanics.memory import History, Memory, Prediction
 
 Array = Any  # an array of NumPy or CuPy
 
@@ -47,81 +46,45 @@ class LayerMemory(Memory):
         self.waves, self.grid = waves, cast(Grid, grid)
 
     @cached_property
-    def instantaneous(self) -> Array:
-        """Symbol of the instantaneous response. [m/Pa]"""
-        return self._symbol_of(self.waves.kernel())
-
-    @cached_property
-    def symbols(self) -> list[Array]:
-        """Symbol of each exponential [m/Pa], and last of the fluidity [m/(Pa s)]."""
-        return [self._symbol_of(self.waves.kernel(one, 0.0)) for one in np.eye(self.times.size)]
-
-    def _symbol_of(self, kernel: Kernel) -> Array:
-        """Return the transform of a kernel on the device of the grid."""
-        return self.grid.xp.asarray(self.grid.symbol_of(kernel))
+    def weights(self) -> list[Array]:
+        """Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]"""
+        kernels = [*(self.waves.kernel(one, 0.0) for one in np.eye(self.times.size)), self.waves.kernel()]
+        return [self.grid.xp.asarray(self.grid.symbol_of(kernel)) for kernel in kernels]
 
     def remaining(self, time: float) -> float:
         """Return one: each wave fades in its own way."""
         return 1.0
 
-    def start(self, nothing: Array) -> History:
-        """Return the memory of an undisturbed body, under a pressure of zeros, shape (nx, ny)."""
-        fields = self.grid.spectrum(nothing)[None]
-        return History(fields, self.grid.xp.zeros((self.times.size, *fields.shape), fields.dtype))
+    def kept(self, unit: Array, pressure: Array) -> Array:
+        """Return the transform of the pressure."""
+        return self.grid.spectrum(pressure)[None]
 
-    def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
-        """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
-        own, earlier, before, new = self.recursion(step, history.step, rule or self.rule(history, step))
-        xp = self.grid.xp
-        modes = xp.empty_like(history.modes)
-        carried, symbol = xp.zeros_like(history.fields[0]), self.instantaneous.copy()
-        for i, mode in enumerate(modes):
-            xp.multiply(history.modes[i], own[i], out=mode)
-            if earlier[i] and history.earlier is not None:
-                mode += earlier[i] * history.earlier[i]
-            if before[i]:
-                mode += before[i] * history.fields
-            carried += self._response(mode[0], self.symbols[i])
-            if new[i]:
-                symbol += new[i] * self.symbols[i]
+    def response(self, field: Array, number: int, part: float = 1.0) -> Array:
+        """Return the product of a transform and a symbol, times a part."""
+        product = field.copy()
+        self.grid.multiply(product, self.weights[number])
+        return product if part == 1 else part * product
+
+    def on_cells(self, total: Array) -> Array:
+        """Return the displacement, shape (1, nx, ny). [m]"""
+        return self.grid.field_of(total[0])[None]
+
+    def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
+        """Return the elastic problem of a step, with its kernel; its compliance is one, or zero if it is rigid."""
+        *symbols, at_once = self.weights
+        symbol = at_once.copy()
+        for part, one in zip(new, symbols, strict=True):
+            if part:
+                symbol += part * one
         answering = self.grid.answering(symbol, self.waves.kernel(new))
         return Prediction(float(symbol.any()), self.grid.field_of(carried), modes, new, step, answering)
-
-    def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
-        """Return the memory after a step, at whose end the pressure [Pa] is given; `unit` is not used."""
-        return self.after_step(history, prediction, self.grid.spectrum(pressure)[None])
-
-    def displacement(self, history: History) -> Array:
-        """Return the displacement, shape (1, nx, ny). [m]"""
-        total = self._response(history.fields[0], self.instantaneous)
-        for mode, symbol in zip(history.modes, self.symbols, strict=True):
-            total += self._response(mode[0], symbol)
-        return self.grid.field_of(total)[None]
-
-    def at_once(self, history: History) -> Array:
-        """Return the instantaneous part of the displacement. [m]"""
-        return self.grid.field_of(self._response(history.fields[0], self.instantaneous))
 
     def unit(self, history: History) -> None:
         """Return nothing: the steps have no common kernel."""
         return
-
-    def after_rest(self, history: History, time: float) -> Array:
-        """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
-        own = self.recursion(time, 0.0, "linear")[0]
-        total = self.grid.xp.zeros_like(history.fields[0])
-        for part, mode, symbol in zip(own, history.modes, self.symbols, strict=True):
-            total += part * self._response(mode[0], symbol)
-        return self.grid.field_of(total)
 
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
         turn = self.grid.turn(cells, axis)
         earlier = None if history.earlier is None else history.earlier * turn
         return History(history.fields * turn, history.modes * turn, earlier, history.step)
-
-    def _response(self, spectrum: Array, symbol: Array) -> Array:
-        """Return the product of a transform and a symbol."""
-        product = spectrum.copy()
-        self.grid.multiply(product, symbol)
-        return product

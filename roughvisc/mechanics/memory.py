@@ -117,6 +117,11 @@ class Memory:
         self.fields = 2 if keeps_pressure else 1
         self.may_ring = self.is_stiff(duration)
 
+    @cached_property
+    def weights(self) -> Any:
+        """Contact compliance of each exponential [1/Pa], of the fluidity [1/(Pa s)], and at once. [1/Pa]"""
+        return np.append(self.compliances, self.glassy)
+
     @property
     def is_elastic(self) -> bool:
         """Whether the history does not matter."""
@@ -128,13 +133,12 @@ class Memory:
 
     def start(self, nothing: Array) -> History:
         """Return the memory of an undisturbed body, under a pressure of zeros, shape (nx, ny)."""
-        xp, shape = namespace(nothing), nothing.shape
-        return History(xp.zeros((self.fields, *shape)), xp.zeros((self.times.size, self.fields, *shape)))
+        fields = self.kept(nothing, nothing)
+        return History(fields, namespace(fields).zeros((self.times.size, *fields.shape), fields.dtype))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step. [s]"""
-        rule = rule or self.rule(history, step)
-        own, earlier, before, new = self.recursion(step, history.step, rule)
+        own, earlier, before, new = self.recursion(step, history.step, rule or self.rule(history, step))
         xp = namespace(history.modes)
         modes, carried = xp.empty_like(history.modes), xp.zeros_like(history.fields[0])
         for i, mode in enumerate(modes):
@@ -143,9 +147,8 @@ class Memory:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
                 mode += before[i] * history.fields
-            carried += self.compliances[i] * mode[0]
-        alpha = self.glassy + float((self.compliances * new).sum())
-        return Prediction(alpha, carried, modes, new, step)
+            carried += self.response(mode[0], i)
+        return self.problem(carried, modes, new, step)
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
         """Return the memory after a step.
@@ -159,12 +162,7 @@ class Memory:
         pressure : array, shape (nx, ny)
             Pressure at the end. [Pa]
         """
-        return self.after_step(
-            history, prediction, unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
-        )
-
-    def after_step(self, history: History, prediction: Prediction, fields: Array) -> History:
-        """Return the memory after a step with the given fields at its end."""
+        fields = self.kept(unit, pressure)
         if prediction.step == 0:
             return History(fields, history.modes)
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
@@ -175,26 +173,45 @@ class Memory:
 
     def displacement(self, history: History) -> Array:
         """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
-        total = self.glassy * history.fields
-        for compliance, mode in zip(self.compliances, history.modes, strict=True):
-            total += compliance * mode
-        return total
+        total = self.response(history.fields, -1)
+        for i, mode in enumerate(history.modes):
+            total += self.response(mode, i)
+        return self.on_cells(total)
 
     def at_once(self, history: History) -> Array:
         """Return the instantaneous part of the displacement. [m]"""
-        return self.glassy * history.fields[0]
-
-    def unit(self, history: History) -> Array | None:
-        """Return the displacement per unit compliance; None if the body has no common kernel. [m Pa]"""
-        return history.fields[0]
+        return self.on_cells(self.response(history.fields[:1], -1))[0]
 
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
         own = self.recursion(time, 0.0, "linear")[0]
-        total = namespace(history.fields).zeros_like(history.fields[0])
-        for compliance, mode in zip(self.compliances * own, history.modes, strict=True):
-            total += compliance * mode[0]
+        total = namespace(history.fields).zeros_like(history.fields[:1])
+        for i, mode in enumerate(history.modes):
+            total += self.response(mode[:1], i, own[i])
+        return self.on_cells(total)[0]
+
+    # What depends on the fields that are kept: of a body whose waves creep differently these are transforms.
+
+    def kept(self, unit: Array, pressure: Array) -> Array:
+        """Return the fields of a history. [m Pa], [Pa]"""
+        return unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
+
+    def response(self, field: Array, number: int, part: float = 1.0) -> Array:
+        """Return what a field of an exponential contributes to the displacement, times a part; -1: what is instant."""
+        return (self.weights[number] * part) * field
+
+    def on_cells(self, total: Array) -> Array:
+        """Return the displacement on the cells. [m]"""
         return total
+
+    def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
+        """Return the elastic problem of a step from what its history carries, see :class:`Prediction`."""
+        alpha = self.glassy + float((self.compliances * new).sum())
+        return Prediction(alpha, carried, modes, new, step)
+
+    def unit(self, history: History) -> Array | None:
+        """Return the displacement per unit compliance; None if the body has no common kernel. [m Pa]"""
+        return history.fields[0]
 
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
