@@ -15,6 +15,9 @@ from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
+    from rich.console import Group
+
+    from roughvisc.topography.inspection import Inspection
 
 
 class _Sides(click.ParamType):
@@ -108,7 +111,6 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     from roughvisc.topography.parameters import parameters
     from roughvisc.topography.readers import list_channels
     from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
-    from roughvisc.views.console.scan_advice import advice_table
     from roughvisc.views.console.tables import scan_table
     from roughvisc.views.figures.files import write_figure
     from roughvisc.views.plot import surface
@@ -124,7 +126,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     levelled, found = level(height), inspect_scan(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = Console()
-    console.print(scan_table(height, parameters(levelled), file.name, channels), "", advice_table(found), "", sep="\n")
+    console.print(scan_table(height, parameters(levelled), file.name, channels), "", _advice(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
     if picture.exists() and not force and not plot:
         say_path(console, "Existing picture kept (--force overwrites it)", picture)
@@ -174,7 +176,6 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect_scan
     from roughvisc.units import number
-    from roughvisc.views.console.scan_advice import advice_table
 
     part = number(contact, "1", "contact", above=0, below=1)
     source = file or Path(EXAMPLE)
@@ -193,11 +194,26 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console = Console()
-    console.print(advice_table(found), "", sep="\n")
+    console.print(_advice(found), "", sep="\n")
     if file is None:
         say_path(console, "Scan", source)
     say_path(console, "Study", out)
     say(console, f"Next: roughvisc plan {out}\n      roughvisc run {out}")
+
+
+def _advice(found: Inspection) -> Group:
+    """Return the findings in a scan, each with the recommendation that follows."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for one in found.findings.values():
+        table.add_row(one.name, Text(one.seen))
+        table.add_row("", Text(f"-> {one.advice or 'no action needed'}", style="bold" if one.advice else ""))
+    return Group(Text("Findings and recommendations", style="bold"), table)
 
 
 def _write_example(path: Path) -> None:

@@ -21,13 +21,14 @@ def test_spikes__are_counted_and_what_they_do_to_sq():
     for place in places:
         values[place] += 5e-6
     found = inspect_scan(with_values(values))
-    assert found.spikes == len(places)
+    spikes = found.findings["Spikes"].values
+    assert spikes["points"] == len(places)
     assert found.steps["outliers"] is True
-    assert found.rms_levelled == pytest.approx(float(rv.level(with_values(values)).std()), rel=1e-12)
-    assert found.rms_levelled > 1.3 * found.rms_despiked
+    assert spikes["rms_with"] == pytest.approx(float(rv.level(with_values(values)).std()), rel=1e-12)
+    assert spikes["rms_with"] > 1.3 * spikes["rms_without"]
     plane = rv.level(SMOOTH)
-    assert found.rms_despiked == pytest.approx(float(plane.std()), rel=1e-3)
-    assert inspect_scan(SMOOTH).spikes == 0
+    assert spikes["rms_without"] == pytest.approx(float(plane.std()), rel=1e-3)
+    assert inspect_scan(SMOOTH).findings["Spikes"].values["points"] == 0
 
 
 def test_steps__leave_out_what_is_not_needed():
@@ -39,13 +40,15 @@ def test_tilt__and_form_by_their_coefficients():
     x, y = np.meshgrid(SMOOTH.x.values, SMOOTH.y.values, indexing="ij")
     tilted = inspect_scan(with_values(SMOOTH.values + 0.02 * x - 0.03 * y))
     both = inspect_scan(SMOOTH)
-    np.testing.assert_allclose(tilted.tilt, (0.02 + both.tilt[0], -0.03 + both.tilt[1]), rtol=1e-9)
+    (x_tilt, y_tilt), slopes = (one.findings["Tilt"].values["slopes"] for one in (both, tilted))
+    np.testing.assert_allclose(slopes, (0.02 + x_tilt, -0.03 + y_tilt), rtol=1e-9)
     assert tilted.steps["level"] == 1
     ball = (x - x.mean()) ** 2 / (2 * 1e-3)
     curved = inspect_scan(with_values(SMOOTH.values + ball))
     assert curved.steps["level"] == 2
-    assert curved.form_share > 0.9
-    assert curved.rms_flat == pytest.approx(float(rv.level(SMOOTH, 2).std()), rel=1e-9)
+    form = curved.findings["Form"].values
+    assert form["share"] > 0.9
+    assert form["rms_without"] == pytest.approx(float(rv.level(SMOOTH, 2).std()), rel=1e-9)
 
 
 def test_boundary__is_mirror_where_opposite_borders_differ():
@@ -64,18 +67,20 @@ def test_noise__of_known_strength_is_found(shape):
     )
     noise = np.random.default_rng(5).normal(0, 2e-9, shape)
     found = inspect_scan(with_values(smooth.values + noise))
-    assert found.noise.floor
-    assert found.noise.rms == pytest.approx(2e-9, rel=0.1)
-    assert found.noise.wavelength == pytest.approx(1.2e-5, rel=0.25)  # the surface has no shorter waves
-    assert found.steps["filter"] == pytest.approx(found.noise.wavelength, rel=0.05)
+    noise = found.findings["Noise"].values
+    assert noise["floor"]
+    assert noise["rms"] == pytest.approx(2e-9, rel=0.1)
+    assert noise["wavelength"] == pytest.approx(1.2e-5, rel=0.25)  # the surface has no shorter waves
+    assert found.steps["filter"] == pytest.approx(noise["wavelength"], rel=0.05)
     assert found.rms_slope == pytest.approx(float(rv.parameters(smooth).Sdq), rel=0.2)  # and a little of the surface
 
 
 def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():
     steep = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, seed=3)
     found = inspect_scan(steep)
-    assert not found.noise.floor
-    assert found.noise.wavelength == pytest.approx(2e-6)
+    noise = found.findings["Noise"].values
+    assert not noise["floor"]
+    assert noise["wavelength"] == pytest.approx(2e-6)
     assert "filter" not in found.steps
 
 
@@ -84,8 +89,8 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
     values[70:, :] = np.nan
     values[10, 10] = values[30, 40] = np.nan
     found = inspect_scan(with_values(values))
-    assert found.missing == 2
-    assert found.holes == pytest.approx(26 / 96, rel=0.05)
+    assert found.findings["Missing points"].values["points"] == 2
+    assert found.findings["Holes"].values["share"] == pytest.approx(26 / 96, rel=0.05)
     treated = condition(with_values(values), found.steps)
     assert not treated.isnull().any()
     assert int(treated.filled.sum()) == 2
@@ -97,8 +102,19 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
 def test_noise__between_missing_points_is_found_and_overestimated_a_little(share, off):
     noisy = SMOOTH.values + np.random.default_rng(5).normal(0, 2e-9, SMOOTH.shape)
     gaps = np.random.default_rng(3).random(SMOOTH.shape) < share
-    found = inspect_scan(with_values(np.where(gaps, np.nan, noisy))).noise
-    assert found.floor
-    assert 0.95 * 2e-9 < found.rms < (1 + off) * 2e-9
-    none = inspect_scan(with_values(np.where(gaps, np.nan, SMOOTH.values))).noise
-    assert not none.floor, "with as many gaps again the floor of filled points grows"
+    found = inspect_scan(with_values(np.where(gaps, np.nan, noisy))).findings["Noise"].values
+    assert found["floor"]
+    assert 0.95 * 2e-9 < found["rms"] < (1 + off) * 2e-9
+    none = inspect_scan(with_values(np.where(gaps, np.nan, SMOOTH.values))).findings["Noise"].values
+    assert not none["floor"], "with as many gaps again the floor of filled points grows"
+
+
+def test_resolution__is_advised_on_after_a_filter_too():
+    """A filter at four cells leaves waves that contact does not resolve."""
+    fine = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.3, rms_height=1e-7, rolloff=4e-5, shortcut=5e-6, seed=3)
+    noise = np.random.default_rng(5).normal(0, 4e-9, fine.shape)
+    found = inspect_scan(with_values(fine.values + noise))
+    assert 3e-6 <= found.steps["filter"] < 8e-6
+    assert found.findings["Resolution"].values["fine_slopes"] > 0.5
+    assert found.findings["Resolution"].advice
+    assert not inspect_scan(SMOOTH).findings["Resolution"].advice
