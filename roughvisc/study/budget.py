@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -15,8 +14,8 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
-from roughvisc.study.neighbours import Known, Share, Source, share, solve, sources_of, together, with_rows
-from roughvisc.study.quantities import Array, Observable, quantity_of
+from roughvisc.study.neighbours import Known, at_rows, compared, solve, with_rows
+from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.store import open_result, result_path
 from roughvisc.units import Quantity, in_si, quantities
 from roughvisc.variables import VARIABLES
@@ -135,24 +134,9 @@ def budgets(
     given = in_si(at, VARIABLES[axis].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, [field for one in observed for field in one.fields], places)
-    sources = sources_of(base, base.height(), known)
-    near = [one for source in sources.values() for one in source.neighbours]
     own = _own_result(case, finished, base, places)
-    todo = [base] if own is None else []
-    watch = partial(watcher, progress)
-    results = solve([*todo, *(one.case for one in near)], folder, watch=watch, client=client, workers=workers)
-    if own is None:
-        own = at_rows(results[base.key], axis, places)
-    results[base.key] = own
-    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
-    seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
-    found = {}
-    for one in observed:
-        values = {key: one.of(result, base) for key, result in rows.items()}
-        stated = one.stated_error(own, values[base.key])
-        shares = {name: share(name, source, one, values, stated) for name, source in sources.items()}
-        found[one.name] = assembled(base, one, sources, shares, values[base.key], own[axis].values, seconds)
-    return found
+    solved = partial(solve, folder=folder, watch=partial(watcher, progress), client=client, workers=workers)
+    return compared(base, base.height(), known, observed, solved, own=own, places=places)
 
 
 def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path, Path]:
@@ -177,68 +161,3 @@ def _own_result(case: Case, finished: Path, base: Case, places: list[float] | No
     if unconverged(whole) or (places is not None and not np.allclose(found[axis], places, rtol=1e-9, atol=0)):
         return None
     return found
-
-
-def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
-    """Return the rows of a result nearest to some places of its axis; all rows if None."""
-    if places is None:
-        return result
-    apart = np.abs(result[axis].values[:, None] - np.asarray(places, dtype=float))
-    return result.isel({axis: apart.argmin(axis=0)})
-
-
-def assembled(
-    case: Case,
-    quantity: Observable,
-    sources: Mapping[str, Source],
-    shares: Mapping[str, Share],
-    value: Array,
-    places: Array,
-    seconds: Mapping[str, float],
-) -> xr.Dataset:
-    """Return the budget of a quantity of a case.
-
-    Parameters
-    ----------
-    case : Case
-    quantity : Observable
-    sources, shares : mapping
-        Name of each source -> the source, and the error of the quantity by it.
-    value, places : ndarray
-        Value of the quantity at each row, and the times [s] or speeds [m/s] of the rows.
-    seconds : mapping
-        Key of each case -> wall time of its solve. [s]
-    """
-    axis, shape = case.experiment().axis, value.shape
-    half_width = [
-        np.where(sources[name].state == "open", math.nan, np.broadcast_to(one.half_width, shape))
-        for name, one in shares.items()
-    ]
-    direction = [np.broadcast_to(one.direction, shape).astype("int8") for one in shares.values()]
-    state, method = ([getattr(one, what) for one in sources.values()] for what in ("state", "method"))
-    cost = [sum(seconds[one.case.key] for one in source.neighbours) for source in sources.values()]
-    with np.errstate(invalid="ignore"):
-        known = np.where(np.abs(value) > 0, value, math.nan)
-    lower, upper = (known * np.exp(side * together(shares.values(), side)) for side in (-1, 1))
-    over, units = ("source", axis), {"units": VARIABLES[quantity.name].units}
-    flags = {"flag_values": np.array([-1, 0, 1], dtype="int8"), "flag_meanings": "lowers both raises"}
-    return xr.Dataset(
-        {
-            "half_width": (over, half_width, {"units": "1", "long_name": "half-width of the logarithm at 95 %"}),
-            "direction": (over, direction, {"long_name": "direction of the error"} | flags),
-            "state": ("source", state, {"long_name": "whether a source counts"}),
-            "method": ("source", method, {"long_name": "how it was found"}),
-            "cost": ("source", cost, {"units": "s", "long_name": "wall time of the solves that it took"}),
-            "value": (axis, value, units | {"long_name": quantity.name.replace("_", " ")}),
-            "lower": (axis, lower, units | {"long_name": "lower bound at 95 %"}),
-            "upper": (axis, upper, units | {"long_name": "upper bound at 95 %"}),
-            "case_cost": ((), seconds[case.key], {"units": "s", "long_name": "wall time of the case itself"}),
-        },
-        coords={"source": list(sources), axis: (axis, places, {"units": VARIABLES[axis].units})},
-        attrs={
-            "quantity": quantity.name,
-            "case": case.to_json(),
-            "title": case.title,
-            "open": "; ".join(name for name, one in sources.items() if one.state == "open"),
-        },
-    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -29,6 +29,7 @@ from roughvisc.topography.cards import FACE_STEPS
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import last_octave, modes
 from roughvisc.units import number, unit_for
+from roughvisc.variables import VARIABLES
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -276,57 +277,6 @@ def _next_octave(own: Case, height: xr.DataArray, known: Known, sample: bool) ->
     return Source(f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held", (one,))
 
 
-@dataclass(frozen=True)
-class Share:
-    """Error of a number by one source.
-
-    Attributes
-    ----------
-    half_width : ndarray
-        Of the logarithm at 95 %, at each row; 0 if the source is not counted. [-]
-    direction : ndarray or int
-        1 or -1 if the error only raises or lowers the number, 0 otherwise.
-    """
-
-    half_width: Array
-    direction: Any = 0
-
-
-def share(name: str, source: Source, quantity: Observable, values: Mapping[str, Array], stated: Array) -> Share:
-    """Return the error of a quantity by a source.
-
-    Parameters
-    ----------
-    name : str
-        Of the source.
-    source : Source
-    quantity : Observable
-    values : mapping
-        Key of each case -> values of the quantity at the rows that are judged.
-    stated : ndarray
-        Error of the logarithm by steps and solver at these rows. [-]
-    """
-    if name == STEPS:
-        return Share(stated)
-    if not source.neighbours:
-        return Share(np.zeros_like(stated))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logarithms = {key: np.log(one) for key, one in values.items()}
-        change = [one.weight * (logarithms[one.case.key] - logarithms[one.against.key]) for one in source.neighbours]
-        if name == SAMPLE:
-            return Share(np.std(change, axis=0, ddof=1))
-        half_width = np.max(np.abs(change), axis=0)
-    if name == OCTAVE:
-        return Share(quantity.octave_factor * half_width, np.sign(-np.nan_to_num(change[0])).astype("int8"))
-    return Share(quantity.grid_factor * half_width if name == GRID else half_width)
-
-
-def together(shares: Iterable[Share], side: int) -> Array:
-    """Return the half-width of independent sources together, on the upper (1) or the lower (-1) side. [-]"""
-    squares = [np.where(np.isin(one.direction, (0, side)), one.half_width, 0.0) ** 2 for one in shares]
-    return np.asarray(np.sqrt(np.sum(squares, axis=0)))
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # solves
 
@@ -373,3 +323,148 @@ def solve(
         if outcome.kind != "done":
             log.warning("a neighbouring case (%s): %s: %s", distinct[key].varied, outcome.kind, outcome.message)
     return {key: open_result(result_path(folder, key)) for key in outcomes}
+
+
+def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
+    """Return the rows of a result nearest to some places of its axis; all rows if None."""
+    if places is None:
+        return result
+    apart = np.abs(result[axis].values[:, None] - np.asarray(places, dtype=float))
+    return result.isel({axis: apart.argmin(axis=0)})
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# comparison
+
+
+def compared(
+    base: Case,
+    height: xr.DataArray,
+    known: Known,
+    observed: Sequence[Observable],
+    solved: Callable[[list[Case]], dict[str, xr.Dataset]],
+    *,
+    own: xr.Dataset | None = None,
+    places: Sequence[float] | None = None,
+    coarsening: float | None = None,
+    before: Mapping[str, xr.Dataset] | None = None,
+) -> dict[str, xr.Dataset]:
+    """Solve the neighbours of a case, and return the budget of each quantity by its name.
+
+    Parameters
+    ----------
+    base, height, known
+        As in :func:`sources_of`.
+    observed : sequence of Observable
+    solved : callable
+        Returns the results of cases by their keys: :func:`solve` with its settings.
+    own : xarray.Dataset, optional
+        Result of the case if it is known.
+    places : sequence of float, optional
+        Times [s] or speeds [m/s] of the rows. Default: all.
+    coarsening : float, optional
+        Take the case on cells so many times as long, at the rows with a force, and a third grid.
+    before : mapping, optional
+        Budgets on another grid, from which the errors that no grid reduces are taken.
+
+    Returns
+    -------
+    dict of str to xarray.Dataset
+        As :func:`roughvisc.budget` returns them.
+    """
+    sources = sources_of(base, height, known, coarsening or 1.0, three_grids=coarsening is not None)
+    new = sources if before is None else {name: sources[name] for name in (STEPS, GRID)}
+    case, axis = on_cells(base, height, coarsening or 1.0), base.experiment().axis
+    near = [one.case for source in new.values() for one in source.neighbours]
+    results = solved(near if own is not None else [case, *near])
+    own = at_rows(results[case.key] if own is None else own, axis, places)
+    if coarsening is not None:
+        own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
+    results[case.key] = own
+    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
+    seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
+    found = {}
+    for one in observed:
+        values = {key: one.of(result, base) for key, result in rows.items()}
+        value, stated = values[case.key], one.stated_error(own, values[case.key])
+        columns: dict[str, list[Any]] = {"half_width": [], "direction": [], "cost": []}
+        for name, source in sources.items():
+            if before is not None and name not in new:
+                stands = before[one.name].sel(source=name)
+                error: Any = [stands[column].values for column in columns]
+            else:
+                error = [*_error(name, source, one, values, stated)]
+                error.append(sum(seconds[neighbour.case.key] for neighbour in source.neighbours))
+            for column, part in zip(columns.values(), error, strict=True):
+                column.append(part)
+        over, units = ("source", axis), VARIABLES[one.name].units
+        states, methods = ([getattr(source, what) for source in sources.values()] for what in ("state", "method"))
+        direction = np.array(columns["direction"], dtype="int8")
+        table = xr.Dataset(
+            {
+                "half_width": (over, columns["half_width"], _described("half-width of the logarithm at 95 %", "1")),
+                "direction": (over, direction, _described("direction of the error") | _DIRECTIONS),
+                "state": ("source", states, _described("whether a source counts")),
+                "method": ("source", methods, _described("how it was found")),
+                "cost": ("source", columns["cost"], _described("wall time of the solves that it took", "s")),
+                "value": (axis, value, _described(one.name.replace("_", " "), units)),
+                "case_cost": ((), seconds[case.key], _described("wall time of the case itself", "s")),
+            },
+            {"source": list(sources), axis: (axis, own[axis].values, {"units": VARIABLES[axis].units})},
+            {
+                "quantity": one.name,
+                "case": case.to_json(),
+                "title": case.title,
+                "open": "; ".join(name for name, source in sources.items() if source.state == "open"),
+            },
+        )
+        for name, side in (("lower", -1), ("upper", 1)):
+            bound = np.where(value == 0, math.nan, value) * np.exp(side * together(table, side))
+            table[name] = (axis, bound, _described(f"{name} bound at 95 %", units))
+        found[one.name] = table
+    return found
+
+
+_DIRECTIONS = {"flag_values": np.array([-1, 0, 1], dtype="int8"), "flag_meanings": "lowers both raises"}
+
+
+def _described(name: str, units: str | None = None) -> dict[str, Any]:
+    return {"long_name": name} if units is None else {"units": units, "long_name": name}
+
+
+def _error(
+    name: str, source: Source, quantity: Observable, values: Mapping[str, Array], stated: Array
+) -> tuple[Array, Array]:
+    """Return the half-width and the direction of the error of a quantity by a source, at each row.
+
+    Parameters
+    ----------
+    name, source
+        Name of the source, and the source.
+    quantity : Observable
+    values : mapping
+        Key of each case -> values of the quantity.
+    stated : ndarray
+        Error of the logarithm by steps and solver. [-]
+    """
+    both = np.zeros(stated.shape)
+    if name == STEPS:
+        return stated, both
+    if not source.neighbours:
+        return np.full(stated.shape, math.nan if source.state == "open" else 0.0), both
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = {key: np.log(one) for key, one in values.items()}
+        change = [one.weight * (logarithms[one.case.key] - logarithms[one.against.key]) for one in source.neighbours]
+        if name == SAMPLE:
+            return np.std(change, axis=0, ddof=1), both
+        half_width = np.max(np.abs(change), axis=0)
+    if name == OCTAVE:
+        return quantity.octave_factor * half_width, -np.sign(np.nan_to_num(change[0]))
+    return quantity.grid_factor * half_width if name == GRID else half_width, both
+
+
+def together(table: xr.Dataset, side: int) -> Array:
+    """Return the half-width of all counted sources of a budget on the upper (1) or the lower (-1) side. [-]"""
+    counts = table["direction"].isin((0, side)) & (table["state"] != "open")
+    squares = table["half_width"].where(counts, 0.0) ** 2
+    return np.asarray(np.sqrt(squares.sum("source", skipna=False)))

@@ -11,19 +11,18 @@ import logging
 import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from roughvisc.arguments import nearest
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
-from roughvisc.study.budget import FOLDER, assembled, at_rows
+from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.monitor import Monitor, watcher
@@ -38,19 +37,16 @@ from roughvisc.study.neighbours import (
     STEPS,
     TIME_SCALE,
     Known,
-    Share,
-    Source,
+    compared,
     is_sample,
     on_cells,
     shape_on,
-    share,
     shortest_wave,
     solve,
-    sources_of,
     together,
     with_rows,
 )
-from roughvisc.study.quantities import QUANTITIES, Array, Observable, quantity_of
+from roughvisc.study.quantities import QUANTITIES, quantity_of
 from roughvisc.study.storage.files import atomic_write, require_writable
 from roughvisc.study.storage.store import result_path, write_dataset
 from roughvisc.topography.grid import spacing
@@ -66,6 +62,8 @@ _PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
 _FINEST, _FEWEST = -2, 12
 #: An error that exceeds the target by less is accepted, since both are rounded in print.
 _ROUNDING = 1.005
+#: Length of cells by level, in words.
+_LENGTHS = {1: "twice as long as", 0: "as long as", -1: "half as long as", -2: "a quarter as long as"}
 #: What reduces the error of a source.
 _REMEDIES = {
     STEPS: "a smaller tolerance",
@@ -75,6 +73,8 @@ _REMEDIES = {
     MODULUS: "moduli that are known more accurately",
     TIME_SCALE: "times of the material, or its temperature, that are known more accurately",
 }
+#: Sources that neither a finer grid nor a smaller tolerance reduces.
+_FLOOR = (SAMPLE, OCTAVE, MODULUS, TIME_SCALE)
 
 
 @dataclass(frozen=True)
@@ -206,204 +206,97 @@ def choose(
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     if case.settings.tolerance < Settings.tolerance:  # sharper than usual, on purpose
         tolerance = min(tolerance, case.settings.tolerance)
-    level, grid = _coarsest(case, height), None
+    times, places = case.settings.times, None
+    if case.experiment().axis == "time":
+        places = times if isinstance(times, tuple) else case.program().corners
+
+    # the coarsest grid resolves the waves of the surface, and leaves some cells to the third grid
+    level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2
+    if is_sample(case, height) and (wave := shortest_wave(height)):
+        level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
+    level, before = max(level, 0), None
     while True:
         if (rounded := float(f"{tolerance:.2g}")) != base.settings.tolerance:
             base = vary(base, {"solve.tolerance": rounded})
-        found = _Grid.solved(base, height, known, level, observed, grid, solved)
-        tell(f"{found.cells}: {found.in_words(targets)}")
-        steps = max(found.error(name, [STEPS]) / math.log1p(part) for name, part in targets.items())
-        if grid is None and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
+        scale = 2.0**level
+        found = compared(base, height, known, observed, solved, places=places, coarsening=scale, before=before)
+        shape, length = shape_on(case, height, scale), _LENGTHS.get(level, f"{scale:g} times as long as")
+        cells = f"{shape[0]} x {shape[1]} cells, {length} those of the study"
+        reached = {
+            name: f"{name} {_percent(error_of(one))}, wanted {_percent(math.log1p(targets[name]))}"
+            for name, one in found.items()
+        }
+        tell(f"{cells}: {'; '.join(reached.values())}")
+        steps = max(error_of(one, [STEPS]) / math.log1p(targets[name]) for name, one in found.items())
+        if before is None and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
             continue  # steps and solver take too much of what is wanted
-        grid = found
-        if grid.misses(targets, grid.floor):
-            raise grid.refusal(case, targets, grid.floor, "whatever the grid")
-        if not grid.misses(targets):
+        _refuse_missed(case, targets, found, "whatever the grid", _FLOOR)
+        if all(error_of(one) <= _ROUNDING * math.log1p(targets[name]) for name, one in found.items()):
             break
-        if level == _FINEST or (level == _FINEST + 1 and grid.next_misses(targets)):
-            raise grid.refusal(case, targets, list(grid.sources), f"with {grid.cells}")
-        level -= 1
-    chosen = grid.own
+        before, level = found, level - 1
+        if level <= _FINEST:  # the error on the finest grid is a part of the last one at least
+            _refuse_missed(case, targets, found, f"with {cells}", on_next=level == _FINEST)
+
+    chosen = on_cells(base, height, scale)
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
             shutil.copyfile(result_path(folder / FOLDER, chosen.key), temporary)
-    reasons = [f"grid: {grid.cells}"]
-    for name in targets:
-        by_grid, others = (_percent(grid.error(name, of)) for of in ((STEPS, GRID), grid.floor))
-        reasons.append(f"{grid.in_words({name: targets[name]})}: {by_grid} by grid and solver, {others} by all else")
+    reasons = [f"grid: {cells}"]
+    for name, one in found.items():
+        by_grid, others = (_percent(error_of(one, names)) for names in ((STEPS, GRID), _FLOOR))
+        reasons.append(f"{reached[name]}: {by_grid} by grid and solver, {others} by all else")
     reasons.append(f"tolerance: {chosen.settings.tolerance:.2g}")
-    if unknown := [name for name, one in grid.sources.items() if one.state == "open"]:
-        reasons.append(f"open, and not counted: {', '.join(unknown)}")
-    return Choice(chosen, tuple(reasons), {name: grid.budget(name, chosen) for name in targets})
+    if unknown := found[observed[0].name].attrs["open"]:
+        reasons.append(f"open, and not counted: {unknown}")
+    return Choice(chosen, tuple(reasons), found)
 
 
-def _coarsest(case: Case, height: xr.DataArray) -> int:
-    """Return the level of the first grid, whose cells are ``2**level`` times as long as those of the study.
+def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
+    """Return the largest error of the logarithm of a number by some sources of its budget, all by default. [-]
 
-    It resolves the waves of the surface, and the third grid has some cells.
+    It is infinite without a row, or if a value has no logarithm.
     """
-    level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2
-    if is_sample(case, height) and (wave := shortest_wave(height)):
-        level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
-    return max(level, 0)
+    part = budget if sources is None else budget.sel(source=list(sources))
+    both = np.array([together(part, side) for side in (-1, 1)])
+    return float(both.max()) if both.size and np.isfinite(both).all() else math.inf
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Errors of the wanted quantities on one grid.
+def _refuse_missed(
+    case: Case,
+    targets: Mapping[str, float],
+    budgets: Mapping[str, xr.Dataset],
+    where: str,
+    sources: Sequence[str] = tuple(_REMEDIES),
+    on_next: bool = False,
+) -> None:
+    """Refuse targets that cannot be met, with the sources of the error and what would reduce the largest of them.
 
-    Attributes
-    ----------
-    own : Case
-        The case on this grid.
-    cells : str
-        The grid, in words.
-    sources : dict
-        Name -> source of error.
-    observed : dict
-        Name -> quantity.
-    values : dict
-        Name of each quantity -> its values at the rows that are judged.
-    shares : dict
-        Name of each quantity -> name of each source -> its error.
-    last_change : dict
-        Name of each quantity -> error of the grid from the last change of the grid alone, without the one before.
-    touches : ndarray of bool
-        Whether there is a force at each of these rows.
-    places : ndarray
-        Times [s] or speeds [m/s] of these rows.
-    seconds : dict
-        Key of each case -> wall time of its solve. [s]
+    With `on_next`, a target is missed if even no change by one more grid would meet it.
     """
-
-    own: Case
-    cells: str
-    sources: dict[str, Source]
-    observed: dict[str, Observable]
-    values: dict[str, Array]
-    shares: dict[str, dict[str, Share]]
-    last_change: dict[str, Array]
-    touches: NDArray[np.bool_]
-    places: Array
-    seconds: dict[str, float]
-
-    @classmethod
-    def solved(
-        cls,
-        base: Case,
-        height: xr.DataArray,
-        known: Known,
-        level: int,
-        observed: Sequence[Observable],
-        coarser: _Grid | None,
-        solved: Callable[[list[Case]], dict[str, xr.Dataset]],
-    ) -> _Grid:
-        """Return the errors on a grid; those of the sources that no grid reduces are taken from a coarser grid."""
-        sources = sources_of(base, height, known, 2.0**level, three_grids=True)
-        new = sources if coarser is None else {name: sources[name] for name in (STEPS, GRID)}
-        near = [one for source in new.values() for one in source.neighbours]
-        own, axis = on_cells(base, height, 2.0**level), base.experiment().axis
-        results = solved([own, *(one.case for one in near)])
-        seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
-        judged = at_rows(results[own.key], axis, _judged(base))
-        places = judged[axis].values
-        rows = {key: at_rows(result, axis, places) for key, result in results.items()}
-        values, shares, last_change = {}, {}, {}
-        for one in observed:
-            of_all = {key: one.of(result, base) for key, result in rows.items()}
-            values[one.name] = of_all[own.key]
-            given = of_all, np.nan_to_num(one.stated_error(judged, of_all[own.key]))
-            shares[one.name] = {} if coarser is None else dict(coarser.shares[one.name])
-            shares[one.name] |= {name: share(name, source, one, *given) for name, source in new.items()}
-            last = replace(sources[GRID], neighbours=sources[GRID].neighbours[:1])
-            last_change[one.name] = share(GRID, last, one, *given).half_width
-        shape = " x ".join(map(str, shape_on(base, height, 2.0**level)))
-        long = {0: "those", 1: "twice as long as those", -1: "half as long as those", -2: "a quarter as long as those"}
-        return cls(
-            own=own,
-            cells=f"{shape} cells, {long.get(level, f'{2.0**level:g} times as long as those')} of the study",
-            sources=sources if coarser is None else coarser.sources | {GRID: sources[GRID]},
-            observed={one.name: one for one in observed},
-            values=values,
-            shares=shares,
-            last_change=last_change,
-            touches=judged["force"].values > 0,
-            places=places,
-            seconds=seconds if coarser is None else coarser.seconds | seconds,
-        )
-
-    @property
-    def floor(self) -> list[str]:
-        """Sources that neither a finer grid nor a smaller tolerance reduces."""
-        return [name for name in self.sources if name not in (STEPS, GRID)]
-
-    def error(self, quantity: str, sources: Sequence[str] | None = None) -> float:
-        """Return the largest error of the logarithm of a quantity by some sources, all by default. [-]
-
-        It is infinite without a row, or if a value has no logarithm.
-        """
-        shares = [one for name, one in self.shares[quantity].items() if sources is None or name in sources]
-        both = np.array([together(shares, side)[self.touches] for side in (-1, 1)])
-        return float(both.max()) if both.size and np.isfinite(both).all() else math.inf
-
-    def misses(self, targets: Mapping[str, float], sources: Sequence[str] | None = None) -> bool:
-        """Return whether the error by some sources, all by default, exceeds a target."""
-        return any(self.error(name, sources) > _ROUNDING * math.log1p(part) for name, part in targets.items())
-
-    def next_misses(self, targets: Mapping[str, float]) -> bool:
-        """Return whether a grid of cells half as long exceeds a target even if nothing changes on it."""
-        return any(
-            float(self.last_change[name][self.touches].max()) / 2**ORDER > _ROUNDING * math.log1p(part)
-            for name, part in targets.items()
-        )
-
-    def in_words(self, targets: Mapping[str, float]) -> str:
-        """Return the errors of some quantities, and the targets."""
-        return "; ".join(
-            f"{name} {_percent(self.error(name))}, wanted {_percent(math.log1p(part))}"
-            for name, part in targets.items()
-        )
-
-    def refusal(self, case: Case, targets: Mapping[str, float], sources: Sequence[str], where: str) -> InputError:
-        """Return the error of targets that cannot be met: the sources, and what would reduce the largest."""
-        lines, first = [], ""
-        for name, part in targets.items():
-            if not self.misses({name: part}, sources):
-                continue
-            first = first or name
-            parts = {one: self.error(name, [one]) for one in sources if self.sources[one].state != "open"}
-            largest = max(parts, key=lambda one: parts[one])
-            if math.isinf(parts[largest]):
-                lines.append(f"{name}: found zero, or less: a part of it is no error: expected another number")
-                continue
-            told = f"{name}: found {_percent(math.log1p(part))}: its error is {_percent(self.error(name, sources), 3)}"
-            lines.append(f"{told} at least, {where}; {_REMEDIES[largest]} would reduce it")
-            lines += [f"  {one}: {_percent(error)}" for one, error in parts.items() if error > 0.1 * math.log1p(part)]
-            lines += [f"  {one}: open: {now.method}" for one, now in self.sources.items() if now.state == "open"]
+    lines, first = [], ""
+    for name, budget in budgets.items():
+        wanted, least = math.log1p(targets[name]), budget
+        if on_next:
+            factor = xr.where(budget["source"] == GRID, 2**-ORDER, 1.0)
+            least = budget.assign(half_width=budget["half_width"] * factor)
+        if error_of(least, sources) <= _ROUNDING * wanted:
+            continue
+        first = first or name
+        parts = {one: error_of(budget, [one]) for one in sources}
+        largest = max(parts, key=parts.__getitem__)
+        if math.isinf(parts[largest]):
+            lines.append(f"{name}: found zero, or less, which has no relative error: expected another number")
+            continue
+        error = _percent(error_of(budget, sources), 3)
+        lines.append(f"{name}: found {_percent(wanted)}: its error is {error} at least, {where}")
+        lines += [f"  {one}: {_percent(part)}" for one, part in parts.items() if part > 0.1 * wanted]
+        lines += [f"  {_REMEDIES[largest]} would reduce it"]
+        lines += [f"  open, and not counted: {budget.attrs['open']}"] if budget.attrs["open"] else []
+    if lines:
         named = f"{case.origin}: " if case.origin else ""
-        return InputError("\n".join([f"{named}{lines[0]}", *lines[1:]]), key=first, found=targets[first])
-
-    def budget(self, quantity: str, chosen: Case) -> xr.Dataset:
-        """Return the budget of a quantity."""
-        return assembled(
-            chosen,
-            self.observed[quantity],
-            self.sources,
-            self.shares[quantity],
-            self.values[quantity],
-            self.places,
-            self.seconds,
-        )
-
-
-def _judged(case: Case) -> list[float] | None:
-    """Return the times of the rows that are judged: the listed ones, else the corners of the program; None: all."""
-    times = case.settings.times
-    if case.experiment().axis != "time":
-        return None
-    return list(times) if isinstance(times, tuple) else list(case.program().corners)
+        raise InputError("\n".join([named + lines[0], *lines[1:]]), key=first, found=targets[first])
 
 
 def _percent(half_width: float, digits: int = 2) -> str:
