@@ -365,7 +365,7 @@ def compared(
     coarsening : float, optional
         Take the case on cells so many times as long, at the rows with a force, and a third grid.
     before : mapping, optional
-        Budgets on another grid, from which the errors that no grid reduces are taken.
+        Budgets on another grid, from which the rows are taken, and the errors that no grid reduces.
 
     Returns
     -------
@@ -377,8 +377,10 @@ def compared(
     case, axis = on_cells(base, height, coarsening or 1.0), base.experiment().axis
     near = [one.case for source in new.values() for one in source.neighbours]
     results = solved(near if own is not None else [case, *near])
+    if before is not None:
+        places = next(iter(before.values()))[axis].values
     own = at_rows(results[case.key] if own is None else own, axis, places)
-    if coarsening is not None:
+    if coarsening is not None and before is None:
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
     results[case.key] = own
     rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}

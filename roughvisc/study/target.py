@@ -234,9 +234,10 @@ def choose(
         _refuse_missed(case, targets, found, "whatever the grid", _FLOOR)
         if all(error_of(one) <= _ROUNDING * math.log1p(targets[name]) for name, one in found.items()):
             break
-        before, level = found, level - 1
-        if level <= _FINEST:  # the error on the finest grid is a part of the last one at least
-            _refuse_missed(case, targets, found, f"with {cells}", on_next=level == _FINEST)
+        level -= 1
+        if level <= _FINEST:
+            _refuse_missed(case, targets, found, f"with {cells}", before=before if level == _FINEST else None)
+        before = found
 
     chosen = on_cells(base, height, scale)
     path = result_path(folder, chosen.key)
@@ -269,18 +270,20 @@ def _refuse_missed(
     budgets: Mapping[str, xr.Dataset],
     where: str,
     sources: Sequence[str] = tuple(_REMEDIES),
-    on_next: bool = False,
+    before: Mapping[str, xr.Dataset] | None = None,
 ) -> None:
     """Refuse targets that cannot be met, with the sources of the error and what would reduce the largest of them.
 
-    With `on_next`, a target is missed if even no change by one more grid would meet it.
+    With the budgets on the grid `before`, a target is missed if it is so even without a change on the next grid, whose
+    error is a part of the last change at least.
     """
     lines, first = [], ""
     for name, budget in budgets.items():
         wanted, least = math.log1p(targets[name]), budget
-        if on_next:
-            factor = xr.where(budget["source"] == GRID, 2**-ORDER, 1.0)
-            least = budget.assign(half_width=budget["half_width"] * factor)
+        if before is not None:
+            change = np.abs(np.log(budget["value"].values / before[name]["value"].values))
+            part = QUANTITIES[name].grid_factor * change / 2**ORDER
+            least = budget.assign(half_width=budget["half_width"].where(budget["source"] != GRID, part))
         if error_of(least, sources) <= _ROUNDING * wanted:
             continue
         first = first or name
