@@ -131,8 +131,9 @@ def trade(
     if not budget > 0:
         raise InputError(key="budget", found=budget, expected="a positive number of seconds")
     asked = [quantity] if isinstance(quantity, str) else list(quantity)
-    derived = [quantity_of(case, name) for name in asked if name not in _USUAL or name == "friction_coefficient"]
-    names = list(dict.fromkeys([*asked, *(one for one in _USUAL if one in (*quantities_of(case), "pressure"))]))
+    fields = [field for name in asked if name != "pressure" for field in quantity_of(case, name).fields]
+    known = {"pressure", *quantities_of(case)}
+    names = [name for name in dict.fromkeys([*asked, *_USUAL]) if name in known]
     height = case.height()
     data, shape = is_data(case), (height.sizes["x"], height.sizes["y"])
     rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
@@ -142,19 +143,18 @@ def trade(
         number(tolerance, "1", "settings", above=0, below=1)
         number(grid, "1", "settings", above=0)
         if data and grid < 1:
-            raise InputError(
-                key="settings", found=(tolerance, grid), expected="cells at least as long as those of the scan"
-            )
-    finest = [1.0] if data else sorted({grid for _, grid in rungs if grid <= max(1.0, min(grid for _, grid in rungs))})
-    sharpest = min(tolerance for tolerance, _ in rungs)
+            expected = "cells at least as long as those of the scan"
+            raise InputError(key="settings", found=(tolerance, grid), expected=expected)
+    sharpest, grids = min(one for one, _ in rungs), sorted({grid for _, grid in rungs})
+    finest = [1.0] if data else [grid for grid in grids if grid <= 1] or grids[:1]
     wanted = {(sharpest / _SHARPER, part * grid) for grid in finest for part in (1.0, 2.0, 4.0)}
     wanted |= {*rungs, *((sharpest, grid) for grid in finest)}
-    fields = [*case.settings.fields, *(field for one in derived for field in one.fields), "pressure"]
     base = _with_common_rows(case, height, fields, {grid for _, grid in wanted})
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
 
     # work, in units of its own: the number of steps follows the root of the tolerance, iterations hardly change
-    power, spent, rate = (0.5 if base.experiment().axis == "time" else 0.1), 0.0, 0.0
+    axis = base.experiment().axis
+    power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
     work = {one: one[0] ** -power / one[1] ** 2 for one in wanted}
     results: dict[tuple[float, float], xr.Dataset] = {}
     notes: dict[tuple[float, float], str] = {}
@@ -175,10 +175,8 @@ def trade(
             continue
         seconds = float(result["wall_time"].values[-1])
         spent, rate = spent + seconds, seconds / work[one]
-        values = {
-            name: (axis_of(result.dims), QUANTITIES[name].of(result, base)) for name in names if name != "pressure"
-        }
-        results[one] = result.assign(values)
+        derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
+        results[one] = result.assign(derived)
     candidates = [(sharpest / _SHARPER, grid) for grid in finest]
     reference = next((one for one in candidates if one in results), None)
     if reference is None:
@@ -195,9 +193,9 @@ def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
 
 
 def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], grids: set[float]) -> Case:
-    """Return the case with these fields, and rows that all settings have in common."""
+    """Return the case with these fields and the pressure, and rows that all settings have in common."""
     changes: dict[str, Any] = {"solve.grid_error": False, "solve.boundary": case.settings.boundary}
-    changes["keep.fields"] = list(dict.fromkeys(fields))
+    changes["keep.fields"] = list(dict.fromkeys([*case.settings.fields, *fields, "pressure"]))
     experiment = case.experiment()
     if isinstance(experiment, Loading):
         times = case.settings.times or _FEW
@@ -219,71 +217,54 @@ def _compared(
     reference: tuple[float, float],
 ) -> xr.Dataset:
     """Return the cost and the errors of the settings that were solved."""
-    sharp, finest = reference
-    wanted, missing = results[reference], np.full(len(names), math.nan)
+    (sharp, finest), axis = reference, case.experiment().axis
+    missing = np.full(len(names), math.nan)
 
-    def apart(one: tuple[float, float], other: tuple[float, float]) -> NDArray[np.float64]:
+    def apart(one: tuple[float, float], other: tuple[float, float] = reference) -> NDArray[np.float64]:
         return _differences(results[one], results[other], names) if {one, other} <= results.keys() else missing
 
-    second, third = ((sharp, part * finest) for part in (2.0, 4.0))
-    ratio = math.sqrt(wanted["x"].size * wanted["y"].size)
-    ratio /= math.sqrt(math.prod(results[second].sizes[side] for side in ("x", "y"))) if second in results else 1.0
-    near, far = apart(second, reference), apart(third, second)
-    moving = "friction_coefficient" in names
-    # the error follows the tolerance, unevenly: hence the larger safety factor
-    unsure = TWO_GRIDS * apart((sharp * _SHARPER, finest), reference) / (_SHARPER - 1)
-    rows, axis = [], axis_of(wanted.dims)
-    shapes = [shape_on(case, height, grid) for _, grid in rungs]
+    rows = []
     for one in rungs:
-        row: dict[str, Any] = {"run_time": math.nan, "transforms": math.nan, "steps": math.nan, "error": missing}
-        row["note"] = notes.get(one, "")
-        if one in results and one[1] < finest:
-            row["note"] = "finer than the reference, for which there is no time"
+        error, shape, cost = apart(one), shape_on(case, height, one[1]), [math.nan] * 3
+        note = notes.get(one, "")
+        if one[1] < finest:
+            note = note or "finer than the reference, for which there is no time"
+        elif one in results and np.isnan(error).all():
+            note = f"its {AXES[axis].rows} differ from those of the reference"
         elif one in results:
-            found, error = results[one], apart(one, reference)
-            if np.isnan(error).all():
-                row["note"] = f"its {AXES[axis].rows} differ from those of the reference"
-            else:
-                steps = steps_of(found)
-                row["run_time"] = float(found["wall_time"][-1])
-                row["transforms"] = float(found["convolutions"].sum())
-                row["steps"] = found.sizes[axis] if steps is None else steps.sizes["step"]
-                row["error"] = error
-        rows.append(row)
-    coords = {
-        "setting": [_label(*one, shape) for one, shape in zip(rungs, shapes, strict=True)],
-        "quantity": list(names),
-        "tolerance": ("setting", [one for one, _ in rungs]),
-        "coarsening": ("setting", [grid for _, grid in rungs]),
-        "cells_x": ("setting", [nx for nx, _ in shapes]),
-        "cells_y": ("setting", [ny for _, ny in shapes]),
-    }
-    variables: dict[str, Any] = {
-        name: (("setting", "quantity")[: np.ndim(rows[0][name]) + 1], np.array([row[name] for row in rows]))
-        for name in rows[0]
-    }
-    variables["reference_time_uncertainty"] = ("quantity", unsure)
-    variables["reference_grid_uncertainty"] = (
-        "quantity",
-        [
-            float(grid_uncertainty(name, one, other, ratio, moving=moving))
-            for name, one, other in zip(names, near, far, strict=True)
-        ],
+            found, steps = results[one], steps_of(results[one])
+            count = found.sizes[axis] if steps is None else steps.sizes["step"]
+            cost = [float(found["wall_time"][-1]), float(found["convolutions"].sum()), float(count)]
+        row: dict[str, Any] = {"setting": _label(*one, shape), "tolerance": one[0], "coarsening": one[1]}
+        row |= {"cells_x": shape[0], "cells_y": shape[1], "note": note, "error": missing if note else error}
+        rows.append(row | dict(zip(("run_time", "transforms", "steps"), cost, strict=True)))
+    columns = {name: (VARIABLES[name].dims, [row[name] for row in rows]) for name in rows[0]}
+    table = xr.Dataset(columns, {"quantity": list(names)})
+    table = table.set_coords(["tolerance", "coarsening", "cells_x", "cells_y"])
+    # the error follows the tolerance, unevenly: hence the larger safety factor
+    by_steps = TWO_GRIDS * apart((sharp * _SHARPER, finest)) / (_SHARPER - 1)
+    second, third = (sharp, 2 * finest), (sharp, 4 * finest)
+    shapes = [shape_on(case, height, grid) for grid in (finest, 2 * finest)]
+    ratio, moving = math.sqrt(math.prod(shapes[0]) / math.prod(shapes[1])), "friction_coefficient" in names
+    by_grid = [
+        float(grid_uncertainty(name, near, far, ratio, moving=moving))
+        for name, near, far in zip(names, apart(second), apart(third, second), strict=True)
+    ]
+    table["reference_time_uncertainty"], table["reference_grid_uncertainty"] = (
+        ("quantity", unsure) for unsure in (by_steps, by_grid)
     )
     attributes = {
         "Conventions": "CF-1.11",
         "result_format": RESULT_FORMAT,
         "title": case.title,
         "source": f"roughvisc {metadata.version('roughvisc')}",
-        "comment": "One case computed under many settings, each timed and compared with 'reference'; attribute 'case' "
-        "states it (JSON, SI units).",
         "case": case.to_json(),
-        "reference": f"finest run: {_label(*reference, shape_on(case, height, finest))}",
+        "reference": f"finest run: {_label(*reference, shapes[0])}",
         "grid_is_data": int(is_data(case)),
         "rows": AXES[axis].rows,
         "transforms": transform_library(),
     }
-    return label(xr.Dataset(variables, coords), VARIABLES).assign_attrs(attributes)
+    return label(table, VARIABLES).assign_attrs(attributes)
 
 
 def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
@@ -292,10 +273,9 @@ def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) ->
     For the pressure it is the absolute difference summed (L1) over the largest force. It is missing if the rows are at
     other times. A quantity that is missing in both results, such as the friction before the load, is equal there.
     """
-    rows = axis_of(wanted.dims)
+    rows, errors = axis_of(wanted.variables), []
     if found[rows].shape != wanted[rows].shape or not np.allclose(found[rows], wanted[rows], rtol=1e-9, atol=0):
         return np.full(len(names), math.nan)
-    errors = []
     for name in names:
         if name == "pressure":
             error, largest = pressure_distance(found, wanted), float(wanted["force"].max())
