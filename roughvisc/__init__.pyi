@@ -36,11 +36,11 @@ from roughvisc.study.case import Case as Case
 from roughvisc.study.case import read_cases as read_cases
 from roughvisc.study.case import read_study as read_study
 from roughvisc.study.case import vary as vary
-from roughvisc.study.ensembles import over_realisations as over_realisations
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.machine_history import read_program as read_program
 from roughvisc.study.observed import observe as observe
 from roughvisc.study.plan import plan as plan
+from roughvisc.study.realisations import over_realisations as over_realisations
 from roughvisc.study.storage.results import open_results as open_results
 from roughvisc.study.storage.store import open_result as open_result
 from roughvisc.study.storage.table import to_table as to_table

@@ -17,15 +17,13 @@ ROW = {
     "patch_lower": 1.5e-9,
     "patch_upper": 2.5e-9,
     "count": 24,
-    "zeros": 0,
     "itself": 1.7e-9,
     "ratio": 0.85,
-    "standing": "inside",
 }
 
 
 def test_realisation_rows__say_what_a_reader_needs():
-    leak = {"quantity": "leak_rate", "unit": "m^3/s", "mean": 1e-12, "zeros": 3, "standing": "not known"}
+    leak = {"quantity": "leak_rate", "unit": "m^3/s", "mean": 1e-12}
     leak |= dict.fromkeys(("lower", "upper", "patch_lower", "patch_upper"), float("nan"))
     headings, rows, notes = realisation_rows(pd.DataFrame([ROW, ROW | leak]))
     assert headings == [
@@ -39,13 +37,14 @@ def test_realisation_rows__say_what_a_reader_needs():
     ]
     assert rows[0] == ["20", "contact area", "2000 µm²", "1900 to 2100", "1500 to 2500", "1700 µm²", "0.85"]
     assert rows[1][3:5] == ["none", "none"]
-    assert len(notes) == 2, "surrogates, and that zeros have no interval"
+    assert notes == ["Over 24 Gaussian surrogates of the scan, values at the end."]
 
 
-def test_realisation_rows__mark_a_scan_that_stands_outside():
-    _, rows, notes = realisation_rows(pd.DataFrame([ROW | {"standing": "below"}]))
-    assert rows[0][-1] == "0.85 !"
-    assert "contact area" in notes[1]
-    table = pd.DataFrame([ROW]).drop(columns=["itself", "ratio", "standing"])
-    assert "24 realisations" in realisation_rows(table)[2][0]
+def test_realisation_rows__of_no_scan():
+    table = pd.DataFrame([ROW]).drop(columns=["itself", "ratio"])
+    headings, rows, notes = realisation_rows(table)
+    assert len(headings) == len(rows[0]) == 5
+    assert "24 realisations" in notes[0]
     assert realisation_rows(pd.DataFrame()) == ([], [], [])
+    follows = pd.DataFrame([ROW | {"quantity": "contact_fraction"}])
+    assert realisation_rows(follows) == ([], [], [])

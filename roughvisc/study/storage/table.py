@@ -13,7 +13,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
-from roughvisc.study.ensembles import STANDING, over_realisations
+from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.failures import stated_failure
 from roughvisc.study.storage.files import atomic_write
@@ -150,7 +150,6 @@ def realisations_table(index: Index, cases: Sequence[SweepCase]) -> pd.DataFrame
                 {"case": number, **dict(zip(varied, settings, strict=True)), "quantity": name, "unit": variable.units}
                 | {"where": f"largest {axis.telling}" if axis.telling else "end"}
                 | told
-                | ({"standing": STANDING[told["standing"]].replace("_", " ")} if "standing" in told else {})
             )
     return pd.DataFrame(rows)
 

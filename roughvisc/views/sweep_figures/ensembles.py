@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from roughvisc.study.ensembles import statistics
+from roughvisc.study.realisations import statistics
 from roughvisc.study.sweep_table import ITSELF
 from roughvisc.variables import NOT_CONVERGED, axis_of
 

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 import scipy.stats
 import xarray as xr
+from support import refused
 
-from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study
-from roughvisc.study.ensembles import STANDING, over_realisations
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
+from roughvisc.study.realisations import over_realisations
 from roughvisc.study.storage.results import open_results
 from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import REALISATIONS, to_table
@@ -46,11 +46,10 @@ def test_over_realisations__holds_what_log_normal_samples_were_drawn_from(count,
     assert (found["lower"] <= found["mean"]).mean() > 0.999
 
 
-def test_over_realisations__zeros_and_missing_values_are_told():
+def test_over_realisations__zeros_and_missing_values():
     nan = np.nan
     found = over_realisations(of([[0, 0, 2, nan, nan], [0, 1, 3, 4, nan], [0, 2, np.inf, nan, nan]]))
     assert found["count"].values.tolist() == [3, 3, 2, 1, 0]
-    assert found["zeros"].values.tolist() == [3, 1, 0, 0, 0]
     np.testing.assert_array_equal(found["mean"], [0, 1, 2.5, 4, nan])
     for name in ("lower", "upper", "patch_lower", "patch_upper"):
         assert np.isfinite(found[name]).values.tolist() == [False, False, True, False, False], name
@@ -64,16 +63,10 @@ def test_over_realisations__the_surface_itself_stands_apart():
     assert found["count"].values.tolist() == [3, 3, 3]
     np.testing.assert_allclose(found["mean"], 1.0)
     np.testing.assert_allclose(found["ratio"], [9, 1, 0.1])
-    assert [STANDING[int(one)] for one in found["standing"]] == ["above", "inside", "below"]
-    drawn = np.log([1.1, 0.9, 1.0])
-    end = np.exp(drawn.mean() + scipy.stats.t.ppf(0.995, 2) * drawn.std(ddof=1) * np.sqrt(4 / 3))
-    for factor, stands in ((0.999, "inside"), (1.001, "above")):
-        values[0] = factor * end
-        assert STANDING[int(over_realisations(values)["standing"][0])] == stands
     found, scaled = over_realisations(values), over_realisations(values * 1e-9)
     np.testing.assert_allclose(scaled["patch_upper"], 1e-9 * found["patch_upper"])
     assert "itself" not in over_realisations(values[1:])
-    with pytest.raises(InputError, match="area lies over time: expected a dimension 'realisation'"):
+    with refused("area", ["time"]):
         over_realisations(values.isel(realisation=0, drop=True).rename("area"))
 
 

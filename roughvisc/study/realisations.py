@@ -1,0 +1,122 @@
+"""Statistics of a number over the realisations of a surface: mean, scatter, and 95 % intervals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.stats
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.study.sweep_table import ITSELF, REALISATION
+
+Array = NDArray[np.float64]
+_MEANINGS = {
+    "mean": "mean",
+    "standard_deviation": "standard deviation",
+    "lower": "lower bound of the mean at 95 %",
+    "upper": "upper bound of the mean at 95 %",
+    "patch_lower": "lower bound of one more patch at 95 %",
+    "patch_upper": "upper bound of one more patch at 95 %",
+    "count": "number of known values",
+    "itself": "value of the measured surface itself",
+    "ratio": "ratio of the measured surface to the mean",
+}
+
+
+def over_realisations(values: xr.DataArray) -> xr.Dataset:
+    r"""Return mean, scatter and 95 % intervals of a quantity over the realisations of a surface.
+
+    Parameters
+    ----------
+    values : xarray.DataArray
+        A quantity with a dimension ``realisation``, such as ``results.contact_area`` of a sweep with ``realisations``,
+        in any unit. Realisation 0, a measured surface itself, is not counted among its surrogates.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the other dimensions, in the unit of the quantity:
+
+        - ``mean`` and ``standard_deviation`` (of the sample, with :math:`n - 1`);
+        - ``lower`` and ``upper``, the interval of the mean;
+        - ``patch_lower`` and ``patch_upper``, the interval of one more patch, to which a single measurement belongs;
+        - ``count``, the number of known values;
+        - with realisation 0 its value ``itself``, and its ``ratio`` to the mean [-].
+
+    Raises
+    ------
+    InputError
+        If there is no such dimension.
+
+    Notes
+    -----
+    Values that are not finite are missing. If all others are positive, the intervals are taken in logarithms, with the
+    mean :math:`m` and the standard deviation :math:`s` of the :math:`n` logarithms and Student's quantile :math:`t` of
+    :math:`n - 1`: that of the mean is :math:`m + s^2/2 \pm t \sqrt{s^2/n + s^4/(2(n-1))}` [1]_, which holds the mean
+    of log-normal values in 92 to 95 of 100 samples of 4 or more with :math:`s \le 1.2`; that of a patch is
+    :math:`m \pm t s \sqrt{1 + 1/n}`. With values of both signs they are those of Student. A quantity that is never
+    negative, but zero in some realisations, such as the leak rate of a closed gap, has no interval. Nor is there one of
+    fewer than two values.
+
+    References
+    ----------
+    .. [1] U. Olsson, Confidence intervals for the mean of a log-normal distribution, J. Stat. Educ. 13 (2005) 1.
+
+    Examples
+    --------
+    >>> import numpy as np, roughvisc as rv, xarray as xr
+    >>> area = xr.DataArray(np.exp([0.1, -0.1, 0.2, -0.2]), dims="realisation", attrs={"units": "m^2"})
+    >>> found = rv.over_realisations(area)
+    >>> [round(float(found[name]), 3) for name in ("lower", "mean", "upper")]
+    [0.758, 1.013, 1.364]
+    """
+    if REALISATION not in values.dims:
+        expected = f"a dimension {REALISATION!r}, as a sweep with realisations = 24 has it"
+        raise InputError(key=str(values.name or "values"), found=list(values.dims), expected=expected)
+    values = values.transpose(REALISATION, ...)
+    numbers = values[REALISATION].values if REALISATION in values.coords else np.ones(len(values))
+    found = statistics(values.values[numbers != ITSELF])
+    if ITSELF in numbers:
+        itself = found["itself"] = values.values[numbers == ITSELF][0]
+        mean = found["mean"]
+        found["ratio"] = np.divide(itself, mean, out=np.full_like(mean, np.nan), where=mean != 0)
+    units, name = values.attrs.get("units"), str(values.attrs.get("long_name", values.name or "values"))
+    variables = {}
+    for one, array in found.items():
+        attributes: dict[str, Any] = {"long_name": f"{_MEANINGS[one]}: {name}"}
+        if one in ("count", "ratio") or units is not None:
+            attributes["units"] = "1" if one in ("count", "ratio") else units
+        variables[one] = (values.dims[1:], array, attributes)
+    coords = {key: one for key, one in values.coords.items() if REALISATION not in one.dims}
+    return xr.Dataset(variables, coords, {"quantity": str(values.name or "")})
+
+
+def statistics(values: Array) -> dict[str, Array]:
+    """Return what :func:`over_realisations` returns of values over (realisation, ...), without a surface itself."""
+    values = np.where(np.isfinite(values), values, np.nan)
+    count = np.isfinite(values).sum(axis=0)
+    with np.errstate(all="ignore"):  # a missing value or too few of them give NaN
+        freedom = np.where(count > 1, count - 1, np.nan)
+        student = scipy.stats.t.ppf(0.975, freedom)
+        mean = np.nansum(values, axis=0) / count
+        deviation = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / freedom)
+        logarithms = np.log(values)
+        middle = np.nansum(logarithms, axis=0) / count
+        spread = np.sqrt(np.nansum((logarithms - middle) ** 2, axis=0) / freedom)
+        of_mean = student * np.sqrt(spread**2 / count + spread**4 / (2 * freedom))
+        of_patch, centre = student * np.sqrt(1 + 1 / count), middle + spread**2 / 2
+        least = np.fmin.reduce(values, axis=0, initial=np.inf)
+        # in logarithms if all values are positive; no interval if some are zero and none is negative
+        positive, zero = least > 0, least == 0
+        ends = {
+            "lower": (np.exp(centre - of_mean), mean - student / np.sqrt(count) * deviation),
+            "upper": (np.exp(centre + of_mean), mean + student / np.sqrt(count) * deviation),
+            "patch_lower": (np.exp(middle - of_patch * spread), mean - of_patch * deviation),
+            "patch_upper": (np.exp(middle + of_patch * spread), mean + of_patch * deviation),
+        }
+    found = {"mean": mean, "standard_deviation": deviation}
+    found |= {name: np.where(zero, np.nan, np.where(positive, *pair)) for name, pair in ends.items()}
+    return found | {"count": count}
