@@ -16,7 +16,7 @@ from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.si_tables import COLUMNS, unit_of
 from roughvisc.study.study_file import KEPT, PROGRAMS, SEGMENTS
-from roughvisc.topography.cards import FACE_STEPS, STEPS
+from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.surrogates import surrogate
 from roughvisc.topography.synthesis import RECIPES
 

@@ -175,6 +175,12 @@ def a_table(where: str, value: Any) -> dict[str, Any]:
     return dict(value)
 
 
+def split(table: Mapping[str, Any], *names: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the entries of a table under some keys, and all others."""
+    chosen = {key: value for key, value in table.items() if key in names}
+    return chosen, {key: value for key, value in table.items() if key not in names}
+
+
 def located(error: InputError, where: str) -> InputError:
     """Return an error about an argument as one about a key of a table."""
     key = re.sub(r"\[(\d+)\]", r".\1", dotted(where, error.key))

@@ -16,7 +16,7 @@ from roughvisc.cli import main
 from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.storage.store import write_result
-from roughvisc.study.study_file import raw_height
+from roughvisc.topography.scans import raw_height
 
 
 def write_study(text=BALL, *replacements):

@@ -112,7 +112,7 @@ assert stored.stiffness.dims == ("time",)
 
 def test_conditioning_step__is_added_in_one_file(added):
     edits = {
-        "topography/cards.py": {
+        "topography/conditioning.py": {
             "STEPS: dict[str, Step] = {\n": '    "raised": Step(lambda h, by: h.copy(data=h.values + by), "by"),\n',
         }
     }
@@ -123,7 +123,6 @@ Path("card.toml").write_text('''generate = "sphere"
 radius = "1 mm"
 size = "0.2 mm"
 shape = 9
-[conditioning]
 raised = 1e-6
 ''')
 np.testing.assert_array_equal(rv.open_scan("card.toml").values, case.height().values)

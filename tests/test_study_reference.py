@@ -14,7 +14,7 @@ from roughvisc.settings import Settings
 from roughvisc.study.audit.given import AuditInputs
 from roughvisc.study.si_tables import COLUMNS, TABLES
 from roughvisc.study.study_file import GEOMETRY, PROGRAMS, SEGMENTS, TEMPERATURE
-from roughvisc.topography.cards import STEPS
+from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.synthesis import RECIPES
 
 PAGE = (DOCS / "study-files.md").read_text(encoding="utf-8")

@@ -11,12 +11,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.study import study_file
 from roughvisc.study.si_tables import in_si, si_tables
 from roughvisc.study.sweep_table import REALISATION, SURROGATE, place, sweep_changes, value_at
-from roughvisc.topography.cards import PROVENANCE, STEPS, is_card, measured_file, read_toml
+from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.readers import sha256
+from roughvisc.topography.scans import check_surface, is_card, measured_file, read_card, read_toml, surface_height
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,7 +140,7 @@ class Case:
         try:
             if self.made_shape is not None:
                 require_surface(self.made_shape)
-            height = study_file.surface_height(self.surface)
+            height = surface_height(self.surface)
         except InputError as error:
             self._refuse_changed(before, error)
             raise error.prefixed(str(self.origin) if self.origin else "case") from error
@@ -243,7 +245,7 @@ class Case:
         """
         if not isinstance(self.title, str) or not self.title.strip():
             raise InputError(key="title", found=self.tables["title"], expected="a text")
-        study_file.check_surface(self.surface)
+        check_surface(self.surface)
         _ = self._body, self._experiment, self.settings, self.precision
         self.observed()
         self.audit_inputs()
@@ -417,8 +419,7 @@ def _checksums(face: Mapping[str, Any]) -> tuple[str, str]:
         return _digest({key: value for key, value in face.items() if key not in steps}), ""
     path, card = Path(face["file"]), {}
     if is_card(path, face.get("format")):
-        stated = read_toml(path, "a surface card in TOML")
-        card = {key: value for key, value in stated.items() if key not in (*PROVENANCE, "file", "sha256")}
+        card = split(read_card(path)[1], "file")[1]
     scan = measured_file(path, face.get("format"))
     try:
         return (_digest(card) if scan is None else sha256(scan)), (_digest(card) if card else "")

@@ -20,7 +20,7 @@ from roughvisc.study.first_study import (
     FirstPressure,
     pressure_for,
 )
-from roughvisc.topography.cards import condition
+from roughvisc.topography.conditioning import condition
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.parameters import rms_slope
 

@@ -25,7 +25,7 @@ from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable, creep_time
 from roughvisc.study.storage.store import open_result, result_path
 from roughvisc.study.study_file import TEMPERATURE
-from roughvisc.topography.cards import FACE_STEPS
+from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import last_octave, modes
 from roughvisc.units import number, unit_for

@@ -24,7 +24,7 @@ from roughvisc.settings import Settings
 from roughvisc.study.audit.given import BOUNDS
 from roughvisc.study.machine_history import read_history
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
-from roughvisc.topography.cards import STEPS
+from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import RECIPES

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
-from pathlib import Path
 from typing import Any
 
-import xarray as xr
-
-from roughvisc.arguments import a_table, call, check, check_keys, located, one_key, one_of, refuse_unknown
+from roughvisc.arguments import a_table, call, check, located, one_key, one_of, refuse_unknown, split
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -29,21 +26,7 @@ from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.topography.cards import (
-    FACE_STEPS,
-    STEPS,
-    boundary_after,
-    boundary_of_card,
-    check_steps,
-    condition,
-    generate,
-    is_card,
-    measured_file,
-)
-from roughvisc.topography.framing import combine
-from roughvisc.topography.readers import sha256
-from roughvisc.topography.scans import open_scan
-from roughvisc.topography.synthesis import BOUNDARIES, check_recipe
+from roughvisc.topography.scans import surface_boundary
 from roughvisc.units import number
 
 #: Keys of a temperature, which every model has.
@@ -68,87 +51,10 @@ _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
 _ROUNDING = 1e-12
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# surface
-
-
-def split(table: Mapping[str, Any], *names: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the entries of a table under some keys, and all others."""
-    chosen = {key: value for key, value in table.items() if key in names}
-    return chosen, {key: value for key, value in table.items() if key not in names}
-
-
-def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
-    """Return the heights of a table ``[surface]``, conditioned; of two faces their sum. [m]"""
-    second = table.get("second")
-    height = _face_height("surface", table)
-    if second is not None:
-        placing, face = split(second, "flip", "offset")
-        flip = placing.pop("flip", "x")
-        other = _face_height("surface.second", face)
-        placing |= {"flip": None if flip == "none" else flip, "align": "centre"}
-        height = call(combine, "surface.second", placing, height, other)
-    steps = {name: table[name] for name in STEPS if name in table and name not in FACE_STEPS}
-    if isinstance(steps.get("realisation"), int):
-        steps["realisation"] = {"number": steps["realisation"], "seed": _surrogate_seed(table)}
-    return condition(height, steps, "surface")
-
-
 def cells(shape: Any) -> tuple[int, int]:
     """Return the numbers of cells along x and y, of which a table may state one for both."""
     both: Any = shape.get("shape") if isinstance(shape, Mapping) else shape
     return (int(both[0]), int(both[1])) if isinstance(both, list | tuple) else (int(both), int(both))
-
-
-def raw_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
-    """Return the heights of a table of a surface before conditioning. [m]"""
-    _, source = split(table, *STEPS, "second", "missing")
-    if "generate" in table:
-        return generate(source, where)
-    file, options = split(source, "file")
-    return call(open_scan, where, options, file["file"])
-
-
-def _face_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
-    return condition(raw_height(where, table), split(table, *FACE_STEPS)[0], where)
-
-
-def _surrogate_seed(table: Mapping[str, Any]) -> int:
-    """Return the seed of the surrogates of a surface, different for each scan.
-
-    With a common seed, the first surrogates of all scans would deviate from their mean in the same direction.
-    """
-    path = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
-    return 0 if path is None else int(sha256(path)[:8], 16)
-
-
-def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
-    """Check a table of a surface without its heights."""
-    source_key = one_key(where, table, ("file", "generate"))
-    is_second = where != "surface"
-    steps, rest = split(table, *(FACE_STEPS if is_second else STEPS))
-    placing, source = split(rest, *(("flip", "offset") if is_second else ("second", "missing")))
-    check_steps(steps, where)
-    if source_key == "generate":
-        check_recipe(where, source)
-    else:
-        check_keys(open_scan, where, {key: value for key, value in source.items() if key != "file"}, 1)
-    if is_second:
-        one_of(f"{where}.flip", placing.pop("flip", "x"), ("x", "y", "none"))
-        check(combine, where, placing | {"align": "centre"}, 2)
-    elif "second" in placing:
-        check_surface(placing["second"], "surface.second")
-
-
-def surface_boundary(table: Mapping[str, Any]) -> Any:
-    """Return the boundary that a surface is made for, without its heights; None if the study has to state it."""
-    made = BOUNDARIES.get(table.get("generate", ""))
-    if "file" in table:
-        path = Path(table["file"])
-        made = boundary_of_card(path) if is_card(path, table.get("format")) else None
-    of_face, rest = split(table, *FACE_STEPS)
-    made = boundary_after(of_face, made)
-    return boundary_after(split(rest, *STEPS)[0], None if "second" in table else made)
 
 
 # ----------------------------------------------------------------------------------------------------------------

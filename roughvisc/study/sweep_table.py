@@ -13,7 +13,7 @@ from typing import Any
 
 from roughvisc.arguments import a_table
 from roughvisc.errors import InputError, short_repr
-from roughvisc.topography.cards import is_card, read_toml
+from roughvisc.topography.scans import is_card, read_toml
 
 #: Key of a sweep, and the key of the number of a realisation in a case.
 REALISATIONS, REALISATION = "realisations", "realisation"

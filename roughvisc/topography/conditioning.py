@@ -1,24 +1,164 @@
-"""Conditioning of scans, one function for each step.
+"""Conditioning of scans: one function for each step, and the steps in the order in which they act.
 
-Every function takes a grid and gives a new one; what was done stands in the attribute ``history``. Missing points are
-NaN, and stay so until :func:`fill`.
+Every function takes a grid and returns a new one. The attribute ``history`` records the steps. Missing points are NaN
+until :func:`fill`.
 """
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Literal, NamedTuple
+
+import xarray as xr
+
+from roughvisc.arguments import a_table, call, check, dotted, located, refuse_unknown
+from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.missing_points import fill, mask_outliers
 from roughvisc.topography.resampling import resample, without_short_waves
+from roughvisc.topography.surrogates import surrogate
 
 __all__ = [
+    "combine",
+    "condition",
+    "crop",
+    "fill",
+    "gaussian_filter",
+    "invert",
     "level",
     "mask_outliers",
-    "fill",
-    "resample",
-    "gaussian_filter",
-    "crop",
-    "rotate90",
-    "invert",
-    "combine",
     "mirror",
+    "resample",
+    "rotate90",
     "without_short_waves",
 ]
+
+
+class Step(NamedTuple):
+    """Conditioning step.
+
+    Attributes
+    ----------
+    function : callable
+        Takes heights and arguments, and returns heights.
+    argument : str
+        Name of the argument that a value states which is neither true nor a table; empty if there is none.
+    """
+
+    function: Callable[..., xr.DataArray]
+    argument: str = ""
+
+
+#: Conditioning steps in the order in which they act. A value is true (the function with its defaults), false (the step
+#: is left out), the value of one argument, or a table of arguments.
+STEPS: dict[str, Step] = {
+    "crop": Step(crop),
+    "rotate90": Step(rotate90, "turns"),
+    "invert": Step(invert),
+    "level": Step(level, "order"),
+    "outliers": Step(mask_outliers),
+    "fill": Step(fill, "method"),
+    "filter": Step(gaussian_filter, "cutoff"),
+    "shortest_wave": Step(without_short_waves, "shortest"),
+    "realisation": Step(surrogate, "number"),
+    "resample": Step(resample, "shape"),
+}
+#: Steps that a face may have before a second face lies on it.
+FACE_STEPS = ("crop", "rotate90", "invert", "level", "outliers", "fill", "filter")
+#: Steps that leave a periodic surface periodic.
+_KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")
+
+
+def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.DataArray:
+    """Condition heights.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    steps : mapping
+        Any of :data:`STEPS` with their values, in any order; they act in the order of that list.
+    where : str
+        Dotted name of the table, for messages.
+
+    Returns
+    -------
+    xarray.DataArray
+        Conditioned height. [m]
+
+    Raises
+    ------
+    InputError
+        If a step or an option is unknown, or a value is wrong.
+    """
+    for name, arguments in _stated(steps, where):
+        with _named(steps, where, name):
+            h = call(STEPS[name].function, "", arguments, h)
+    return h
+
+
+def check_steps(steps: Mapping[str, Any], where: str = "") -> None:
+    """Check conditioning steps without heights.
+
+    Parameters
+    ----------
+    steps, where
+        As in :func:`condition`.
+    """
+    for name, arguments in _stated(steps, where):
+        with _named(steps, where, name):
+            check(STEPS[name].function, "", arguments)
+
+
+@contextmanager
+def _named(steps: Mapping[str, Any], where: str, name: str) -> Iterator[None]:
+    """Put the key of a step in front of errors about its argument, which the value of the key may be itself."""
+    try:
+        yield
+    except InputError as error:
+        key = dotted(where, name)
+        if error.key == STEPS[name].argument != "" and not isinstance(steps[name], Mapping | bool):
+            raise InputError(key=key, found=error.found, expected=error.expected) from error
+        raise located(error, key) from error
+
+
+def _stated(steps: Any, where: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield name and arguments of each step that is not left out, in order."""
+    refuse_unknown(where, a_table(where or "conditioning", steps), STEPS)
+    for name, step in STEPS.items():
+        value = steps.get(name, False)
+        if isinstance(value, Mapping):
+            yield name, dict(value)
+        elif value is True:
+            yield name, {}
+        elif value is not False:
+            if not step.argument:
+                raise InputError(key=dotted(where, name), found=value, expected="true, false or a table")
+            yield name, {step.argument: value}
+
+
+def boundary_after(
+    steps: Mapping[str, Any], made: Literal["free", "periodic"] | None
+) -> Literal["free", "periodic"] | None:
+    """Boundary of a surface after conditioning steps; None where it has to be said.
+
+    Parameters
+    ----------
+    steps : mapping
+        As :func:`condition` takes them. ``realisation`` makes any surface periodic; turns, cuts of short waves and
+        other numbers of cells leave a periodic one so; all else leaves open what lies beyond the border.
+    made : {"free", "periodic"} or None
+        Boundary that the surface was made for.
+
+    Examples
+    --------
+    >>> boundary_after({"level": 1, "realisation": 1}, None), boundary_after({"level": 1}, "free")
+    ('periodic', None)
+    """
+    for step in STEPS:
+        if steps.get(step, False) is not False:
+            kept = made == "periodic" and step in _KEEP_PERIOD
+            made = "periodic" if kept or step == "realisation" else None
+    return made

@@ -1,14 +1,29 @@
-"""``open_scan``: the entry to instrument files, grid files and surface cards."""
+"""Surfaces: scan files, surface cards and the table ``[surface]`` of a study.
+
+The table names a scan ``file`` and how to read it, or a recipe to ``generate`` and its parameters, and the conditioning
+steps. A surface card is such a table in a TOML file of its own, with the origin of the surface.
+"""
 
 from __future__ import annotations
 
 import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
-from roughvisc.topography.cards import is_card, open_card
-from roughvisc.topography.readers import existing, finite, read_file
-from roughvisc.units import Quantity, quantities
+from roughvisc.arguments import call, check, check_keys, dotted, one_key, one_of, split
+from roughvisc.errors import InputError
+from roughvisc.tables import regular
+from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, check_steps, combine, condition
+from roughvisc.topography.readers import existing, finite, read_file, sha256
+from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
+from roughvisc.units import Quantity, in_si, quantities
+
+#: Keys of a card that change no height.
+PROVENANCE = ("title", "description", "licence", "source", "instrument")
 
 
 @quantities(spacing="m", grid="m")
@@ -77,6 +92,180 @@ def open_scan(
     path = existing(path)
     if not is_card(path, format):
         return read_file(path, format=format, **options)
-    h = open_card(path, **options)
+    if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
+        raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
+    h = open_card(path)
     finite(h, str(path))
     return h
+
+
+def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
+    """Return the heights that a surface card describes. [m]
+
+    Parameters
+    ----------
+    path : Path
+        The card; its ``file`` is relative to the card's folder.
+    conditioned : bool
+        Whether to condition the heights.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height, with the card's title, description, licence and source among the attributes. [m]
+
+    Raises
+    ------
+    InputError
+        If the card is no TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
+    """
+    path = Path(path)
+    about, table = read_card(path)
+    stated = about.pop("sha256", None)
+    try:
+        one_key("the card", table, ("file", "generate"))
+        table |= {key: in_si(table[key], "m", key) for key in ("spacing", "grid") if key in table}
+        if "file" in table and stated is not None:
+            found = sha256(existing(table["file"]))
+            if stated.lower() != found:
+                raise InputError(
+                    f"the checksum of {Path(table['file']).name} is {found}, sha256 says {stated}: the file was "
+                    "changed or damaged"
+                )
+        h = raw_height("", table)
+        h = condition(h, split(table, *STEPS)[0]) if conditioned else h
+    except InputError as error:
+        raise error.prefixed(str(path)) from error
+    return h.assign_attrs(card=path.name, **about)
+
+
+def read_card(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
+    """Return the origin and the checksum that a surface card states, and its table with the path of its file.
+
+    Raises
+    ------
+    InputError
+        If the card cannot be read, or one of these entries is not a text.
+    """
+    about, table = split(read_toml(path, "a surface card in TOML"), *PROVENANCE, "sha256")
+    for key, value in {**about, **split(table, "file", "generate")[0]}.items():
+        if not isinstance(value, str):
+            raise InputError(f"{path}: {key}: found {value!r}: expected a text", key=key, found=value)
+    if "file" in table:
+        table["file"] = str(path.parent / table["file"])
+        if is_card(Path(table["file"]), table.get("format")):
+            raise InputError(f"{path}: file: found a surface card: expected a scan file", key="file")
+    return about, table
+
+
+def is_card(path: Path, format: str | None) -> bool:
+    """Whether a file is a surface card: by its suffix, unless the format is given."""
+    return format == "card" or (format is None and path.suffix.lower() == ".toml")
+
+
+def measured_file(path: Path, format: str | None) -> Path | None:
+    """File with the measured heights of a surface file: the file named in a card, otherwise the file itself.
+
+    None for a card with a recipe.
+
+    Raises
+    ------
+    InputError
+        If a card cannot be read.
+    """
+    if not is_card(path, format):
+        return path
+    named = read_card(path)[1].get("file")
+    return None if named is None else Path(named)
+
+
+def read_toml(path: Path, wanted: str) -> dict[str, Any]:
+    """Tables of a TOML file, with a byte-order mark or without.
+
+    Raises
+    ------
+    InputError
+        If it is no regular file, cannot be read, or is not what is ``wanted``.
+    """
+    regular(path)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        line = 1 + error.object[: error.start].count(b"\n")
+        where = f"line {line} contains a byte that is not UTF-8"
+        found = "it is in UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else where
+        raise InputError(f"{path}: is not {wanted}: {found}: expected a text in UTF-8") from error
+    except ValueError as error:  # of TOML, of an integer of thousands of digits
+        raise InputError(f"{path}: is not {wanted}: {error}") from error
+    except RecursionError as error:
+        raise InputError(f"{path}: is not {wanted}: it is nested too deeply") from error
+
+
+def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
+    """Return the heights of a table ``[surface]``, conditioned; of two faces their sum. [m]"""
+    second = table.get("second")
+    height = _face_height("surface", table)
+    if second is not None:
+        placing, face = split(second, "flip", "offset")
+        flip = placing.pop("flip", "x")
+        other = _face_height("surface.second", face)
+        placing |= {"flip": None if flip == "none" else flip, "align": "centre"}
+        height = call(combine, "surface.second", placing, height, other)
+    steps = {name: table[name] for name in STEPS if name in table and name not in FACE_STEPS}
+    if isinstance(steps.get("realisation"), int):
+        steps["realisation"] = {"number": steps["realisation"], "seed": _surrogate_seed(table)}
+    return condition(height, steps, "surface")
+
+
+def raw_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
+    """Return the heights of a table of a surface before conditioning. [m]"""
+    _, source = split(table, *STEPS, "second", "missing")
+    recipe, arguments = split(source, "generate")
+    if recipe:
+        return call(RECIPES[one_of(dotted(where, "generate"), recipe["generate"], RECIPES)], where, arguments)
+    file, options = split(source, "file")
+    return call(open_scan, where, options, file["file"])
+
+
+def _face_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
+    return condition(raw_height(where, table), split(table, *FACE_STEPS)[0], where)
+
+
+def _surrogate_seed(table: Mapping[str, Any]) -> int:
+    """Return the seed of the surrogates of a surface, different for each scan.
+
+    With a common seed, the first surrogates of all scans would deviate from their mean in the same direction.
+    """
+    path = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
+    return 0 if path is None else int(sha256(path)[:8], 16)
+
+
+def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
+    """Check a table of a surface without its heights."""
+    source_key = one_key(where, table, ("file", "generate"))
+    is_second = where != "surface"
+    steps, rest = split(table, *(FACE_STEPS if is_second else STEPS))
+    placing, source = split(rest, *(("flip", "offset") if is_second else ("second", "missing")))
+    check_steps(steps, where)
+    if source_key == "generate":
+        check_recipe(where, source)
+    else:
+        check_keys(open_scan, where, {key: value for key, value in source.items() if key != "file"}, 1)
+    if is_second:
+        one_of(f"{where}.flip", placing.pop("flip", "x"), ("x", "y", "none"))
+        check(combine, where, placing | {"align": "centre"}, 2)
+    elif "second" in placing:
+        check_surface(placing["second"], "surface.second")
+
+
+def surface_boundary(table: Mapping[str, Any]) -> Any:
+    """Return the boundary that a surface is made for, without its heights; None if the study has to state it."""
+    made = BOUNDARIES.get(table.get("generate", ""))
+    if "file" in table:
+        path = Path(table["file"])
+        made = surface_boundary(read_card(path)[1]) if is_card(path, table.get("format")) else None
+    of_face, rest = split(table, *FACE_STEPS)
+    made = boundary_after(of_face, made)
+    return boundary_after(split(rest, *STEPS)[0], None if "second" in table else made)

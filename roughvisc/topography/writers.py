@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -71,23 +71,14 @@ def known_suffix(path: Path) -> None:
 
 
 def card_text(
-    file: str | os.PathLike[str],
-    folder: str | os.PathLike[str],
-    options: Mapping[str, Any],
-    steps: Mapping[str, Any] | None = None,
+    file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
 ) -> str:
     """Return the surface card of a scan file as TOML: its checksum, how it is read, and how it is conditioned.
 
     Parameters
     ----------
-    file : path
-        The scan.
-    folder : path
-        Folder of the card: the file is named relative to it.
-    options : mapping
-        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened, or None.
-    steps : mapping, optional
-        Conditioning steps, as for :func:`surface_table`. [m]
+    file, folder, options, steps
+        As in :func:`surface_table`; the file is named relative to the folder of the card.
 
     Raises
     ------
@@ -97,12 +88,11 @@ def card_text(
     file = Path(file)
     if file.suffix.lower() == ".toml":
         raise InputError(f"{file}: is a surface card already: expected a scan file")
-    lines = [f"title = {_text(file.stem)}", f"file = {_text(Path(os.path.relpath(file, folder)).as_posix())}"]
-    lines.append(f"sha256 = {_text(sha256(file))}")
-    lines += [f"{key} = {value}" for key, value in _how_to_read(options, _numbers).items()]
-    lines += ["", '# source = "..."      # where it comes from', '# licence = "..."     # who may use it']
-    lines += ['# instrument = "..."', "", "# Steps on the heights whenever the card is opened.", "[conditioning]"]
-    return "\n".join(lines + [f"{key} = {value}" for key, value in _as_toml(steps or {}).items()]) + "\n"
+    entries = {"title": _toml(file.stem), "sha256": _toml(sha256(file))}
+    entries |= _entries(Path(os.path.relpath(file, folder)), options, steps)
+    lines = ['# source = "..."      # where it comes from', '# licence = "..."     # who may use it']
+    lines += ['# instrument = "..."', *(f"{key} = {value}" for key, value in entries.items())]
+    return "\n".join(lines) + "\n"
 
 
 def surface_table(
@@ -112,54 +102,42 @@ def surface_table(
     steps: Mapping[str, Any],
     remarks: Mapping[str, str] | None = None,
 ) -> str:
-    """The ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
+    """Return the ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
 
     Parameters
     ----------
     file : path
         The scan, or a surface card.
     folder : path
-        Where the study is going to be: a file below it is named relative to it, any other by its whole path.
+        Folder of the study: a file below it is named relative to it, any other by its whole path.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``height_unit``, ``spacing`` [m] that the file needs to be opened; None where
-        it does not.
+        Options of :func:`roughvisc.open_scan` that the file needs; None for the others.
     steps : mapping
-        Conditioning steps, as :func:`~roughvisc.topography.cards.condition` takes them. [m]
+        Conditioning steps, as :func:`~roughvisc.topography.conditioning.condition` takes them. [m]
     remarks : mapping, optional
-        What stands behind a line, by its key.
+        Comment behind a line, by its key.
     """
-    file, remarks = Path(file), remarks or {}
+    remarks = remarks or {}
     near = Path(os.path.relpath(file, folder))
-    entries = {"file": _text((file.resolve() if near.parts[0] == ".." else near).as_posix())}
-    entries |= _how_to_read(options, _lengths)
-    entries |= _as_toml(steps)
-    lines = [f"{key} = {value}" for key, value in entries.items()]
-    width = max((len(line) for line, key in zip(lines, entries, strict=True) if key in remarks), default=0)
-    shown = [
-        f"{line:<{width}}  # {remarks[key]}" if key in remarks else line
-        for line, key in zip(lines, entries, strict=True)
-    ]
+    entries = _entries(Path(file).resolve() if near.parts[0] == ".." else near, options, steps)
+    lines = {key: f"{key} = {value}" for key, value in entries.items()}
+    width = max((len(line) for key, line in lines.items() if key in remarks), default=0)
+    shown = [f"{line:<{width}}  # {remarks[key]}" if key in remarks else line for key, line in lines.items()]
     return "\n".join(["[surface]", *shown]) + "\n"
 
 
-def _as_toml(steps: Mapping[str, Any]) -> dict[str, str]:
-    """Return the values of conditioning steps as TOML."""
-    entries = {}
+def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:
+    """Return the keys of a table of a surface and their values as TOML."""
+    entries = {"file": _toml(file.as_posix())}
+    for key, value in options.items():
+        if value is not None:
+            entries[key] = _lengths(value, 15) if key in ("spacing", "grid") else _toml(value)
     for key, value in steps.items():
         if key == "crop":
             entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
-        elif key == "filter":
-            entries[key] = _lengths(value)
         else:
-            entries[key] = json.dumps(value)
+            entries[key] = _lengths(value) if key == "filter" else _toml(value)
     return entries
-
-
-def _how_to_read(options: Mapping[str, Any], spacing: Callable[[Any], str]) -> dict[str, str]:
-    """Return the options that a file needs to be opened, as TOML; lengths as `spacing` writes them."""
-    ways = dict.fromkeys(("format", "channel", "unit", "height_unit"), _text) | {"spacing": spacing, "grid": spacing}
-    ways |= dict.fromkeys(("no_data", "height_scale"), json.dumps)
-    return {key: way(options[key]) for key, way in ways.items() if options.get(key) is not None}
 
 
 def written_quantity(value: float, unit: str, digits: int = 6) -> str:
@@ -173,20 +151,16 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
     prefixes = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
     exponent = 3 * math.floor(math.log10(abs(value) * (1 + 1e-12)) / 3) if value else 0
     exponent = min(max(exponent, -12), 0 if unit == "m" else 9)
-    return f"{float(f'{value / 10.0**exponent:.{digits}g}'):g} {prefixes[exponent]}{unit}"
+    return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.{digits}g} {prefixes[exponent]}{unit}"
 
 
-def _lengths(value: Any) -> str:
-    """One length, or a list of them."""
+def _lengths(value: Any, digits: int = 6) -> str:
+    """Return one length, or a list of them, as TOML."""
     if isinstance(value, tuple | list):
-        return "[" + ", ".join(_lengths(part) for part in value) + "]"
-    return _text(written_quantity(float(value), "m"))
+        return "[" + ", ".join(_lengths(part, digits) for part in value) + "]"
+    return _toml(written_quantity(float(value), "m", digits))
 
 
-def _text(value: str | int) -> str:
-    """A TOML string or number: JSON's, but for one character."""
+def _toml(value: Any) -> str:
+    """Return a text, a number or a truth value as TOML: that of JSON, except for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _numbers(value: Any) -> str:
-    return json.dumps([float(v) for v in value] if isinstance(value, tuple | list) else value)

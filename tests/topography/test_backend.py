@@ -18,7 +18,7 @@ from roughvisc.topography.scans import open_scan
 def test_engine__gives_what_open_scan_gives(engine, tmp_path):
     path = write_x3p(tmp_path / "scan.x3p")
     xr.testing.assert_identical(xr.open_dataarray(path, **engine), open_scan(path))
-    path = file_card(tmp_path, "[conditioning]\nfill = true\nresample = [6, 4]\n")
+    path = file_card(tmp_path, "fill = true\nresample = [6, 4]\n")
     xr.testing.assert_identical(xr.open_dataarray(path, engine="roughvisc"), open_scan(path))
 
 

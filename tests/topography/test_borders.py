@@ -6,7 +6,8 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.topography.borders import boundary_of, is_periodic
-from roughvisc.topography.cards import boundary_after, boundary_of_card, condition, open_card
+from roughvisc.topography.conditioning import boundary_after, condition
+from roughvisc.topography.scans import open_card, surface_boundary
 
 SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
 BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)
@@ -101,9 +102,9 @@ def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
 
 @pytest.mark.parametrize(
     ("steps", "expected"),
-    [("", "free"), ("[conditioning]\nlevel=1", None)],
+    [("", "free"), ("level = 1", None)],
 )
 def test_card__says_by_its_text_what_its_heights_say(tmp_path, steps, expected):
     path = tmp_path / "ball.toml"
     path.write_text(f'generate = "sphere"\nradius = "1 cm"\nsize = "1 mm"\nshape = [12, 10]\n{steps}\n')
-    assert boundary_of_card(path) == boundary_of(open_card(path)) == expected
+    assert surface_boundary({"file": str(path)}) == boundary_of(open_card(path)) == expected

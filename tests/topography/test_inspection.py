@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.topography.cards import condition
+from roughvisc.topography.conditioning import condition
 from roughvisc.topography.inspection import inspect_scan
 from roughvisc.topography.readers import from_array
 

@@ -42,7 +42,7 @@ def test_save_scan__refuses(tmp_path):
 def test_card_text__makes_a_card_that_opens_as_the_file(tmp_path):
     (tmp_path / "scans").mkdir()
     path = write_x3p(tmp_path / "scans" / 'odd "name" \u00b5.x3p')
-    (tmp_path / "card.toml").write_text(card_text(path, tmp_path, {"channel": None}), encoding="utf-8")
+    (tmp_path / "card.toml").write_text(card_text(path, tmp_path, {"channel": None}, {}), encoding="utf-8")
     h = rv.open_scan(tmp_path / "card.toml")
     xr.testing.assert_equal(h, rv.open_scan(path))
     assert h.attrs["title"] == 'odd "name" \u00b5'
@@ -54,7 +54,7 @@ def test_card_text__makes_a_card_that_opens_as_the_file(tmp_path):
 def test_card_text__states_the_options_that_the_file_needs(tmp_path):
     np.save(tmp_path / "scan.npy", tilted())
     options = {"unit": "mm", "height_unit": "um", "spacing": CELL, "format": "npy", "channel": 0}
-    (tmp_path / "card.toml").write_text(card_text(tmp_path / "scan.npy", tmp_path, options))
+    (tmp_path / "card.toml").write_text(card_text(tmp_path / "scan.npy", tmp_path, options, {}))
     xr.testing.assert_equal(rv.open_scan(tmp_path / "card.toml"), rv.open_scan(tmp_path / "scan.npy", **options))
 
 
@@ -66,4 +66,4 @@ def test_card_text__has_the_conditioning(tmp_path):
     expected = rv.fill(rv.level(rv.crop(h, **steps["crop"]), 1), "harmonic")
     np.testing.assert_array_equal(rv.open_scan(tmp_path / "card.toml"), expected)
     with pytest.raises(InputError, match="is a surface card already"):
-        card_text(tmp_path / "card.toml", tmp_path, {})
+        card_text(tmp_path / "card.toml", tmp_path, {}, {})

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case
-from roughvisc.study.study_file import raw_height
-from roughvisc.topography.cards import is_card, open_card
+from roughvisc.topography.scans import is_card, open_card, raw_height
 
 if TYPE_CHECKING:
     import xarray as xr

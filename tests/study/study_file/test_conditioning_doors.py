@@ -8,8 +8,8 @@ import pytest
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case
-from roughvisc.study.study_file import raw_height
-from roughvisc.topography.cards import condition
+from roughvisc.topography.conditioning import condition
+from roughvisc.topography.scans import raw_height
 
 H = rv.from_array(np.random.default_rng(0).standard_normal((20, 24)), 1e-6)
 STATED = {

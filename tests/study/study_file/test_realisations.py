@@ -7,7 +7,7 @@ from support import refused
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study, vary
-from roughvisc.topography.cards import condition
+from roughvisc.topography.conditioning import condition
 
 ROUGH = """
 [surface]
