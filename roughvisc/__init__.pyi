@@ -13,9 +13,9 @@ from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.layer import layer as layer
 from roughvisc.mechanics.materials.creep import creep as creep
+from roughvisc.mechanics.materials.creep import pair as pair
 from roughvisc.mechanics.materials.creep import power_law as power_law
-from roughvisc.mechanics.materials.derived import pair as pair
-from roughvisc.mechanics.materials.derived import shift as shift
+from roughvisc.mechanics.materials.creep import shift as shift
 from roughvisc.mechanics.materials.models import elastic as elastic
 from roughvisc.mechanics.materials.models import kelvin_voigt as kelvin_voigt
 from roughvisc.mechanics.materials.models import maxwell as maxwell

@@ -53,9 +53,9 @@ def simulate(
         that heights or coordinates state is converted; without one they are metres. The undeformed gap is
         ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
     material : Material
-        Material of a half-space: one of roughvisc, or any object with a contact compliance, see
-        :class:`roughvisc.mechanics.materials.creep.Material`; or a body, such as from :func:`roughvisc.sheet`. With
-        periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet includes its compression.
+        Material of a half-space, such as from :func:`roughvisc.zener` or :func:`roughvisc.creep`; or a body, such as
+        from :func:`roughvisc.sheet`. With periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet
+        includes its compression.
     program : Program
         Load, nominal pressure or approach against time. A nominal pressure is the load over the whole area of the given
         grid, absent cells included.

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, separability_error
-from roughvisc.mechanics.materials.creep import complete
 from roughvisc.settings import OPEN_BOUNDARY, OVER_TIME, Settings, known_boundary
 from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing
@@ -73,7 +72,7 @@ def facts_of(body: Body, end: float, time_scale: float) -> dict[str, Any]:
     time_scale : float
         Shortest time in which the load or the approach changes; infinite in a steady state. [s]
     """
-    material = complete(body.material)
+    material = body.material
     poisson = {} if separability_error(body.material) else {"poisson": material.poisson}
     return {
         **body.attributes(),

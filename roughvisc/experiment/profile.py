@@ -22,7 +22,6 @@ from roughvisc.experiment.base import Problem
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Settings
 from roughvisc.topography.grid import checked, spacing
@@ -223,7 +222,7 @@ def expected_contact(problem: Problem, program: Program, enlarged: int | None = 
         larger = enlarged_indenter(height)
         assert larger is not None, "it was enlarged before"
         height = larger
-    compliance = float(complete(body.material).contact_compliance(program.duration))
+    compliance = float(body.material.contact_compliance(program.duration))
     approach, at_border = estimated(height, body.kernel, compliance, program)
     while enlarged is None and at_border and (larger := enlarged_indenter(height)) is not None:
         height, times = larger, times + 1

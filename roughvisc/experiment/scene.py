@@ -18,7 +18,6 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.layer_memory import LayerMemory
-from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory_choice import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene
@@ -95,7 +94,7 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
         raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
     if boundary != "free" and heights > 0:
         # as if the whole surface gave way like a punch of its longer side
-        compliance = float(complete(body.material).contact_compliance(duration))
+        compliance = float(body.material.contact_compliance(duration))
         sides = profile.gap.shape[0] * profile.spacing[0], profile.gap.shape[1] * profile.spacing[1]
         displaced = load / math.prod(sides) * compliance * max(sides)
         if displaced > MOST_HEIGHTS * heights:

@@ -21,9 +21,8 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import check_grid, love_kernel
-from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
-from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
 
@@ -219,9 +218,8 @@ class Body:
 
     Parameters
     ----------
-    material : Material
-        A material of roughvisc, or any object with a contact compliance, see
-        :class:`roughvisc.mechanics.materials.creep.Material`.
+    material : Prony or Creep
+        A material.
     kernel : Kernel
         Displacement of the surface under pressure at unit contact compliance. Default: that of a half-space.
 
@@ -243,7 +241,7 @@ class Body:
     def __post_init__(self) -> None:
         if isinstance(self.material, Body):
             raise InputError(f"material is the body {self.material!r}: expected a material")
-        complete(self.material)
+        check_material(self.material)
         for name in ("influence", "transfer"):
             if not callable(getattr(self.kernel, name, None)):
                 found = type(self.kernel).__name__
@@ -255,9 +253,9 @@ class Body:
         return True
 
     @property
-    def materials(self) -> tuple[Prony | Creep, ...]:
+    def materials(self) -> tuple[Material, ...]:
         """Materials of the body."""
-        return (complete(self.material),)
+        return (self.material,)
 
     @property
     def note(self) -> str:
@@ -304,6 +302,6 @@ def body_of(material: Any) -> Body:
     return material if isinstance(material, Body) else Body(material)
 
 
-def separability_error(material: Any) -> str:
+def separability_error(material: Material) -> str:
     """Return what a material represents if it is not one body of a constant Poisson ratio; otherwise empty."""
-    return str(getattr(material, "stands_for", ""))
+    return check_material(material).stands_for

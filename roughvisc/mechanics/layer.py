@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, separability_error
 from roughvisc.mechanics.half_space import cell_mean, check_grid, corner_sum, love_kernel
-from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -504,9 +504,9 @@ class LayeredBody(Body):
         return text
 
     @property
-    def materials(self) -> tuple[Prony | Creep, ...]:
+    def materials(self) -> tuple[Material, ...]:
         """Materials from the top."""
-        return tuple(complete(one) for one in (self.material, *self.below))
+        return (self.material, *self.below)
 
     @property
     def poissons(self) -> tuple[float, ...]:
@@ -602,21 +602,20 @@ def _check(name: str, material: Any) -> None:
     amiss = separability_error(material)
     if amiss:
         raise InputError(key=name, found=amiss, expected="one body, Poisson's ratio constant")
-    poisson = complete(material).poisson
+    poisson = material.poisson
     if not 0 <= poisson <= 0.5:
         raise InputError(key=name, found=poisson, expected="Poisson's ratio from 0 to 1/2 in a layered body")
 
 
 def _final_kernel(materials: tuple[Material, ...], thicknesses: tuple[float, ...]) -> LayerKernel:
     """Return the kernel of the final state, or of the instantaneous one if a material flows; per unit of the top."""
-    whole = [complete(one) for one in materials]
     for age in _AGES:
         with suppress(InputError):  # a table ends earlier
-            shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in whole]
+            shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]
             if all(0 < one < math.inf for one in shear):
                 break
-    unit = 0.5 * (1 - whole[0].poisson) * shear[0]
-    elastic = tuple(Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, whole, strict=True))
+    unit = 0.5 * (1 - materials[0].poisson) * shear[0]
+    elastic = tuple(Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, materials, strict=True))
     return layer_series(Layers(thicknesses, elastic), 0.0, 0.0, _ELASTIC).kernel()
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.creep import Creep, Material, complete
+from roughvisc.mechanics.materials.creep import Creep, Material, check_material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
 from roughvisc.mechanics.memory import Memory
@@ -96,7 +96,7 @@ def choose_memory(
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
     if isinstance(body, Body) and not body.separates:
         return _of_layers(body, duration, tolerance, shortest, grid)
-    material = complete(body.material if isinstance(body, Body) else body)
+    material = body.material if isinstance(body, Body) else check_material(body)
     if isinstance(material, Prony):
         memory = Memory(material, duration, keeps_pressure)
         return Choice(memory, 0.0, _joined(in_words(material), material.note))
@@ -122,7 +122,7 @@ def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, g
             "it: expected the body that layer() makes, or a Body whose kernel is constant in time"
         )
     share = SERIES_SHARE * tolerance
-    given = [complete(one) for one in body.materials]
+    given = body.materials
     found = [
         series(one, shortest, duration, MATERIALS_SHARE * share) if duration > 0 else (at_once(one), 0.0)
         for one in given

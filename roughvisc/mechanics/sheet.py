@@ -18,7 +18,7 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel, separability_error
 from roughvisc.mechanics.half_space import cell_mean, check_grid, love_kernel
-from roughvisc.mechanics.materials.creep import Material, complete
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
         expected = f"none with a material that is {amiss}; a sheet has one material, Poisson's ratio constant"
         raise InputError(key="thickness", found=thickness, expected=expected)
     endless = thickness == math.inf
-    kernel = Sheet(1.0 if endless else thickness, complete(material).poisson, base)  # checks all arguments
+    kernel = Sheet(1.0 if endless else thickness, material.poisson, base)  # checks all arguments
     return Body(material) if endless else Body(material, kernel)
 
 

@@ -44,7 +44,6 @@ from roughvisc.experiment.scene import check_program, memory_options
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.memory_choice import Choice, choose_memory
 from roughvisc.mechanics.program import Program, Segment, Slide
 from roughvisc.study.case import Case, read_cases
@@ -446,7 +445,7 @@ def elastic_contact(problem: Problem, program: Program) -> float:
     effective = 0.0
     for last in np.unique(np.linspace(1, changes.size, 60).astype(int)) if changes.size else ():
         ages = np.maximum(times[last] - middles[:last], 0.0)
-        effective = max(effective, float(complete(material).contact_compliance(ages) @ changes[:last]))
+        effective = max(effective, float(material.contact_compliance(ages) @ changes[:last]))
     profile = Profile(problem.height, "absent", problem.body.kernel)
     boundary, found = problem.settings.boundary, 0.0
     grid = Grid(profile.gap.shape, profile.spacing, boundary, kernel=profile.kernel)
@@ -637,7 +636,7 @@ def _planned(
     seconds = work * (run.seconds + dearer * max(beyond, 0.0)) + passes * _PASS * (height.size - run.height.size)
     again = 1 + (_GRID_ERROR if settings.has_grid_error(whole.size, experiment.axis) else 0.0)
     length = max(float(np.ptp(whole[axis].values)) for axis in ("x", "y"))
-    full = full_contact_pressure(setup.slope, complete(body.material), creep_time(experiment, length))
+    full = full_contact_pressure(setup.slope, body.material, creep_time(experiment, length))
     memory, pressure = needed(whole.size), force / setup.area
     row |= {
         "solved_cells_x": height.sizes["x"],

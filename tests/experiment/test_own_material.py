@@ -1,4 +1,4 @@
-"""Materials of the user's own: an object with a contact compliance, or a creep function, by a series."""
+"""Materials by a creep function of the user, which the solver replaces by a series."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,6 @@ from support import refused
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.closed_forms import Paraboloid, lee_radok_step
-from roughvisc.mechanics.materials.creep import Material, complete
 from roughvisc.mechanics.materials.series import series
 from roughvisc.mechanics.memory_choice import choose_memory
 
@@ -37,13 +36,11 @@ class Stretched:
 
 @dataclass(frozen=True)
 class Logarithmic:
-    """``C = glassy + slope log(1 + t/time)``, with all that a material may say."""
+    """``C = glassy + slope log(1 + t/time)``."""
 
     glassy: float = 1e-7
     slope: float = 5e-8
     time: float = 1e-3
-    poisson: float = 0.4
-    note: str = "logarithmic creep"
 
     def contact_compliance(self, t):
         return self.glassy + self.slope * np.log1p(t / self.time)
@@ -52,20 +49,15 @@ class Logarithmic:
         return self.glassy * t + self.slope * ((t + self.time) * np.log1p(t / self.time) - t)
 
 
-class Inherited(Material):
-    """What is left out comes from the protocol."""
-
-    def contact_compliance(self, t):
-        return Stretched().contact_compliance(t)
-
-    def contact_integral(self, t):
-        return Stretched().contact_integral(t)
+def of(curve, poisson=0.5):
+    """Material of a contact compliance ``C = (1 - nu) J / 2``."""
+    return rv.creep(lambda t: 2 / (1 - poisson) * curve.contact_compliance(t), poisson)
 
 
 RADIUS = 1e-3
 BALL = rv.sphere(RADIUS, 2e-4, (45, 41))
 STEP = rv.Program().load(1e-3, over=0).hold(2.0)
-OWN = [Stretched(), Logarithmic()]
+CURVES = [Stretched(), Logarithmic()]
 
 
 def pressed(material, program=STEP, **settings):
@@ -73,11 +65,12 @@ def pressed(material, program=STEP, **settings):
     return rv.simulate(BALL, material, program, **{**given, **settings})
 
 
-@pytest.mark.parametrize("material", [*OWN, Inherited()], ids=lambda m: type(m).__name__)
-def test_a_step_load__has_the_approach_of_the_compliance_then(material):
+@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+def test_a_step_load__has_the_approach_of_the_compliance_then(curve):
     """Lee and Radok: while the contact grows, it is the elastic one of the compliance then, on any grid."""
+    material = of(curve)
     ds = pressed(material)
-    compliance = material.contact_compliance(ds.time.values)
+    compliance = curve.contact_compliance(ds.time.values)
     first = rv.Program().load(1e-3, over=0)
     on_this_grid = [
         float(pressed(rv.elastic(1 / (4 * c)), first, times=[0.0], tolerance=1e-4).approach[0]) for c in compliance
@@ -95,12 +88,12 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(material):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
-def test_a_cycle__is_that_of_all_past_forces_without_a_series(material):
+@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+def test_a_cycle__is_that_of_all_past_forces_without_a_series(curve):
     """The method of dimensionality reduction, with the material's own compliance and integral."""
-    program = rv.Program().load(1e-3, over=0.2).load(3e-4, over=0.2).hold(0.4)
+    material, program = of(curve), rv.Program().load(1e-3, over=0.2).load(3e-4, over=0.2).hold(0.4)
     times = [0.1, 0.2, 0.4, 0.8]
-    exact = reduced_contact(Paraboloid(RADIUS), complete(material), program, times, steps=60, elements=2000)
+    exact = reduced_contact(Paraboloid(RADIUS), material, program, times, steps=60, elements=2000)
     assert exact.error < 1e-5
     ds = pressed(material, program, times=times)
     # a tolerance, and the grid: about 4 % of the square of a cell over the contact radius, which is ten cells
@@ -109,41 +102,31 @@ def test_a_cycle__is_that_of_all_past_forces_without_a_series(material):
     assert np.sqrt(ds.contact_area.values / np.pi) == pytest.approx(exact.radius, rel=0.02)
 
 
-@pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("shortest", [1e-8, 1e-4])
-def test_the_series__is_within_the_tolerance_between_its_samples(material, shortest):
-    found, error = series(material, shortest, 10.0, 1e-4)
+def test_the_series__is_within_the_tolerance_between_its_samples(curve, shortest):
+    found, error = series(of(curve, 0.4), shortest, 10.0, 1e-4)
     t = np.append(0.0, np.geomspace(shortest, 10.0, 3001))
-    assert found.contact_compliance(t) == pytest.approx(material.contact_compliance(t), rel=1.05e-4)
+    assert found.contact_compliance(t) == pytest.approx(curve.contact_compliance(t), rel=1.05e-4)
     assert error <= 1e-4
-    assert found.poisson == getattr(material, "poisson", 0.5)
+    assert found.poisson == 0.4
 
 
 def test_no_compliance_at_once__has_a_series_too():
-    material = Stretched(glassy=0.0)
-    found, error = series(material, 1e-6, 10.0, 1e-4)
+    found, error = series(of(Stretched(glassy=0.0)), 1e-6, 10.0, 1e-4)
     assert found.glassy == 0
     assert error <= 1e-4
 
 
-@pytest.mark.parametrize("material", OWN, ids=lambda m: type(m).__name__)
-def test_the_integral__is_found_from_the_compliance(material):
+@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+def test_the_integral__is_found_from_the_compliance(curve):
     t = np.array([[0.0, 1e-9, 1e-4], [0.3, 7.0, 1e6]])
-    assert complete(material).contact_integral(t) == pytest.approx(material.contact_integral(t), rel=1e-11, abs=0)
+    assert of(curve).contact_integral(t) == pytest.approx(curve.contact_integral(t), rel=1e-11, abs=0)
 
 
-def test_a_creep_function__is_the_same_material_as_the_object():
-    """J(t) and C(t) = (1 - nu) J(t) / 2 of logarithmic creep."""
-    own = Logarithmic()
-    found = rv.creep(lambda t: 2 / 0.6 * own.contact_compliance(t), poisson=0.4)
-    t = np.array([0.0, 1e-3, 2.0])
-    assert found.contact_compliance(t) == pytest.approx(own.contact_compliance(t), rel=1e-14)
-    ds, expected = pressed(found), pressed(own)
-    np.testing.assert_allclose(ds.approach, expected.approach, rtol=1e-10)
-    assert "in place of the compliance" in ds.attrs["memory"]
-    stiff = rv.creep(lambda t: 1e-7 * (1 + t), longest=1.0)
+def test_a_creep_function__is_not_extrapolated():
     with pytest.raises(InputError, match=r"asked for at 2 s, and the table ends at 1 s"):
-        pressed(stiff)
+        pressed(rv.creep(lambda t: 1e-7 * (1 + t), longest=1.0))
 
 
 @pytest.mark.parametrize(
@@ -160,55 +143,40 @@ def test_creep__refuses(make, key, found):
 
 
 def test_a_pair__takes_one():
-    both = rv.pair(Stretched(), rv.zener(1e6, 1e6, 1e5))
-    alone = Stretched()
+    both = rv.pair(of(Stretched()), rv.zener(1e6, 1e6, 1e5))
     t = np.array([0.0, 0.1, 2.0])
     rest = rv.zener(1e6, 1e6, 1e5).contact_compliance(t)
-    assert both.contact_compliance(t) == pytest.approx(alone.contact_compliance(t) + rest)
+    assert both.contact_compliance(t) == pytest.approx(Stretched().contact_compliance(t) + rest)
     choice = choose_memory(both, 2.0, 1e-3)
     assert choice.series_error <= 1e-4
     assert choice.material.contact_compliance(t) == pytest.approx(both.contact_compliance(t), rel=1e-4)
 
 
 def test_a_compliance_of_no_passive_material__is_said_to_be_none():
-    class Late(Stretched):  # a delay: no positive sum of exponentials
-        def contact_compliance(self, t):
-            return 1e-7 + 1e-7 * np.clip((np.asarray(t) - 0.1) / 0.01, 0, 1)
-
-        def contact_integral(self, t):
-            late = np.clip(np.asarray(t) - 0.1, 0, 0.01)
-            return 1e-7 * t + 1e-7 * (late**2 / 0.02 + np.maximum(np.asarray(t) - 0.11, 0))
-
-    ds = pressed(Late())
+    # a delay: no positive sum of exponentials
+    ds = pressed(rv.creep(lambda t: 4e-7 + 4e-7 * np.clip((t - 0.1) / 0.01, 0, 1)))
     assert ds.attrs["series_error"] > 1e-2
     assert (ds.stated_error.values > 1e-2).all()
     assert "the material is not passive" in ds.attrs["memory"]
 
 
-def changed(**functions):
-    return type("Wrong", (Stretched,), {name: lambda self, t, f=f: f(t) for name, f in functions.items()})()
-
-
 @pytest.mark.parametrize(
-    ("material", "words"),
+    ("function", "words"),
     [
-        (3.0, "material is a float: expected one of roughvisc's materials, .* or an object with contact_compliance"),
-        (type("None", (), {"contact_integral": lambda self, t: t})(), "expected .* an object with contact_compliance"),
-        (
-            changed(contact_compliance=lambda t: -1.0 - t),
-            r"creep of Wrong is -4 1/Pa at 0 s: expected a number that is not",
-        ),
-        (changed(contact_compliance=lambda t: t * np.nan), r"creep of Wrong is nan 1/Pa at 0 s"),
-        pytest.param(
-            changed(contact_compliance=lambda t: 1 / (1 + t)),
-            r"creep of Wrong is .*: expected no less than before",
-            marks=pytest.mark.thorough,
-        ),
-        (changed(contact_compliance=lambda t: 1e-7), r"gives \(\) of .* times: expected a number each"),
-        (changed(contact_compliance=lambda t: 0 * t), "is 0 1/Pa at .* expected a positive compliance"),
-        (Logarithmic(poisson=0.7), "poisson: found 0.7: expected a number above -1"),
+        (lambda t: -4.0 - t, r"creep of .*lambda.* is -4 1/Pa at 0 s: expected a number that is not"),
+        (lambda t: t * np.nan, r"creep of .* is nan 1/Pa at 0 s"),
+        pytest.param(lambda t: 1 / (1 + t), r"creep of .*: expected no less than before", marks=pytest.mark.thorough),
+        (lambda t: 1e-7, r"gives \(\) of .* times: expected a number each"),
+        (lambda t: 0 * t, "is 0 1/Pa at .* expected a positive compliance"),
     ],
 )
-def test_what_is_no_material__is_refused(material, words):
+def test_what_is_no_creep__is_refused(function, words):
     with pytest.raises(InputError, match=words):
-        pressed(material)
+        pressed(rv.creep(function))
+
+
+@pytest.mark.parametrize("material", [3.0, Stretched(), np.sqrt], ids=["number", "object", "function"])
+def test_what_is_no_material__is_refused(material):
+    for use in (pressed, lambda one: rv.pair(one, rv.elastic(1.0)), lambda one: rv.shift(one, 2.0)):
+        with refused("material", material):
+            use(material)

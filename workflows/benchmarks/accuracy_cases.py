@@ -71,14 +71,14 @@ def case(seed, number):
 # materials: of a compliance of about ``unit`` [1/Pa], for programs of about ``span`` [s]
 
 
-def _solid_or_fluid(rng, unit, span, index, **volume):
-    """One of the four of springs and dashpots, its Poisson ratio or bulk modulus given."""
+def _solid_or_fluid(rng, unit, span, index, poisson):
+    """One of the four of springs and dashpots."""
     time, ratio = span * 10 ** rng.uniform(-2, 2), 10 ** rng.uniform(-2, 2)
     return [
-        lambda: rv.elastic(1 / unit, **volume),
-        lambda: rv.maxwell(1 / unit, time / unit, **volume),
-        lambda: rv.kelvin_voigt(1 / unit, time / unit, **volume),
-        lambda: rv.zener(1 / unit, ratio / unit, ratio * time / unit, **volume),
+        lambda: rv.elastic(1 / unit, poisson),
+        lambda: rv.maxwell(1 / unit, time / unit, poisson),
+        lambda: rv.kelvin_voigt(1 / unit, time / unit, poisson),
+        lambda: rv.zener(1 / unit, ratio / unit, ratio * time / unit, poisson),
     ][index]()
 
 
@@ -122,7 +122,12 @@ def _table(rng, unit, span):
 
 
 def _bulk(rng, unit, span):
-    return _solid_or_fluid(rng, unit, span, rng.integers(4), bulk_modulus=10 ** rng.uniform(-0.5, 3) / unit)
+    """A Maxwell fluid, or a solid of a few terms, in shear."""
+    count = rng.integers(1, 4)
+    moduli, times = 10 ** rng.uniform(-1, 1, count) / unit, span * 10 ** rng.uniform(-2, 2, count)
+    equilibrium = rng.integers(2) * 10 ** rng.uniform(-1, 1) / unit
+    bulk_modulus = 10 ** rng.uniform(-0.5, 3) / unit
+    return rv.from_relaxation(equilibrium, moduli.tolist(), times.tolist(), bulk_modulus=bulk_modulus)
 
 
 def _pair(rng, unit, span):

@@ -67,9 +67,13 @@ def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = 
     for name, array in zip(names, arrays, strict=True):
         for row in np.flatnonzero(~(np.isfinite(array) & (array >= 0)))[:1]:
             raise InputError(f"table row {row}: {name} is {array[row]:g}: expected a finite number, not negative")
-    first = arrays[0]
-    for row in np.flatnonzero(np.diff(first) <= 0)[:1] if ascending else ():
-        raise InputError(
-            f"table row {row + 1}: {names[0]} {first[row + 1]:g} after {first[row]:g}: expected ascending {names[0]}"
-        )
+    steps = np.diff(arrays[0]) <= 0
+    for row in np.flatnonzero(steps)[:1] + 1 if ascending else ():
+        again = f"{names[0]} {arrays[0][row]:g} after {arrays[0][row - 1]:g}"
+        if np.count_nonzero(steps) < steps.size / 2 and row + 1 < arrays[0].size and not steps[row]:
+            raise InputError(
+                f"table row {row}: {again}: several temperatures? expected the rows of one temperature, or a master "
+                "curve with all times multiplied by shift factors"
+            )
+        raise InputError(f"table row {row}: {again}: expected ascending {names[0]}")
     return arrays

@@ -1,4 +1,4 @@
-"""Materials by a creep function: power laws, measured creep, two bodies, and the user's own.
+"""Materials by a creep function, such as a power law; two bodies, another temperature, another modulus.
 
 A creep function is not negative and increases; a passive material has a positive sum of exponentials. The solver uses
 the Prony series that :func:`roughvisc.mechanics.materials.series.series` fits for the times of the program.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.words import in_words
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -26,18 +25,8 @@ Array = NDArray[np.float64]
 _PANELS, _POINTS, _LIMIT = 80, 8, 40.0
 #: Largest relative decrease of a creep function that counts as rounding.
 _ROUNDING = 1e-9
-
-
-class Material(Protocol):
-    """Any object with the contact compliance of a material.
-
-    Two attributes are optional: ``poisson``, the Poisson ratio (a half if missing), and ``note``, a text on how the
-    material was found. Equal materials should compare equal, which frozen dataclasses do.
-    """
-
-    def contact_compliance(self, t: ArrayLike) -> Array:
-        """Return ``C(t) = (1 - nu) J(t) / 2``, [1/Pa], at times since the load was applied, for arrays of any shape."""
-        ...
+#: Shift factors above this, or below its inverse, come from a temperature in a wrong unit.
+LARGEST_SHIFT = 1e30
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,8 +45,6 @@ class Creep:
         Longest time at which the function is known. [s]
     time_factor, modulus_factor : float
         Factors of all times and of all moduli. [-]
-    label : str
-        The material in words.
     note : str
         How the material was found.
     warning : str
@@ -74,14 +61,13 @@ class Creep:
     longest: float = math.inf
     time_factor: float = 1.0
     modulus_factor: float = 1.0
-    label: str = field(default="", compare=False)
     note: str = field(default="", compare=False)
     warning: str = field(default="", compare=False)
     misfit: float = field(default=0.0, compare=False)
     stands_for: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        return self.label
+        return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
@@ -107,6 +93,10 @@ class Creep:
         weights = np.tile(weights * width / 2, _PANELS) * np.exp(-y)
         t = np.asarray(t, dtype=float)
         return np.asarray(t * (self.contact_compliance(t[..., None] * np.exp(-y)) @ weights))
+
+
+#: The two kinds of materials.
+Material = Prony | Creep
 
 
 def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: float = math.inf) -> Creep:
@@ -144,9 +134,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: fl
     check_poisson(poisson)
     if not longest > 0:
         check_number("longest", longest, "s")
-    name = getattr(function, "__qualname__", type(function).__name__)
-    ratio = "" if poisson == 0.5 else f", poisson={poisson:g}"
-    return Creep(function, (), poisson, longest, label=f"creep({name}{ratio})")
+    return Creep(function, (), poisson, longest)
 
 
 @quantities(glassy="1/Pa", coefficient="1/Pa", time_scale="s")
@@ -189,10 +177,7 @@ def power_law(
     check_poisson(poisson)
     if not 0 < exponent < 1:
         raise InputError(key="exponent", found=exponent, expected="a number above 0 and below 1")
-    parameters = (glassy, coefficient, exponent, time_scale)
-    names, units = ("glassy", "coefficient", "exponent", "time_scale"), ("1/Pa", "1/Pa", "1", "s")
-    words = dict(zip(names, zip(parameters, units, strict=True), strict=True))
-    return Creep(power_creep, parameters, poisson, label=in_words("power_law", poisson, "", **words))
+    return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson)
 
 
 def power_creep(t: Array, glassy: float, coefficient: float, exponent: float, time_scale: float) -> Array:
@@ -205,35 +190,141 @@ def series_creep(t: Array, series: Prony) -> Array:
     return series.creep_compliance(t)
 
 
-def pair_creep(t: Array, a: Prony | Creep, b: Prony | Creep) -> Array:
+def pair_creep(t: Array, a: Material, b: Material) -> Array:
     """Return the creep compliance of an incompressible body with the contact compliance of two bodies. [1/Pa]"""
     return 4 * (a.contact_compliance(t) + b.contact_compliance(t))
 
 
-def own_creep(t: Array, material: Material) -> Any:
-    """Return the creep compliance of an object of the user's own, from its contact compliance. [1/Pa]"""
-    return 2 / (1 - getattr(material, "poisson", 0.5)) * np.asarray(material.contact_compliance(t))
+def pair(a: Material, b: Material) -> Material:
+    """Two deformable bodies: their contact compliances add.
+
+    Parameters
+    ----------
+    a, b : Prony or Creep
+        The two materials, in any order.
+
+    Returns
+    -------
+    Prony or Creep
+        A series if both are series. Its Poisson ratio is a half; each body keeps its own.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> float(pair(rv.elastic(2e6, 0.3), rv.maxwell(1e6, 1e6)).contact_compliance(3.0))  # 0.35/2e6 + 0.25 (1 + 3)/1e6
+    1.175e-06
+    """
+    bodies = check_material(a), check_material(b)
+    note = "; ".join(f"{name}: {body.note}" for name, body in zip("ab", bodies, strict=True) if body.note)
+    named: dict[str, Any] = {"note": note, "stands_for": "a pair of bodies"}
+    if isinstance(a, Prony) and isinstance(b, Prony):
+        glassy, fluidity = 0.0, 0.0
+        compliances: dict[float, float] = {}
+        for body in (a, b):
+            share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body
+            glassy += share * body.glassy
+            fluidity += share * body.fluidity
+            for compliance, time in zip(body.compliances, body.times, strict=True):
+                compliances[time] = compliances.get(time, 0.0) + share * compliance
+        return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), **named)
+    measured = [body for body in bodies if isinstance(body, Creep)]
+    warning = " ".join(filter(None, (body.warning for body in measured)))
+    return Creep(pair_creep, bodies, warning=warning, misfit=max(body.misfit for body in measured), **named)
 
 
-def complete(material: Any) -> Prony | Creep:
-    """Return a material of roughvisc; an object of the user's own becomes a :class:`Creep`.
+def shift(material: Material, factor: float) -> Material:
+    r"""Shift a material to another temperature: multiply all its times by one factor.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material at its reference temperature. Both bodies of a pair are shifted.
+    factor : float
+        Shift factor ``a_T``, from :func:`wlf`, :func:`arrhenius` or a measurement; above one for slower response, at
+        lower temperature. [-]
+
+    Returns
+    -------
+    Prony or Creep
+        The shifted material. Its ``note`` states the factor.
 
     Raises
     ------
     InputError
-        If it has no contact compliance.
+        If the factor is not between 1e-30 and 1e30.
+
+    Notes
+    -----
+    .. math:: C(t;\, T) = C(t / a_T;\, T_r)
+
+    The material is thermorheologically simple: temperature changes only times, not compliances. There is no vertical
+    shift.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> float(shift(rv.maxwell(1e6, 1e6), 10.0).creep_compliance(20.0))  # J(2 s) at the reference temperature
+    3e-06
     """
-    if isinstance(material, Prony | Creep):
-        return material
-    name = type(material).__name__
-    if not callable(getattr(material, "contact_compliance", None)):
+    if not (isinstance(factor, int | float | np.number) and 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT):
+        raise InputError(key="factor", found=factor, expected="a number from 1e-30 to 1e30")
+    note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
+    return _scaled(check_material(material), float(factor), 1.0, note)
+
+
+def stiffened(material: Material, factor: float) -> Material:
+    r"""Multiply all moduli and viscosities of a material by one factor, :math:`C(t) \to C(t) / f`.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Both bodies of a pair are stiffened.
+    factor : float
+        Above one: stiffer. [-]
+
+    Returns
+    -------
+    Prony or Creep
+        Its ``note`` states the factor.
+
+    Raises
+    ------
+    InputError
+        If the factor is not positive and finite.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> stiffened(rv.elastic(1e6), 2.0).glassy
+    5e-07
+    """
+    check_number("modulus_factor", factor, "1")
+    return _scaled(check_material(material), 1.0, float(factor), f"all moduli multiplied by {factor:.6g}")
+
+
+def _scaled(material: Material, time_factor: float, modulus_factor: float, note: str) -> Material:
+    if isinstance(material, Prony):
+        return material.scaled(time_factor, modulus_factor, note)
+    note = "; ".join(filter(None, (material.note, note)))
+    if material.function is pair_creep:
+        return replace(pair(*(_scaled(one, time_factor, modulus_factor, "") for one in material.parameters)), note=note)
+    factors = time_factor * material.time_factor, modulus_factor * material.modulus_factor
+    return replace(material, time_factor=factors[0], modulus_factor=factors[1], note=note)
+
+
+def check_material(material: Any) -> Material:
+    """Return the material if it is one.
+
+    Raises
+    ------
+    InputError
+        If it is not a :class:`Prony` or a :class:`Creep`.
+    """
+    if not isinstance(material, Prony | Creep):
         raise InputError(
-            f"material is a {name}: expected one of roughvisc's materials, creep(function), or an object with "
-            "contact_compliance(t)"
+            key="material", found=material, expected="a material, such as rv.zener(...) or rv.creep(function)"
         )
-    poisson, note = float(getattr(material, "poisson", 0.5)), str(getattr(material, "note", ""))
-    check_poisson(poisson)
-    return Creep(own_creep, (material,), poisson, label=name, note=note)
+    return material
 
 
 def check_creep(material: Creep, times: Array) -> Array:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Creep, Material, complete, pair_creep, power_creep, series_creep
-from roughvisc.mechanics.materials.derived import pair
+from roughvisc.mechanics.materials.creep import (
+    Material,
+    check_material,
+    pair,
+    pair_creep,
+    power_creep,
+    series_creep,
+)
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
 
@@ -65,17 +69,27 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     ([0.5, 0.375], [0.0, -0.125])
     """
     w = np.asarray(frequency, dtype=float)
-    closed = over_frequencies(material, w)
-    if isinstance(closed, Prony):
-        return _of_series(closed, w)
-    w = w * closed.time_factor
-    if closed.function is pair_creep:
-        return np.asarray(sum(complex_compliance(one, w) for one in closed.parameters) / closed.modulus_factor)
-    found = 0.5 * (1 - closed.poisson) / closed.modulus_factor * _of_power_law(w, *closed.parameters)
-    return _endless(found, w == 0)
+    material = over_frequencies(material, w)
+    if isinstance(material, Prony):
+        total = np.full(w.shape, material.glassy, dtype=complex)
+        for compliance, time in zip(material.compliances, material.times, strict=True):
+            total += compliance / (1 + 1j * w * time)
+        total -= 1j * material.fluidity / np.where(w == 0, 1.0, w)
+        flows = material.fluidity > 0
+    elif material.function is pair_creep:
+        return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
+    else:
+        glassy, coefficient, exponent, time_scale = material.parameters
+        w = w * material.time_factor
+        size = np.where(w == 0, 1.0, np.abs(w) * time_scale)
+        turned = math.cos(math.pi / 2 * exponent) - 1j * np.sign(w) * math.sin(math.pi / 2 * exponent)
+        total = glassy + coefficient * math.gamma(1 + exponent) * size**-exponent * turned
+        total, flows = total / material.modulus_factor, True
+    found = 0.5 * (1 - material.poisson) * total
+    return np.asarray(np.where((w == 0) & flows, complex(math.inf, 0.0), found))
 
 
-def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Prony | Creep:
+def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
     """Return a material with a closed form of the complex compliance that replaces another one at some frequencies.
 
     Parameters
@@ -93,15 +107,12 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     InputError
         As :func:`complex_compliance`.
     """
-    material = complete(material)
+    material = check_material(material)
     if isinstance(material, Prony) or material.function is power_creep:
         return material
-    size = np.abs(np.asarray(frequency, dtype=float))
     if material.function is pair_creep:
-        factors = material.time_factor, material.modulus_factor
-        bodies = [over_frequencies(one, size * factors[0], tolerance) for one in material.parameters]
-        both = pair(*bodies)
-        return both.scaled(*factors) if isinstance(both, Prony) else replace(material, parameters=tuple(bodies))
+        return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
+    size = np.abs(np.asarray(frequency, dtype=float))
     size = size[size > 0]
     if not size.size:
         raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
@@ -111,25 +122,3 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     material.creep_compliance(longest)  # refuses a table that ends before
     fitted: Prony = material.parameters[0]
     return fitted.scaled(material.time_factor, material.modulus_factor)
-
-
-def _of_series(material: Prony, w: NDArray[np.float64]) -> Complex:
-    total = np.full(w.shape, material.glassy, dtype=complex)
-    for compliance, time in zip(material.compliances, material.times, strict=True):
-        total += compliance / (1 + 1j * w * time)
-    total -= 1j * material.fluidity / np.where(w == 0, 1.0, w)
-    return _endless(0.5 * (1 - material.poisson) * total, (w == 0) & (material.fluidity > 0))
-
-
-def _of_power_law(
-    w: NDArray[np.float64], glassy: float, coefficient: float, exponent: float, time_scale: float
-) -> Complex:
-    """Return the complex shear compliance of a power law; at zero frequency a number without meaning. [1/Pa]"""
-    size = np.where(w == 0, 1.0, np.abs(w) * time_scale)
-    turned = math.cos(math.pi / 2 * exponent) - 1j * np.sign(w) * math.sin(math.pi / 2 * exponent)
-    return np.asarray(glassy + coefficient * math.gamma(1 + exponent) * size**-exponent * turned)
-
-
-def _endless(compliance: NDArray[Any], where: NDArray[np.bool_]) -> Complex:
-    """Return the compliance, infinite where creep has no end."""
-    return np.asarray(np.where(where, complex(math.inf, 0.0), compliance))

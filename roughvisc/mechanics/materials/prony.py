@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,14 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
 from roughvisc.mechanics.materials.secular import merged, secular_roots
-from roughvisc.mechanics.materials.words import in_words
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
 
 @quantities(glassy="1/Pa", fluidity="1/(Pa s)", compliances="1/Pa", times="s")
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Prony:
     r"""Exponential (Prony) series of the shear creep compliance.
 
@@ -53,8 +50,8 @@ class Prony:
     compliances: tuple[Quantity, ...] = ()
     times: tuple[Quantity, ...] = ()
     poisson: float = 0.5
-    note: str = field(default="", compare=False)
-    stands_for: str = field(default="", compare=False)
+    note: str = field(default="", compare=False, repr=False)
+    stands_for: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))
@@ -72,26 +69,6 @@ class Prony:
             expected = "a positive compliance: a rigid material cannot be pressed"
             raise InputError(key="glassy", found=self.glassy, expected=expected)
 
-    def __repr__(self) -> str:
-        """The constructor of springs and dashpots that makes the series, if there is one; otherwise the series."""
-        parameters: dict[str, tuple[Any, str]]
-        name, spring = "Prony", (1 / self.glassy if self.glassy else np.inf, "Pa")
-        parameters = {"glassy": (self.glassy, "1/Pa")}
-        if self.fluidity and self.glassy and not self.times:
-            name, parameters = "maxwell", {"shear_modulus": spring, "viscosity": (1 / self.fluidity, "Pa s")}
-        elif not self.fluidity and not self.times:
-            name, parameters = "elastic", {"shear_modulus": spring}
-        elif not self.fluidity and len(self.times) == 1 and self.compliances[0]:
-            modulus, viscosity = (1 / self.compliances[0], "Pa"), (self.times[0] / self.compliances[0], "Pa s")
-            name, parameters = "kelvin_voigt", {"shear_modulus": modulus, "viscosity": viscosity}
-            if self.glassy:
-                kelvin = {"kelvin_modulus": modulus, "kelvin_viscosity": viscosity}
-                name, parameters = "zener", {"shear_modulus": spring, **kelvin}
-        else:
-            parameters |= {"fluidity": (self.fluidity, "1/(Pa s)")} if self.fluidity else {}
-            parameters |= {"compliances": (self.compliances, "1/Pa"), "times": (self.times, "s")} if self.times else {}
-        return in_words(name, self.poisson, self.note, **parameters)
-
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Shear creep compliance ``J(t)``. [1/Pa]"""
         t = np.asarray(t, dtype=float)
@@ -106,21 +83,9 @@ class Prony:
     def contact_integral(self, t: ArrayLike) -> Array:
         """First antiderivative ``int_0^t C``. [s/Pa]"""
         t = np.asarray(t, dtype=float)
-        total = self.glassy * t + self.fluidity * t**2 / 2
-        for compliance, time in zip(self.compliances, self.times, strict=True):
-            total = total + compliance * time * one_less_mean_decay(t / time) * (t / time)
-        return np.asarray(0.5 * (1 - self.poisson) * total)
-
-    def mean_contact_compliance(self, s: ArrayLike, h: ArrayLike) -> Array:
-        """Mean of ``C`` over ``[s, s + h]``, [1/Pa]; ``C(s)`` for ``h = 0``. [s]"""
-        s, h = np.asarray(s, dtype=float), np.asarray(h, dtype=float)
         compliances, times = self._terms
-        risen = one_less_mean_decay(h[..., None] / times)
-        if s.any():  # 1 - exp(-s/tau) (1 - exp(-x))/x as a sum of positive terms
-            age = s[..., None] / times
-            risen = np.exp(-age) * risen - np.expm1(-age)
-        retarded = np.add.reduce(compliances * risen, axis=-1)
-        return np.asarray(0.5 * (1 - self.poisson) * (self.glassy + self.fluidity * (s + h / 2) + retarded))
+        crept = np.add.reduce(compliances * one_less_mean_decay(t[..., None] / times), axis=-1) * t
+        return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
 
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
         """Return the series with all times and all moduli multiplied by a factor each."""
@@ -181,21 +146,9 @@ _SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
 
 
 def one_less_mean_decay(x: ArrayLike) -> Array:
-    """``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
-    return by_size(
-        np.asarray(x, dtype=float),
-        0.3,
-        lambda x: np.add.reduce(_SERIES * x[..., None] ** _POWERS, axis=-1),
-        lambda x: 1 + np.expm1(-x) / x,
+    """Return ``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
+    x = np.asarray(x, dtype=float)
+    small, large = np.minimum(x, 0.3), np.maximum(x, 0.3)
+    return np.where(
+        x < 0.3, np.add.reduce(_SERIES * small[..., None] ** _POWERS, axis=-1), 1 + np.expm1(-large) / large
     )
-
-
-def by_size(x: Array, limit: float, small: Callable[[Array], Array], large: Callable[[Array], Array]) -> Array:
-    """Evaluate one form of a function below a limit and another form above it, each only for its own arguments."""
-    below = x < limit
-    count = np.count_nonzero(below)
-    if count == below.size:
-        return np.asarray(small(x))
-    if count == 0:
-        return np.asarray(large(x))
-    return np.where(below, small(np.minimum(x, limit)), large(np.maximum(x, limit)))

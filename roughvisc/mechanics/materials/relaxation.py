@@ -6,6 +6,7 @@ With an elastic bulk modulus the Poisson ratio changes in time: viscoelastic in 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,18 +17,28 @@ from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.secular import merged, secular_roots
 from roughvisc.units import Quantity, quantities
 
+#: Difference from one at which the sum of ratios counts as one: a fluid.
+_ONE = 1e-9
+#: Sum of the moduli over the equilibrium modulus below which moduli of at most one are dimensionless ratios.
+_RATIOS = 1e-3
 
-@quantities(equilibrium="Pa", moduli="Pa", times="s", bulk_modulus="Pa")
+
+@quantities(equilibrium="Pa", moduli="Pa", times="s", instantaneous="Pa", bulk_modulus="Pa")
 def from_relaxation(
-    equilibrium: Quantity,
-    moduli: Sequence[Quantity],
-    times: Sequence[Quantity],
+    equilibrium: Quantity | None = None,
+    moduli: Sequence[Quantity] = (),
+    times: Sequence[Quantity] = (),
     poisson: float | None = None,
     *,
+    instantaneous: Quantity | None = None,
+    ratios: Sequence[float] = (),
     kind: Kind = "shear",
     bulk_modulus: Quantity | None = None,
 ) -> Prony:
-    r"""Generalised Maxwell solid, ``G(t) = G_e + sum G_i exp(-t / theta_i)``, as finite-element codes state it.
+    r"""Generalised Maxwell solid, ``G(t) = G_e + sum G_i exp(-t / theta_i)``.
+
+    Papers and finite-element codes also state it as ``G(t) = G_0 [1 - sum g_i (1 - exp(-t / theta_i))]``, by the
+    instantaneous modulus and ratios.
 
     Parameters
     ----------
@@ -37,10 +48,14 @@ def from_relaxation(
         ``G_i`` [Pa] and relaxation times ``theta_i`` [s].
     poisson : float
         Poisson ratio; a half unless given.
+    instantaneous : float or str
+        ``G_0``, in place of `equilibrium`. [Pa]
+    ratios : sequence of float
+        ``g_i = G_i / G_0``, in place of `moduli`; a sum of one makes a fluid. [-]
     kind : {"shear", "tensile"}
         Whether the moduli are shear moduli or Young's moduli, ``E = 2 G (1 + nu)``.
     bulk_modulus : float or str
-        Elastic bulk modulus, in place of a Poisson ratio; with shear moduli. [Pa]
+        Elastic bulk modulus ``K``, in place of a Poisson ratio. [Pa]
 
     Returns
     -------
@@ -50,27 +65,64 @@ def from_relaxation(
     Raises
     ------
     InputError
-        If a modulus is negative, a time is not positive, or their numbers differ; if all moduli are zero; or if a
-        bulk modulus is given with a Poisson ratio or with Young's moduli.
+        If a modulus is negative, a time is not positive, or their numbers differ; if all moduli are zero; if the ratios
+        exceed one in sum, or are given as moduli; if a bulk modulus is given with a Poisson ratio, or is below a ninth
+        of Young's modulus.
+
+    Examples
+    --------
+    >>> rubber = from_relaxation(instantaneous="4 MPa", ratios=[0.75], times=["1 s"])
+    >>> float(rubber.creep_compliance(0.0)), round(1 / float(rubber.creep_compliance(1e9)))
+    (2.5e-07, 1000000)
+    """
+    if (equilibrium is None) == (instantaneous is None):
+        key = "equilibrium" if instantaneous is None else "instantaneous"
+        raise InputError(key=key, found=instantaneous, expected="either equilibrium or instantaneous")
+    given, terms, unit = ("moduli", moduli, "Pa") if instantaneous is None else ("ratios", ratios, "1")
+    if len(terms) != len(times):
+        raise InputError(key=given, found=len(terms), expected=f"as many as times, {len(times)}")
+    if len(moduli) and len(ratios):
+        raise InputError(key="ratios", found=ratios, expected="moduli with equilibrium, or ratios with instantaneous")
+    for i, (term, time) in enumerate(zip(terms, times, strict=True)):
+        check_number(f"{given}[{i}]", term, unit, zero=True)
+        check_number(f"times[{i}]", time, "s")
+    if instantaneous is not None:
+        instantaneous = check_number("instantaneous", instantaneous, "Pa")
+        rest = 1 - math.fsum(ratios)
+        if rest < -_ONE:
+            raise InputError(key="ratios", found=ratios, expected=f"ratios with a sum of at most 1, not {1 - rest:g}")
+        equilibrium, moduli = instantaneous * (rest if rest > _ONE else 0.0), [instantaneous * one for one in ratios]
+    equilibrium = check_number("equilibrium", equilibrium, "Pa", zero=True)
+    if len(moduli) and 0 < max(moduli) <= 1 and sum(moduli) < _RATIOS * equilibrium:
+        expected = "moduli [Pa]; ratios without a unit belong to instantaneous= and ratios="
+        raise InputError(key="moduli", found=moduli, expected=expected)
+    if bulk_modulus is not None and poisson is not None:
+        raise InputError(key="bulk_modulus", found=bulk_modulus, expected="either poisson or bulk_modulus")
+    factor = tensile_to_shear(kind, 0.5 if poisson is None else poisson)
+    if bulk_modulus is None:
+        moduli = [modulus / factor for modulus in moduli]
+        shear = relaxation_series(equilibrium / factor, moduli, times)
+        return shear if poisson is None else dataclasses.replace(shear, poisson=poisson)
+    check_number("bulk_modulus", bulk_modulus, "Pa")
+    found = relaxation_series(equilibrium, moduli, times)
+    if kind == "tensile":
+        shear = found.scaled(1.0, 1 / 3)  # 1/G = 3/E - 1/(3K)
+        if shear.glassy <= 1 / (3 * bulk_modulus):
+            expected = f"more than a ninth of the instantaneous Young's modulus, {1 / found.glassy:g} Pa"
+            raise InputError(key="bulk_modulus", found=bulk_modulus, expected=expected)
+        found = dataclasses.replace(shear, glassy=shear.glassy - 1 / (3 * bulk_modulus))
+    return with_elastic_bulk(found, bulk_modulus)
+
+
+def relaxation_series(equilibrium: float, moduli: Sequence[float], times: Sequence[float]) -> Prony:
+    """Return the creep compliance of the relaxation modulus ``G_e + sum G_i exp(-t / theta_i)``, [Pa], [s]; exact.
 
     Notes
     -----
     The retardation rates are the zeros of ``G_e - sum G_i lambda / (r_i - lambda)``, found between
     consecutive rates ``r_i = 1/theta_i``.
     """
-    check_number("equilibrium", equilibrium, "Pa", zero=True)
-    if len(moduli) != len(times):
-        raise InputError(key="moduli", found=len(moduli), expected=f"as many as times, {len(times)}")
-    for i, (modulus, time) in enumerate(zip(moduli, times, strict=True)):
-        check_number(f"moduli[{i}]", modulus, "Pa", zero=True)
-        check_number(f"times[{i}]", time, "s")
-    if kind == "tensile" and bulk_modulus is not None:
-        wanted = "shear moduli, or a Poisson ratio"
-        message = f"kind is 'tensile' and bulk_modulus is {bulk_modulus!r}: expected {wanted}"
-        raise InputError(message, key="bulk_modulus", found=bulk_modulus, expected=wanted)
-    factor = tensile_to_shear(kind, 0.5 if poisson is None else poisson)
     weights, rates = merged(moduli, times)
-    equilibrium, weights = equilibrium / factor, weights / factor
     glassy_modulus = equilibrium + float(np.sum(weights))
     if glassy_modulus == 0:
         raise InputError(key="moduli", found=moduli, expected="a positive modulus, or a positive equilibrium modulus")
@@ -84,8 +136,7 @@ def from_relaxation(
         compliances.append(1 / (rate * rate * float(np.sum(strengths / offset**2))))
         retardations.append(1 / rate)
     fluidity = 0.0 if equilibrium else 1 / float(np.sum(weights / rates))
-    shear = Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(retardations))
-    return in_volume(shear, poisson, bulk_modulus)
+    return Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(retardations))
 
 
 def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
@@ -110,7 +161,6 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
     With ``J^ = s J~``, ``B^ = J^/(1 + 3K J^) = 1/(3K) - 1/((3K)^2 (1/(3K) + J^))``: the rates of ``B`` are the zeros
     of ``1/(3K) + J_0 - phi/m + sum J_i r_i / (r_i - m)``.
     """
-    check_number("bulk_modulus", bulk_modulus, "Pa")
     strengths, poles = shear.poles()
     volume = 1 / (3 * bulk_modulus)
     compliances, times = list(shear.compliances), list(shear.times)
@@ -118,30 +168,11 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
         compliances.append(3 * volume**2 / (rate * float(np.sum(strengths / offsets**2))))
         times.append(1 / rate)
     glassy = shear.glassy + 3 * volume * shear.glassy / (volume + shear.glassy)
-    note = f"effective compliance J + 3B for an elastic bulk modulus of {bulk_modulus:g} Pa"
-    note = f"{shear.note}; {note}" if shear.note else note
     return Prony(
         glassy,
         shear.fluidity,
         tuple(compliances),
         tuple(times),
-        0.5,
-        note,
-        "a body with an elastic bulk modulus, whose Poisson ratio changes in time",
+        note=f"effective compliance J + 3B for an elastic bulk modulus of {bulk_modulus:g} Pa",
+        stands_for="a body with an elastic bulk modulus, whose Poisson ratio changes in time",
     )
-
-
-def in_volume(shear: Prony, poisson: float | None, bulk_modulus: float | None) -> Prony:
-    """The series with its behaviour in volume: a constant Poisson ratio, a half unless given, or a bulk modulus. [Pa]
-
-    Raises
-    ------
-    InputError
-        If both are given.
-    """
-    if bulk_modulus is None:
-        return dataclasses.replace(shear, poisson=0.5 if poisson is None else poisson)
-    if poisson is not None:
-        message = f"poisson is {poisson!r} and bulk_modulus is {bulk_modulus!r}: expected one of them"
-        raise InputError(message, key="bulk_modulus", found=bulk_modulus, expected="poisson or bulk_modulus")
-    return with_elastic_bulk(shear, bulk_modulus)

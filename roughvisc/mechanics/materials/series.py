@@ -8,13 +8,21 @@ until then.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Creep, Material, check_creep, complete, pair_creep, series_creep
-from roughvisc.mechanics.materials.derived import pair
+from roughvisc.mechanics.materials.creep import (
+    Creep,
+    Material,
+    check_creep,
+    check_material,
+    pair,
+    pair_creep,
+    series_creep,
+)
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 
@@ -73,34 +81,30 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
         raise InputError(f"times are {shortest!r} to {longest!r} s: expected positive times in order")
     if not 0 < tolerance < math.inf:
         raise InputError(f"tolerance is {tolerance!r}: expected a positive number")
-    material = complete(material)
+    material = check_material(material)
     if isinstance(material, Prony):
         return material, 0.0
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
     if material.function is pair_creep:
-        factors = material.time_factor, material.modulus_factor
-        parts = [series(one, shortest / factors[0], longest / factors[0], tolerance)[0] for one in material.parameters]
-        joined = pair(*parts)
+        joined = pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters))
         assert isinstance(joined, Prony)
-        joined = joined.scaled(*factors)
         return joined, _error(joined, instants, compliance)
-    found, error = _fitted(material, instants, compliance, tolerance)
-    if material.function is series_creep and (
-        error > tolerance or len(found.times) >= len(material.parameters[0].times)
-    ):
-        exact: Prony = material.parameters[0]
-        return exact.scaled(material.time_factor, material.modulus_factor), 0.0
+    fits = _fits(material, instants, compliance, tolerance)
+    error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
+    if material.function is series_creep:
+        exact: Prony = material.parameters[0].scaled(material.time_factor, material.modulus_factor)
+        if error > tolerance or len(found.times) >= len(exact.times):
+            return exact, 0.0
     return found, error
 
 
-def _fitted(material: Creep, instants: Array, compliance: Array, tolerance: float) -> tuple[Prony, float]:
-    """Return the best series and its error, from ever denser lattices of retardation times."""
+def _fits(material: Creep, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
+    """Yield series and their errors, from ever denser lattices of retardation times."""
     shortest, longest = float(instants[0]), float(instants[-1])
     glassy = float(material.creep_compliance(0.0))
     t = _instants(shortest, longest, _FITTED)
     exact = material.creep_compliance(t)
-    best, least = Prony(float(compliance[-1]), poisson=material.poisson), math.inf
     for faster in _FASTER:
         idle, reached = 0, math.inf
         for per_decade in _OFFERED:
@@ -111,20 +115,15 @@ def _fitted(material: Creep, instants: Array, compliance: Array, tolerance: floa
             before, importance = reached, np.ones(t.size)
             for _ in range(_LEVELLINGS):
                 weights = nonnegative(columns, exact - glassy, exact / importance)
-                if not weights.any():
-                    break
                 used = np.flatnonzero(weights[1:])
                 terms = tuple(weights[1:][used].tolist()), tuple(times[used].tolist())
                 found = Prony(glassy, float(weights[0]) / longest, *terms, material.poisson)
                 error = _error(found, instants, compliance)
+                yield error, found
                 reached = min(reached, error)
-                fewer = len(found.times) < len(best.times)
-                if (error <= tolerance and fewer) if least <= tolerance else error < least:
-                    best, least = found, error
                 misfit = np.abs((glassy + columns @ weights) / exact - 1)
                 importance = importance * np.sqrt(0.02 + misfit / max(float(misfit.max()), 1e-300))
             idle = 0 if reached < 0.9 * before else idle + 1
-    return best, least
 
 
 def _instants(shortest: float, longest: float, per_decade: int) -> Array:

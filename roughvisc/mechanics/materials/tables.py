@@ -9,19 +9,18 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import Kind, check_number, check_poisson, checked_rows, tensile_to_shear
+from roughvisc.mechanics.materials.checks import Kind, check_number, checked_rows, tensile_to_shear
 from roughvisc.mechanics.materials.creep import Creep, series_creep
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.relaxation import from_relaxation
+from roughvisc.mechanics.materials.relaxation import relaxation_series
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
-from roughvisc.mechanics.materials.words import in_words
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
@@ -39,6 +38,8 @@ _SLOWER = 3.0
 #: rows hardly determine a faster term, and no rheometer measures better. Creep: a fast term rises from the given
 #: instantaneous compliance, and the terms are chosen later, for a program.
 _MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
+#: Largest ratio of moduli measured at one frequency and one temperature.
+_ONE_TEMPERATURE = 2.0
 #: Largest ratio of the times of neighbouring rows without a warning.
 _DECADE = 10.0 * (1 + 1e-9)
 
@@ -89,36 +90,31 @@ def creep_table(
     factor = tensile_to_shear(kind, poisson)
     t, values = checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
     check_number("noise", noise, "1", zero=True)
-    check_poisson(poisson)
     for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
         raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
-    ascending = _ascending(t, values, noise)
-    later = t > 0
-    rows, measured = t[later], values[later]
+    highest = np.maximum.accumulate(values)
+    for row in np.flatnonzero(values < (1 - noise) * highest)[:1]:
+        raise InputError(
+            f"table row {row}: compliance {values[row]:g} 1/Pa at {t[row]:g} s is {1 - values[row] / highest[row]:.2%} "
+            f"below an earlier row, noise is {noise:g}: expected an ascending compliance, or a larger noise"
+        )
+    # equal weights of relative deviations; a compliance of zero comes first and does not move
+    weights = (highest[-1] / np.where(values > 0, values, highest[-1])) ** 2
+    ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
+    rows, measured = t[t > 0], values[t > 0]
     glassy = float(ascending[0]) if t[0] == 0 else _instantaneous(rows, ascending)
 
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau = _fitted(columns, rows, measured, measured - glassy, measured, *_CREEP)
-    misfit = (glassy + columns(tau) @ weights) / measured - 1
+    weights, tau, misfit = _fitted(columns, rows, measured, measured - glassy, measured, *_CREEP)
     note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
     fitted = Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:].tolist()), tuple(tau.tolist()))
     largest = float(np.abs(misfit).max())
-    stated: dict[str, tuple[Any, str]] = {"times": (t.tolist(), "s"), "compliances": (values.tolist(), "1/Pa")}
-    stated |= {"noise": (noise, "1")} if noise else {}
-    return Creep(
-        series_creep,
-        (fitted,),
-        poisson,
-        float(t[-1]),
-        label=in_words("creep_table", poisson, "", **stated),
-        note=note,
-        warning=_gap("creep", rows),
-        misfit=largest if largest > noise else 0.0,
-    )
+    off = largest if largest > noise else 0.0
+    return Creep(series_creep, (fitted,), poisson, float(t[-1]), note=note, warning=_gap("creep", rows), misfit=off)
 
 
 @quantities(times="s", moduli="Pa")
@@ -151,7 +147,7 @@ def relaxation_table(
     Notes
     -----
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
-    ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.from_relaxation`, which is exact. Outside the
+    ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.relaxation_series`, which is exact. Outside the
     measured times its slowest and its fastest terms determine the series.
     """
     t, values = checked_rows(("time", "modulus"), times, moduli)
@@ -163,10 +159,8 @@ def relaxation_table(
     def columns(theta: Array) -> Array:
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
-    fitted, theta = _fitted(columns, t[later], shear[later], shear, shear, *_MODULI)
-    misfit = columns(theta) @ fitted / shear - 1
-    note = _note(theta.size + 1, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
-    return _relaxing(fitted, theta, poisson, note)
+    span = f"times {t[0]:g} to {t[-1]:g} s"
+    return _relaxing(columns, t[later], shear[later], shear, shear, poisson, t.size, span, "relaxation")
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -224,9 +218,19 @@ def dynamic_table(
     omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
     for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
+    modulus, distinct = np.hypot(elastic, viscous), np.unique(np.round(np.log(omega), 6), return_inverse=True)[1]
+    for group in range(distinct.max() + 1) if distinct.max() + 1 < omega.size else ():
+        at = np.flatnonzero(distinct == group)
+        if modulus[at].max() > _ONE_TEMPERATURE * modulus[at].min():
+            raise InputError(
+                f"table row {at[-1]}: the moduli at {omega[at[-1]]:g} rad/s differ between rows by a factor of "
+                f"{modulus[at].max() / modulus[at].min():.2g}: several temperatures? expected the rows of one "
+                "temperature, or shift_factors"
+            )
     factor = tensile_to_shear(kind, poisson)
     elastic, viscous = elastic / factor, viscous / factor
-    least = 1e-3 * np.hypot(elastic, viscous)
+    size = np.hypot(elastic, viscous)
+    least = 1e-3 * size
     target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
 
     def columns(theta: Array) -> Array:
@@ -234,11 +238,8 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    fitted, theta = _fitted(columns, 1 / omega, np.hypot(elastic, viscous), target, scale, *_MODULI)
-    misfit = (columns(theta) @ fitted - target) / scale
     span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
-    note = _note(theta.size + 1, omega.size, misfit, span, _gap("dynamic", np.unique(1 / omega)))
-    return _relaxing(fitted, theta, poisson, note)
+    return _relaxing(columns, 1 / omega, size, target, scale, poisson, omega.size, span, "dynamic")
 
 
 def _fitted(
@@ -249,8 +250,8 @@ def _fitted(
     scale: Array,
     faster: float,
     accurate: float,
-) -> tuple[Array, Array]:
-    """Return the non-negative weights of a series, and its times. [s]
+) -> tuple[Array, Array, Array]:
+    """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows.
 
     Parameters
     ----------
@@ -277,24 +278,36 @@ def _fitted(
         steps = np.diff(np.diag(_STEPS / np.interp(np.log(times), np.log(at), course)), axis=0)[: sparse * times.size]
         rows = np.vstack([offered / scale[:, None], np.pad(steps, ((0, 0), (1, 0)))])
         weights = nonnegative(rows, np.append(target / scale, np.zeros(len(steps))), np.ones(len(rows)))
-        rms = float(np.sqrt(np.mean(((offered @ weights - target) / scale) ** 2)))
+        misfit = (offered @ weights - target) / scale
         used = np.flatnonzero(weights[1:])
-        fits.append((rms, np.append(weights[0], weights[1:][used]), times[used]))
-    enough = max(_FEWER * min(rms for rms, _, _ in fits), accurate)
-    _, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)
-    return weights, times
+        rms = float(np.sqrt(np.mean(misfit**2)))
+        fits.append((rms, np.append(weights[0], weights[1:][used]), times[used], misfit))
+    enough = max(_FEWER * min(fit[0] for fit in fits), accurate)
+    return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
 
 
-def _relaxing(fitted: Array, theta: Array, poisson: float, note: str) -> Prony:
-    """Return the material of an equilibrium modulus and of moduli [Pa] with their times. [s]"""
-    found = from_relaxation(float(fitted[0]), fitted[1:].tolist(), theta.tolist(), poisson)
-    return dataclasses.replace(found, note=note)
+def _relaxing(
+    columns: Callable[[Array], Array],
+    at: Array,
+    course: Array,
+    target: Array,
+    scale: Array,
+    poisson: float,
+    rows: int,
+    span: str,
+    kind: str,
+) -> Prony:
+    """Return the material of a table of moduli; the arguments are those of :func:`_fitted` and what its note states."""
+    weights, theta, misfit = _fitted(columns, at, course, target, scale, *_MODULI)
+    note = "; ".join(filter(None, (_note(theta.size + 1, rows, misfit, span), _gap(kind, np.unique(at)))))
+    found = relaxation_series(float(weights[0]), weights[1:].tolist(), theta.tolist())
+    return dataclasses.replace(found, poisson=poisson, note=note)
 
 
-def _note(terms: int, rows: int, misfit: Array, span: str, gap: str = "") -> str:
+def _note(terms: int, rows: int, misfit: Array, span: str) -> str:
     rms = float(np.sqrt(np.mean(misfit**2)))
-    fit = f"{terms} terms fitted to {rows} rows, largest misfit {np.abs(misfit).max():.2g}, rms {rms:.2g} (relative)"
-    return "; ".join(filter(None, (f"{fit}, {span}", gap)))
+    largest = np.abs(misfit).max()
+    return f"{terms} terms fitted to {rows} rows, largest misfit {largest:.2g}, rms {rms:.2g} (relative), {span}"
 
 
 def _gap(kind: str, times: Array) -> str:
@@ -325,20 +338,3 @@ def _instantaneous(times: Array, compliances: Array) -> float:
     power = (middle - first) / (ratio - 1) if ratio > 1 else np.inf
     logarithmic = (end - first) / np.log(span) * (1 + np.log(10))
     return first - min(power, logarithmic, 0.9 * first)
-
-
-def _ascending(times: Array, compliances: Array, noise: float) -> Array:
-    """Return the compliances made to increase by isotonic regression. [1/Pa]"""
-    highest = np.maximum.accumulate(compliances)
-    drops = 1 - compliances / np.where(highest > 0, highest, 1.0)
-    drops[highest == 0] = 0.0
-    for row in np.flatnonzero(drops > noise)[:1]:
-        raise InputError(
-            f"table row {row}: compliance {compliances[row]:g} 1/Pa at {times[row]:g} s is {drops[row]:.2%} below an "
-            f"earlier row, noise is {noise:g}: expected an ascending compliance, or a larger noise"
-        )
-    if not drops.any():
-        return compliances
-    # equal weights of relative deviations; a compliance of zero comes first and does not move
-    weights = (highest[-1] / np.where(compliances > 0, compliances, highest[-1])) ** 2
-    return np.maximum.accumulate(scipy.optimize.isotonic_regression(compliances, weights=weights).x)

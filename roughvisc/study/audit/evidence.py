@@ -17,7 +17,6 @@ from roughvisc.experiment.base import facts_of
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.body import separability_error
-from roughvisc.mechanics.materials.creep import complete
 from roughvisc.mechanics.sheet import BASE, Sheet, complement
 from roughvisc.observables.response import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
@@ -276,7 +275,7 @@ def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
 
 def bodies_of(case: Case, end: float) -> tuple[Body, ...]:
     """The deformable bodies of a case after a time [s]; none if Poisson's ratio of one changes in time."""
-    materials = [complete(one) for one in case.materials()]
+    materials = case.materials()
     if any(map(separability_error, materials)):
         return ()
     return tuple(Body(*(float(one.contact_compliance(t)) for t in (0.0, end)), float(one.poisson)) for one in materials)

@@ -358,3 +358,30 @@ def test_many_rows__are_fitted_as_few_are():
     assert off(rv.creep_table(t, CREEP["stretched"](t)), CREEP["stretched"], t) < 1e-4
     material = rv.relaxation_table(t, WIDE["stretched"](t))
     assert np.abs(modulus(material, t) / WIDE["stretched"](t) - 1).max() < 2e-3
+
+
+# --- several temperatures -------------------------------------------------------------------------------------------
+
+
+def test_several_temperatures__in_one_table_are_named():
+    """A raw table begins again at each temperature: times fall back, or frequencies return with other moduli."""
+    window = np.geomspace(1e-2, 10.0, 12)
+    times = np.tile(window, 3)
+    shifts = np.repeat([1.0, 1e-2, 1e2], 12)
+    for make in (
+        lambda: rv.relaxation_table(times, relaxation(times * shifts)),
+        lambda: rv.creep_table(times, 1e-6 * (1 + (times * shifts) ** 0.3), noise=0.9),
+        lambda: rv.dynamic_table(times, *dynamic(times * shifts), frequency_unit="Hz"),
+    ):
+        with pytest.raises(InputError, match=r"table row \d+: .*several temperatures\?"):
+            make()
+
+
+def test_repeated_frequencies__of_one_temperature_are_fitted():
+    omega = np.tile(np.geomspace(1e-2, 1e4, 40), 2)
+    noise = 1 + 0.02 * np.random.default_rng(1).standard_normal((2, 80))
+    storage, loss = dynamic(omega)
+    assert (
+        distance(rv.dynamic_table(omega, storage * noise[0], loss * noise[1], frequency_unit="rad/s", poisson=0.4))
+        < 0.03
+    )

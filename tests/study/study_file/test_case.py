@@ -82,8 +82,8 @@ def test_read_study__units_become_si(study):
         ),
         ('model = "prony"\nglassy = 1e-9', rv.Prony(1e-9)),
         (
-            'model = "zener"\nshear_modulus = 3\nkelvin_modulus = 2\nkelvin_viscosity = 1\nbulk_modulus = "2 kPa"',
-            rv.zener(3.0, 2.0, 1.0, bulk_modulus=2e3),
+            'model = "from_relaxation"\ninstantaneous = "3 kPa"\nratios = [0.5]\ntimes = [1]\nbulk_modulus = "2 kPa"',
+            rv.from_relaxation(instantaneous=3e3, ratios=[0.5], times=[1.0], bulk_modulus=2e3),
         ),
         (
             'model = "power_law"\nglassy = 0\ncoefficient = "1 MPa^-1"\nexponent = 0.4\ntime_scale = "2 h"',
@@ -268,7 +268,7 @@ def test_program__table_from_csv(study, tmp_path, rows):
         ('"3 MPa"', '"-3 MPa"', "material.shear_modulus", "-3 MPa"),
         ("kelvin_modulus", "kelvin_modlus", "material.kelvin_modlus", None),
         ('kelvin_modulus = "1 MPa"', "", "material.kelvin_modulus", None),
-        ('shear_modulus = "3 MPa"', "young_modulus = 9\nbulk_modulus = 2", "material.bulk_modulus", 2),
+        ('shear_modulus = "3 MPa"', "young_modulus = 9", "material.young_modulus", None),
         ("[[program]]\nload", "poisson = 0.6\n[[program]]\nload", "material.poisson", 0.6),
         ('"zener"', '"zenner"', "material.model", None),
         ("[material]", "[materials]", "materials", None),
@@ -436,7 +436,7 @@ def test_key__counts_what_determines_the_numbers(study):
         ("[surface]", "[keep]\nfields = ['gap']\n[surface]"),
         ("[material]", "level = 1\n[solve]\nboundary = 'free'\n[material]"),
         ('model = "zener"', 'model = "zener"\npoisson = 0.4'),
-        ('model = "zener"', 'model = "zener"\nbulk_modulus = "1 GPa"'),
+        ('model = "zener"', 'model = "zener"\nmodulus_factor = 2'),
     ]
     key = read_study(study()).key
     assert len(key) == 16
