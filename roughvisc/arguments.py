@@ -162,7 +162,7 @@ def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
     """Return the value if it is one of the allowed words; refuse it otherwise."""
     words = list(words)
     if value not in words:
-        expected = f"one of {', '.join(words)}"
+        expected = f"one of {', '.join(map(str, words))}"
         hint = nearest(value, words) if isinstance(value, str) else f": expected {expected}"
         raise InputError(f"{key}: found {short_repr(value)}{hint}", key=key, found=value, expected=expected)
     return value

@@ -7,71 +7,31 @@ imported when a scan is opened.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 from xarray.backends import BackendEntrypoint
 
-#: Suffixes of one format each, which nothing but scans has; those that mean other things too are left to ``engine=``.
+#: Suffixes that only scans have.
 _SUFFIXES = "x3p sdf al3d sur frt opd opdx datx plux os3d nms vk3 vk4 vk6 vk7 zmg zon ezd nid bcrf gwy lext poir jpk"
-UNAMBIGUOUS = frozenset(_SUFFIXES.split())
+_OPTIONS = ("format", "channel", "unit", "height_unit", "spacing", "grid", "no_data", "height_scale")
 
 
 class RoughviscBackend(BackendEntrypoint):
-    """Instrument files, grid files and surface cards as a Dataset with the variable ``height`` over (x, y)."""
+    """Scan files and surface cards as a Dataset with the variable ``height`` over (x, y)."""
 
     description = "Scans of surfaces: X3P, SDF and the instrument formats that SurfaceTopography reads"
-    open_dataset_parameters = (
-        "filename_or_obj",
-        "drop_variables",
-        "format",
-        "channel",
-        "unit",
-        "height_unit",
-        "spacing",
-        "grid",
-        "no_data",
-        "height_scale",
-    )
+    open_dataset_parameters = ("filename_or_obj", "drop_variables", *_OPTIONS)
 
-    def open_dataset(
-        self,
-        filename_or_obj: Any,
-        *,
-        drop_variables: str | Iterable[str] | None = None,
-        **options: Any,
-    ) -> xr.Dataset:
-        """Read a scan, as :func:`roughvisc.open_scan` does.
-
-        Parameters
-        ----------
-        filename_or_obj : path
-            As :func:`roughvisc.open_scan` takes it.
-        drop_variables : str or iterable of str, optional
-            Variables to leave out.
-        **options
-            As for :func:`roughvisc.open_scan`.
-
-        Returns
-        -------
-        xarray.Dataset
-            ``height`` over (x, y). [m]
-
-        Raises
-        ------
-        InputError
-            As :func:`roughvisc.open_scan`.
-        """
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, **options: Any) -> xr.Dataset:
+        """Read a scan with the options of :func:`roughvisc.open_scan`, without the variables to drop."""
         from roughvisc.topography.scans import open_scan
 
         dataset = open_scan(filename_or_obj, **options).to_dataset(name="height")
-        dropped = [drop_variables] if isinstance(drop_variables, str) else list(drop_variables or ())
-        return dataset.drop_vars(dropped, errors="ignore")
+        return dataset.drop_vars(drop_variables or [], errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        """Whether the suffix is that of one scan format and of nothing else."""
-        if not isinstance(filename_or_obj, str | os.PathLike):
-            return False
-        return Path(filename_or_obj).suffix.lower().removeprefix(".") in UNAMBIGUOUS
+        """Return whether the suffix is that of one scan format and of nothing else."""
+        is_path = isinstance(filename_or_obj, str | os.PathLike)
+        return is_path and Path(filename_or_obj).suffix.lower().removeprefix(".") in _SUFFIXES.split()

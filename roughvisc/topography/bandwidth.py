@@ -10,8 +10,8 @@ import scipy.fft
 import scipy.ndimage
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.topography.arguments import KEEP, ORDER
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
 from roughvisc.units import Quantity, quantities
 
@@ -39,7 +39,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     InputError
         If the order is none of these, or the points present do not determine the polynomial.
     """
-    ORDER.check("order", order)
+    one_of("order", order, (0, 1, 2, 3))
     h = checked(h, "level")
     require_heights(h, "level")
     kept = {} if order == 0 else {"period": None}  # a polynomial does not repeat
@@ -107,7 +107,7 @@ def gaussian_filter(
     .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
     """
     cutoff = number("cutoff", cutoff, "m")
-    KEEP.check("keep", keep)
+    one_of("keep", keep, ("long", "short"))
     h = checked(h, "gaussian_filter")
     sides = spacing(h)
     if cutoff < 3 * max(sides):

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.arguments import TURNS
 from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
@@ -90,7 +89,8 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     xarray.DataArray
         The rotated surface; coordinates start half a cell from zero. [m]
     """
-    TURNS.check("turns", turns)
+    if not isinstance(turns, int) or isinstance(turns, bool):
+        raise InputError(key="turns", found=turns, expected="a whole number of quarter turns")
     h = checked(h, "rotate90")
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)

@@ -10,8 +10,8 @@ import scipy.ndimage
 import scipy.sparse.linalg
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.topography.arguments import FILL, WINDOW
 from roughvisc.topography.grid import (
     checked,
     filled_points,
@@ -59,7 +59,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
     would otherwise use the spikes as the rim of the hole.
     """
-    WINDOW.check("window", window)
+    if not isinstance(window, int) or window < 3 or window % 2 == 0:
+        raise InputError(key="window", found=window, expected="an odd whole number of at least 3")
     threshold = number("threshold", threshold, "-")
     h = checked(h, "mask_outliers")
     require_heights(h, "mask_outliers")
@@ -98,7 +99,7 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
     InputError
         If the method is unknown, all points are missing, or they are absent on purpose (no material there).
     """
-    FILL.check("method", method)
+    one_of("method", method, ("harmonic", "nearest"))
     h = checked(h, "fill")
     if h.attrs.get("missing") == "absent":
         raise InputError(
@@ -108,7 +109,8 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
     missing = np.isnan(h.values)
     heights = h.values.copy()
     if missing.any():
-        heights[missing] = _FILLS[method](h.values, missing, spacing(h))
+        spanned = harmonic(h.values, missing) if method == "harmonic" else _nearest(h.values, missing, spacing(h))
+        heights[missing] = spanned
     before = filled_points(h)
     marked = with_filled_points(like(h, heights), missing if before is None else missing | before)
     return noted(marked, f"filled: {int(missing.sum())} missing points, {method}", fill_method=method)
@@ -175,9 +177,3 @@ def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float
     """The nearest height present, of each missing point. [m]"""
     nearest = scipy.ndimage.distance_transform_edt(missing, sides, return_distances=False, return_indices=True)
     return heights[nearest[0][missing], nearest[1][missing]]
-
-
-_FILLS = {
-    "harmonic": lambda heights, missing, sides: harmonic(heights, missing),
-    "nearest": _nearest,
-}

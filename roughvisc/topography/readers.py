@@ -84,8 +84,7 @@ def read_file(
     given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
     stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
     h = noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
-    finite(h, str(path))
-    _low_enough(h, path)
+    finite(h, str(path), HIGHEST)
     return h
 
 
@@ -367,31 +366,18 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
             )
 
 
-def _low_enough(h: xr.DataArray, path: Path) -> None:
-    """Refuse heights of metres, whose unit is another; not in a file of a dozen points, which is an example."""
-    count, example = _beyond(h.values, HIGHEST)
-    if count and h.size >= _FEWEST:
-        raise InputError(
-            f"{path}: {count} heights are like {example:.6g} m, which is not plausible (at most "
-            f"{HIGHEST:g} m from zero): expected height_scale if they are in another unit than the file or `unit` "
-            f"states, such as 1e-6, or no_data if the number stands for missing points"
-        )
+def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
+    """Refuse heights that are all missing, or further from zero than is plausible.
 
-
-def _beyond(values: np.ndarray, most: float) -> tuple[int, float]:
-    """How many heights are further from zero, and the first of them. [m]"""
-    beyond = values[np.abs(values) > most]
-    return beyond.size, float(beyond[0]) if beyond.size else math.nan
-
-
-def finite(h: xr.DataArray, source: str) -> None:
-    """Refuse heights that are all missing, or that are numbers standing for missing points."""
+    In a file of a dozen points, which is an example, heights of metres are accepted.
+    """
     values = h.values
     if np.isnan(values).all():
         raise InputError(f"{source}: all {h.size} points are missing: expected heights")
-    count, example = _beyond(values, FARTHEST)
-    if count:
+    beyond = values[np.abs(values) > (highest if h.size >= _FEWEST else FARTHEST)]
+    if beyond.size:
         raise InputError(
-            f"{source}: {count} heights are like {example:.6g} m: expected none beyond {FARTHEST:g} m "
-            "(NaN or no_data if the number stands for missing points)"
+            f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} "
+            "m from zero): expected height_scale, such as 1e-6, if they are in another unit than the file or `unit` "
+            "states; no_data, or NaN in an array, if the number stands for missing points"
         )

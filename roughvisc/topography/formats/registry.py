@@ -37,8 +37,6 @@ _SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",
 _ADDED: dict[str, tuple[tuple[str, ...], Callable[[Path], ScanFile]]] = {}
 #: Largest expansion of a deflated stream.
 EXPANSION = 1040
-#: Largest plausible expansion of measured heights, and the size below which any is accepted. [1, byte]
-_PLAUSIBLE, _SMALL = 100, 256 << 20
 
 
 @dataclass(frozen=True)
@@ -233,13 +231,3 @@ def affordable(path: Path, points: int, expansion: float = EXPANSION) -> None:
     held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
-    modest(8 * points, held)
-
-
-def modest(size: int, held: int) -> None:
-    """Refuse content that is far larger in memory than measured heights in a file of this size. [byte]"""
-    if size > max(_PLAUSIBLE * held, _SMALL):
-        raise InputError(
-            f"it would take {size:.3g} bytes in memory, {size / held:.0f} times as many as the file has: expected "
-            f"measured heights, at most {_PLAUSIBLE} times"
-        )
