@@ -132,9 +132,9 @@ def _choose(
     from roughvisc.study.target import choose, parse_targets
 
     watch, tell = partial(watcher, not console.quiet, console, summary=False), partial(say, console)
-    choice = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
-    tell("\n  ".join(["Chosen", *choice.reasons]))
-    return choice.case, choice.budgets
+    chosen, reasons, budgets = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
+    tell("\n  ".join(["Chosen", *reasons]))
+    return chosen, budgets
 
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
@@ -304,7 +304,7 @@ def budget(
     out: Path | None,
     workers: int | None,
     quiet: bool,
-    **errors: Any,
+    **known: Any,
 ) -> None:
     """Estimate the total uncertainty of a number, by source.
 
@@ -321,13 +321,11 @@ def budget(
 
     from roughvisc.study.budget import budgets, case_of
     from roughvisc.study.case import read_study
-    from roughvisc.study.neighbours import Known
     from roughvisc.study.storage.store import open_result
 
     console = Console(quiet=quiet)
     case = open_result(study) if study.suffix == ".nc" else read_study(study)
     names, folder = list(quantity) or ["contact_area"], case_of(case, out)[-1]
-    known = Known(**errors)
     found = budgets(case, names, known, at=list(at) or None, out=folder, workers=workers, progress=not quiet)
     for name, one in found.items():
         _show_budget(console, one, folder, name)

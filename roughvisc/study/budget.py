@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution.monitor import watcher
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
-from roughvisc.study.neighbours import Known, at_rows, compared, solve, with_rows
+from roughvisc.study.neighbours import at_rows, compared, solve, with_rows
 from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.store import open_result, result_path
 from roughvisc.units import Quantity, in_si, quantities
@@ -100,7 +100,12 @@ def budget(
     found = budgets(
         case,
         [quantity] if isinstance(quantity, str) else list(quantity),
-        Known(modulus_error, time_scale_error, cutoff, population),
+        {
+            "modulus_error": modulus_error,
+            "time_scale_error": time_scale_error,
+            "cutoff": cutoff,
+            "population": population,
+        },
         at=at,
         out=out,
         client=client,
@@ -117,7 +122,7 @@ def budget(
 def budgets(
     case: Case | str | Path | xr.Dataset,
     names: Sequence[str],
-    known: Known,
+    known: Mapping[str, Any],
     *,
     at: Sequence[Quantity] | Quantity | None = None,
     out: str | Path | None = None,

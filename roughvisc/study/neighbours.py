@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 Population = Literal["patch", "ensemble"]
+#: Inputs of a budget that only the user knows.
+KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
 STEPS, GRID, SAMPLE, OCTAVE = "time steps and solver", "grid", "sample", "next octave of waves"
 MODULUS, TIME_SCALE = "modulus", "time scale"
 #: Recipes that give the same surface on any grid.
@@ -102,17 +104,6 @@ def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
     return vary(case, changes)
 
 
-def stiffer(case: Case) -> Case:
-    """Return the case with all moduli larger by a tenth."""
-    return vary(case, {"material.modulus_factor": _CHANGE * case.tables["material"].get("modulus_factor", 1.0)})
-
-
-def slower(case: Case) -> Case:
-    """Return the case with all times of the material longer by a tenth."""
-    changes: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if key in case.tables["material"]}
-    return vary(case, changes | {"material.shift_factor": _CHANGE * case.shift_factor})
-
-
 def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = None) -> Case:
     """Return a case that keeps these fields, at these places of its axis if given, and no error of the grid.
 
@@ -134,8 +125,6 @@ class Neighbour:
 
     Attributes
     ----------
-    source : str
-        Source of error that it shows.
     case : Case
     weight : float
         Half-width of the logarithm of a number at 95 %, over the change of the logarithm. [-]
@@ -143,7 +132,6 @@ class Neighbour:
         Case that it is compared with.
     """
 
-    source: str
     case: Case
     weight: float
     against: Case
@@ -158,7 +146,7 @@ class Source:
     method : str
         How its error is found; the missing input if it is open.
     neighbours : tuple of Neighbour
-        Solves that show it.
+        Cases that show it.
     state : {"counted", "none", "open"}
         Whether it is part of the total error: ``none`` if it does not apply, ``open`` if an input is missing.
     """
@@ -168,43 +156,8 @@ class Source:
     state: Literal["counted", "none", "open"] = "counted"
 
 
-@dataclass(frozen=True)
-class Known:
-    """Errors that the user states.
-
-    Attributes
-    ----------
-    modulus_error, time_scale_error : float or None
-        Relative errors of the moduli and of the times of the material at 95 %. [-]
-    cutoff : float or None
-        Shortest wavelength of the real surface. [m]
-    population : {"patch", "ensemble"}
-        Whether the number is of this patch, or of the roughness that it is a sample of.
-
-    Raises
-    ------
-    InputError
-        If a value is invalid.
-    """
-
-    modulus_error: Any = None
-    time_scale_error: Any = None
-    cutoff: Any = None
-    population: Population | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("modulus_error", "time_scale_error"):
-            if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, number(value, "1", name, least=0, below=1))
-        if self.cutoff is not None:
-            object.__setattr__(self, "cutoff", number(self.cutoff, "m", "cutoff", above=0))
-        if self.population not in (None, *get_args(Population)):
-            expected = " or ".join(map(repr, get_args(Population)))
-            raise InputError(key="population", found=self.population, expected=expected)
-
-
 def sources_of(
-    base: Case, height: xr.DataArray, known: Known, coarsening: float = 1.0, three_grids: bool = False
+    base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0, three_grids: bool = False
 ) -> dict[str, Source]:
     """Return the sources of error of the numbers of a case, by name.
 
@@ -214,67 +167,84 @@ def sources_of(
         The case as it is solved.
     height : xarray.DataArray
         Its surface. [m]
-    known : Known
-        Errors that the user states.
+    known : mapping
+        What the user states of :data:`KNOWN`, as :func:`roughvisc.budget` takes it.
     coarsening : float
         Length of the cells over the length of the cells of the case: the sources are those on this grid.
     three_grids : bool
         Whether the error of the grid takes a third grid even if the surface is a sample, of which two may agree by
         chance. Default: the third grid of a sample would be another surface.
+
+    Raises
+    ------
+    InputError
+        If a stated value is invalid.
     """
+    population, cutoff = known.get("population") or "patch", known.get("cutoff")
+    if population not in ("patch", "ensemble"):
+        raise InputError(key="population", found=population, expected="'patch' or 'ensemble'")
+    if cutoff is not None:
+        cutoff = number(cutoff, "m", "cutoff", above=0)
     sample = is_sample(base, height)
     own, coarse = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0))
-    grids, words = [Neighbour(GRID, coarse, 1.0, own)], "cells twice as long"
+    grids, words = [Neighbour(coarse, 1.0, own)], "cells twice as long"
     if three_grids or not sample:
-        grids.append(Neighbour(GRID, on_cells(base, height, 4 * coarsening), 2**-ORDER, coarse))
+        grids.append(Neighbour(on_cells(base, height, 4 * coarsening), 2**-ORDER, coarse))
         words = "cells twice and four times as long"
-    # the contact of an indenter has few cells: its material is compared on its own grid
-    compared = coarse if sample else own
     found = {STEPS: Source("errors that the result states"), GRID: Source(words, tuple(grids))}
+
     if not sample:
         found[SAMPLE] = Source("the surface is the whole body, and no sample", state="none")
-    elif known.population != "ensemble":
+    elif population == "patch":
         words = "the number is of this patch; population 'ensemble' asks for its roughness"
         found[SAMPLE] = Source(words, state="none")
     else:
-        half = [max(2, round(n / (2 * coarsening))) for n in height.shape]
-        others = (
-            vary(base, {"surface.resample": half, "surface.realisation": number}) for number in range(1, _PATCHES + 1)
+        few = [max(2, round(n / (2 * coarsening))) for n in height.shape]
+        patches = (
+            vary(base, {"surface.resample": few, "surface.realisation": patch}) for patch in range(1, _PATCHES + 1)
         )
-        patches = tuple(Neighbour(SAMPLE, other, _SAMPLE_FACTOR, coarse) for other in others)
-        found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", patches)
-    found[OCTAVE] = _next_octave(own, height, known, sample)
-    creeps = float(base.material().contact_compliance(creep_time(base.experiment(), 1.0)))
-    for name, what, error, changed in (
-        (MODULUS, "moduli", known.modulus_error, stiffer),
-        (TIME_SCALE, "times of the material", known.time_scale_error, slower),
-    ):
-        if name == TIME_SCALE and creeps <= float(base.material().contact_compliance(0.0)):
+        found[SAMPLE] = Source(
+            f"{_PATCHES} Gaussian surrogates on cells twice as long",
+            tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches),
+        )
+
+    if not sample:
+        found[OCTAVE] = Source("the surface is no sample of a roughness", state="none")
+    elif cutoff is None:
+        found[OCTAVE] = Source("state cutoff, the shortest wavelength that the real surface has", state="open")
+    else:
+        end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
+        if shortest < _SAME * cutoff:
+            found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
+        else:
+            octaves = math.log2(shortest / cutoff)
+            words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held"
+            smooth = vary(own, {"surface.shortest_wave": 2 * shortest})
+            found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
+
+    # the contact of an indenter has few cells: its material is compared on its own grid
+    compared, material = coarse if sample else own, base.tables["material"]
+    changes: dict[str, dict[str, Any]] = {
+        MODULUS: {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)},
+        TIME_SCALE: {f"material.{key}": None for key in TEMPERATURE if key in material}
+        | {"material.shift_factor": _CHANGE * base.shift_factor},
+    }
+    at_once, later = (float(base.material().contact_compliance(t)) for t in (0.0, creep_time(base.experiment(), 1.0)))
+    for name, what in ((MODULUS, "moduli"), (TIME_SCALE, "times of the material")):
+        key = f"{name.replace(' ', '_')}_error"
+        if (error := known.get(key)) is not None:
+            error = number(error, "1", key, least=0, below=1)
+        if name == TIME_SCALE and later <= at_once:
             found[name] = Source("the material does not creep", state="none")
         elif error is None:
-            key = f"{name.replace(' ', '_')}_error"
             found[name] = Source(f"state {key}, the relative error of the {what}", state="open")
         elif error == 0:
             found[name] = Source(f"{what} are exact")
         else:
             weight = math.log1p(error) / math.log(_CHANGE)
-            one = Neighbour(name, changed(compared), weight, compared)
+            one = Neighbour(vary(compared, changes[name]), weight, compared)
             found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
     return found
-
-
-def _next_octave(own: Case, height: xr.DataArray, known: Known, sample: bool) -> Source:
-    """Return the source of the waves that the grid does not resolve."""
-    if not sample:
-        return Source("the surface is no sample of a roughness", state="none")
-    if known.cutoff is None:
-        return Source("state cutoff, the shortest wavelength that the real surface has", state="open")
-    end, shortest = unit_for(known.cutoff, "m").text(known.cutoff, 3), shortest_wave(height)
-    if shortest < _SAME * known.cutoff:
-        return Source(f"the grid holds all waves down to {end}")
-    octaves = math.log2(shortest / known.cutoff)
-    one = Neighbour(OCTAVE, vary(own, {"surface.shortest_wave": 2 * shortest}), octaves, own)
-    return Source(f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held", (one,))
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -340,7 +310,7 @@ def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
 def compared(
     base: Case,
     height: xr.DataArray,
-    known: Known,
+    known: Mapping[str, Any],
     observed: Sequence[Observable],
     solved: Callable[[list[Case]], dict[str, xr.Dataset]],
     *,
@@ -389,26 +359,24 @@ def compared(
     for one in observed:
         values = {key: one.of(result, base) for key, result in rows.items()}
         value, stated = values[case.key], one.stated_error(own, values[case.key])
-        columns: dict[str, list[Any]] = {"half_width": [], "direction": [], "cost": []}
+        errors: list[tuple[Any, ...]] = []
         for name, source in sources.items():
             if before is not None and name not in new:
-                stands = before[one.name].sel(source=name)
-                error: Any = [stands[column].values for column in columns]
+                kept = before[one.name].sel(source=name)
+                errors.append(tuple(kept[column].values for column in ("half_width", "direction", "cost")))
             else:
-                error = [*_error(name, source, one, values, stated)]
-                error.append(sum(seconds[neighbour.case.key] for neighbour in source.neighbours))
-            for column, part in zip(columns.values(), error, strict=True):
-                column.append(part)
+                cost = sum(seconds[neighbour.case.key] for neighbour in source.neighbours)
+                errors.append((*_error(name, source, one, values, stated), cost))
+        half_width, direction, costs = (np.array(column) for column in zip(*errors, strict=True))
         over, units = ("source", axis), VARIABLES[one.name].units
         states, methods = ([getattr(source, what) for source in sources.values()] for what in ("state", "method"))
-        direction = np.array(columns["direction"], dtype="int8")
         table = xr.Dataset(
             {
-                "half_width": (over, columns["half_width"], _described("half-width of the logarithm at 95 %", "1")),
-                "direction": (over, direction, _described("direction of the error") | _DIRECTIONS),
+                "half_width": (over, half_width, _described("half-width of the logarithm at 95 %", "1")),
+                "direction": (over, direction.astype("int8"), _described("direction of the error") | _DIRECTIONS),
                 "state": ("source", states, _described("whether a source counts")),
                 "method": ("source", methods, _described("how it was found")),
-                "cost": ("source", columns["cost"], _described("wall time of the solves that it took", "s")),
+                "cost": ("source", costs, _described("wall time of the solves that it took", "s")),
                 "value": (axis, value, _described(one.name.replace("_", " "), units)),
                 "case_cost": ((), seconds[case.key], _described("wall time of the case itself", "s")),
             },

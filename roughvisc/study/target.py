@@ -11,7 +11,6 @@ import logging
 import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,13 +29,13 @@ from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.single import run_stated
 from roughvisc.study.neighbours import (
     GRID,
+    KNOWN,
     MODULUS,
     OCTAVE,
     ORDER,
     SAMPLE,
     STEPS,
     TIME_SCALE,
-    Known,
     compared,
     is_sample,
     on_cells,
@@ -77,27 +76,8 @@ _REMEDIES = {
 _FLOOR = (SAMPLE, OCTAVE, MODULUS, TIME_SCALE)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Grid and tolerance that were chosen for a target.
-
-    Attributes
-    ----------
-    case : Case
-        The case with the chosen grid and tolerance.
-    reasons : tuple of str
-        What was chosen and why, in sentences.
-    budgets : dict
-        Name of each quantity -> its budget.
-    """
-
-    case: Case
-    reasons: tuple[str, ...]
-    budgets: dict[str, xr.Dataset]
-
-
-def targets_of(want: Mapping[str, Any]) -> tuple[dict[str, float], Known]:
-    """Return the wanted relative error of each number, and the errors that the user states.
+def targets_of(want: Mapping[str, Any]) -> dict[str, float]:
+    """Return the wanted relative error of each number.
 
     Raises
     ------
@@ -106,16 +86,15 @@ def targets_of(want: Mapping[str, Any]) -> tuple[dict[str, float], Known]:
     """
     if not isinstance(want, Mapping):
         raise InputError(key="want", found=want, expected="a dictionary such as {'contact_area': '1 %'}")
-    known = list(Known.__dataclass_fields__)
     for name in want:
-        if name not in (*QUANTITIES, *known):
-            raise InputError(key="want", found=name, expected=f"one of {', '.join((*QUANTITIES, *known))}")
+        if name not in (*QUANTITIES, *KNOWN):
+            raise InputError(key="want", found=name, expected=f"one of {', '.join((*QUANTITIES, *KNOWN))}")
     targets = {
         name: number(part, "1", f"want.{name}", above=0, below=1) for name, part in want.items() if name in QUANTITIES
     }
     if not targets:
         raise InputError(key="want", found=dict(want), expected="a target such as {'contact_area': '1 %'}")
-    return targets, Known(**{name: value for name, value in want.items() if name in known})
+    return targets
 
 
 def parse_targets(texts: Sequence[str]) -> dict[str, str]:
@@ -155,11 +134,12 @@ def run(
     """Return the result of the case that is chosen for wanted errors; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
     watch = partial(watcher, progress, summary=False)
-    choice = choose(case, want, folder, watch=watch, tell=log.info, client=default_client(), threads=threads)
-    for name, one in choice.budgets.items():
+    chosen, reasons, budgets = choose(
+        case, want, folder, watch=watch, tell=log.info, client=default_client(), threads=threads
+    )
+    for name, one in budgets.items():
         write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
-    found = run_stated(choice.case, out, progress=False, threads=threads)
-    return found.assign_attrs(choice="\n".join(choice.reasons))
+    return run_stated(chosen, out, progress=False, threads=threads).assign_attrs(choice="\n".join(reasons))
 
 
 def choose(
@@ -172,7 +152,7 @@ def choose(
     client: Client | None = None,
     workers: int | None = 0,
     threads: int | None = None,
-) -> Choice:
+) -> tuple[Case, list[str], dict[str, xr.Dataset]]:
     """Choose grid and tolerance for wanted errors, and write the result of the chosen case.
 
     Parameters
@@ -191,13 +171,22 @@ def choose(
     client, workers, threads
         As in :func:`roughvisc.sweep`.
 
+    Returns
+    -------
+    case : Case
+        The case with the chosen grid and tolerance.
+    reasons : list of str
+        What was chosen and why, in sentences.
+    budgets : dict
+        Name of each quantity -> its budget.
+
     Raises
     ------
     InputError
         If a target is invalid or cannot be met: the message names the smallest error, its sources, and what would
         reduce the largest of them.
     """
-    targets, known = targets_of(want)
+    targets = targets_of(want)
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
     solved = partial(solve, folder=folder / FOLDER, watch=watch, client=client, workers=workers, threads=threads)
@@ -219,7 +208,7 @@ def choose(
         if (rounded := float(f"{tolerance:.2g}")) != base.settings.tolerance:
             base = vary(base, {"solve.tolerance": rounded})
         scale = 2.0**level
-        found = compared(base, height, known, observed, solved, places=places, coarsening=scale, before=before)
+        found = compared(base, height, want, observed, solved, places=places, coarsening=scale, before=before)
         shape, length = shape_on(case, height, scale), _LENGTHS.get(level, f"{scale:g} times as long as")
         cells = f"{shape[0]} x {shape[1]} cells, {length} those of the study"
         reached = {
@@ -251,7 +240,7 @@ def choose(
     reasons.append(f"tolerance: {chosen.settings.tolerance:.2g}")
     if unknown := found[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")
-    return Choice(chosen, tuple(reasons), found)
+    return chosen, reasons, found
 
 
 def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
@@ -281,7 +270,8 @@ def _refuse_missed(
     for name, budget in budgets.items():
         wanted, least = math.log1p(targets[name]), budget
         if before is not None:
-            change = np.abs(np.log(budget["value"].values / before[name]["value"].values))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                change = np.abs(np.log(budget["value"].values / before[name]["value"].values))
             part = QUANTITIES[name].grid_factor * change / 2**ORDER
             least = budget.assign(half_width=budget["half_width"].where(budget["source"] != GRID, part))
         if error_of(least, sources) <= _ROUNDING * wanted:

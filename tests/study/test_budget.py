@@ -10,7 +10,6 @@ from support import refused
 import roughvisc as rv
 from roughvisc.study.budget import budgets
 from roughvisc.study.case import Case
-from roughvisc.study.neighbours import Known
 from roughvisc.study.target import parse_targets
 
 BALL = """
@@ -88,7 +87,7 @@ def states(found):
 
 def test_interval__holds_hertz(tmp_path):
     exact = {"contact_area": np.pi * RADIUS**2, "approach": RADIUS**2 / 1e-3, "force": 2e-4}
-    found = budgets(case(BALL, tmp_path), list(exact), Known(), out=tmp_path / "budget", workers=0, progress=False)
+    found = budgets(case(BALL, tmp_path), list(exact), {}, out=tmp_path / "budget", workers=0, progress=False)
     for name, true in exact.items():
         one = found[name]
         assert (one["lower"] <= true * (1 + 1e-12)).all(), name
@@ -140,7 +139,7 @@ def test_missing_waves__count_on_one_side(tmp_path):
     """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
     study, names = case(ROUGH, tmp_path), ["contact_area", "mean_gap"]
     one, two = (
-        budgets(study, names, Known(cutoff=cutoff), out=tmp_path / "b", workers=0, progress=False)
+        budgets(study, names, {"cutoff": cutoff}, out=tmp_path / "b", workers=0, progress=False)
         for cutoff in ("18 um", "9 um")
     )
     for name, side in (("contact_area", -1), ("mean_gap", 1)):
