@@ -6,7 +6,6 @@ import math
 from typing import Literal
 
 import numpy as np
-import scipy.fft
 import xarray as xr
 
 from roughvisc.errors import InputError
@@ -14,7 +13,7 @@ from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, labelled, noted, require_complete, spacing
 from roughvisc.topography.spectrum import psd
-from roughvisc.topography.synthesis import RandomWaves, make_hermitian, synthesised
+from roughvisc.topography.synthesis import half_spectrum, random_heights
 
 
 def surrogates(
@@ -84,24 +83,18 @@ def surrogate(
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # its rings are as wide
-    (nx, ny), sides = h.shape, spacing(h)
-    area, whole = h.size * math.prod(sides), np.pi / max(sides)
-    waves = RandomWaves([int(seed), int(number)], amplitudes == "gaussian")
-    q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, sides[0]), 2 * np.pi * scipy.fft.rfftfreq(ny, sides[1])
+    sides = spacing(h)
+    q_x, q_y, _ = half_spectrum(h.shape, sides)
+    q = np.hypot(q_x[:, None], q_y)
     rings = np.round(spectrum["wavevector"].values / step).astype(int)
     density = np.zeros(rings[-1] + 1)
     density[rings] = spectrum["psd"].values
-    centres = np.exp(1j * np.pi * np.arange(q_y.size) / ny)
-    heights_q = np.zeros((nx, q_y.size), dtype=complex)
-    for row in range(nx):
-        q = np.hypot(q_x[row], q_y)
-        inside = (q > 0) & (q < whole * (1 - 1e-12))
-        ring = np.maximum(np.round(q / step).astype(int), 1)
-        amplitude = np.sqrt(np.where(inside, density[np.where(inside, ring, 0)], 0.0) / area)
-        k_x = row if 2 * row < nx else row - nx
-        heights_q[row] = amplitude * np.exp(1j * np.pi * k_x / nx) * centres * waves.row(k_x, q_y.size)
-    make_hermitian(heights_q)
-    grid = labelled(synthesised(heights_q, ny), (sides[0], sides[1])).assign_coords(x=h["x"], y=h["y"])
+    ring = np.maximum(np.round(q / step).astype(int), 1)
+    inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
+    variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
+    entropy = [int(seed), int(number)]
+    heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=amplitudes == "gaussian")
+    grid = labelled(heights, sides).assign_coords(x=h["x"], y=h["y"])
     return noted(
         grid, f"surrogate {number} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
     )

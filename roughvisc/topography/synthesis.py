@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -134,8 +133,7 @@ def self_affine(
 
     Random numbers belong to wavevectors :math:`2 \pi (k_x / L_x, k_y / L_y)`: each :math:`k_x` has its own stream,
     spawned from the seed [2]_ and drawn from :math:`k_y = 0` upwards. The grid only determines the number of streams
-    and the length drawn from each. Phases are those at the corner :math:`x = y = 0`. The transform is real and in
-    place, so the peak memory is little more than that of the result.
+    and the length drawn from each. Phases are those at the corner :math:`x = y = 0`.
 
     References
     ----------
@@ -164,12 +162,19 @@ def self_affine(
         source = np.random.default_rng(seed)
     except (TypeError, ValueError) as error:
         raise InputError(f"seed is {seed!r}: expected a whole number >= 0 or a numpy.random.Generator") from error
-    waves = RandomWaves(source.integers(1 << 32, size=4).tolist(), amplitudes == "gaussian")
-    spectrum, variance, slope2 = _spectrum(size, shape, hurst, band, stretch, waves)
-    if not variance:
+    entropy = source.integers(1 << 32, size=4).tolist()
+    q_x, q_y, weight = half_spectrum(shape, cell_of(size, shape))
+    q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
+    inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, are outside
+    amplitude = np.zeros(q.shape)
+    np.power(np.maximum(q, band[0] / band[1]), -1 - hurst, out=amplitude, where=inside)
+    power = weight * amplitude**2  # Parseval
+    power = power if rms_slope is None else power * (q_x[:, None] ** 2 + q_y**2)
+    square = float(sum(power[start : start + 64].sum() for start in range(0, shape[0], 64)))
+    if not square:
         raise InputError(f"no wave of the domain is longer than shortcut = {shortcut:.6g} [m]: expected a larger size")
-    heights = synthesised(spectrum, shape[1])
-    heights *= target / math.sqrt(slope2 if rms_height is None else variance)
+    heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
+    heights *= target / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes}
     parameters |= {"seed": int(seed) if isinstance(seed, int | np.integer) else None}
@@ -177,79 +182,51 @@ def self_affine(
     return labelled(heights, cell_of(size, shape), attrs)
 
 
-@dataclass(frozen=True)
-class RandomWaves:
-    """Random complex numbers by wavevector, whatever the grid: of modulus one, or normal of mean square one.
+def half_spectrum(shape: Any, cell: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the wavevectors of a real transform along x and y [rad/m], and the number of modes of each along y."""
+    q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(shape[0], cell[0]), 2 * np.pi * scipy.fft.rfftfreq(shape[1], cell[1])
+    weight = np.full(q_y.size, 2.0)  # the half that is not stored
+    weight[0] = 1.0
+    return q_x, q_y, weight
+
+
+def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal: bool) -> np.ndarray:
+    """Return periodic heights at the cell centres from amplitudes and random phases.
+
+    Each wave number along x has its own stream of random numbers, whatever the grid.
 
     Parameters
     ----------
+    amplitude : ndarray, shape (nx, ny // 2 + 1)
+        Amplitude of each mode of a real transform, zero for the mean and the Nyquist modes. [m]
+    ny : int
+        Number of cells along y.
     entropy : list of int
         From the seed.
     normal : bool
-        Whether moduli are random too; phases are the same either way.
+        Whether amplitudes are multiplied by moduli of complex normal numbers of mean square one.
+
+    Returns
+    -------
+    ndarray, shape (nx, ny)
+        Heights. [m]
     """
-
-    entropy: list[int]
-    normal: bool
-
-    def row(self, k_x: int, count: int) -> np.ndarray:
-        """Those of one wave number along x and the wave numbers 0 to ``count - 1`` along y."""
-        number = 2 * k_x if k_x >= 0 else -2 * k_x - 1
-        found = np.exp(2j * np.pi * self._stream(number, 0).random(count))
-        return found * np.sqrt(self._stream(number, 1).standard_exponential(count)) if self.normal else found
-
-    def _stream(self, number: int, what: int) -> np.random.Generator:
-        return np.random.default_rng(np.random.SeedSequence(self.entropy, spawn_key=(number, what)))
-
-
-def _spectrum(
-    size: Any, shape: Any, hurst: float, band: tuple[float, float], stretch: Any, waves: RandomWaves
-) -> tuple[np.ndarray, float, float]:
-    """Half spectrum of unit scale, with its expected variance and mean square slope (Parseval)."""
-    nx, ny = shape
-    q_x = 2 * np.pi * scipy.fft.fftfreq(nx, size[0] / nx)
-    q_y = 2 * np.pi * scipy.fft.rfftfreq(ny, size[1] / ny)
-    weight = np.full(q_y.size, 2.0)  # the half that is not stored
-    weight[0] = 1.0
-    centres = np.exp(1j * np.pi * np.arange(q_y.size) / ny)  # from the corner to the first centre, half a cell
-    spectrum = np.empty((nx, q_y.size), dtype=complex)
-    variance = slope2 = 0.0
-    for start in range(0, nx, 64):  # in blocks of rows, so that the temporaries stay small
-        rows = slice(start, start + 64)
-        q = np.hypot(q_x[rows, None] * stretch[0], q_y * stretch[1]) / band[1]
-        inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, fall outside
-        amplitude = np.zeros(q.shape)
-        np.power(np.maximum(q, band[0] / band[1]), -1 - hurst, out=amplitude, where=inside)
-        for row, part in zip(range(nx)[rows], amplitude, strict=True):
-            count = np.count_nonzero(part) + (row == 0)  # from zero on, but for the mean
-            spectrum[row, count:] = 0.0
-            k_x = row if 2 * row < nx else row - nx
-            centred = np.exp(1j * np.pi * k_x / nx) * centres[:count]
-            spectrum[row, :count] = part[:count] * centred * waves.row(k_x, count)
-        power = weight * amplitude**2
-        variance += power.sum()
-        slope2 += (power * (q_x[rows, None] ** 2 + q_y**2)).sum()
-    make_hermitian(spectrum)
-    return spectrum, float(variance), float(slope2)
-
-
-def make_hermitian(spectrum: np.ndarray) -> None:
-    """Make the first column, which holds both halves, such that the amplitudes survive the real transform."""
-    column, half = spectrum[:, 0], (len(spectrum) - 1) // 2
-    column[len(spectrum) - half :] = column[1 : half + 1][::-1].conj()
-
-
-def synthesised(spectrum: np.ndarray, ny: int) -> np.ndarray:
-    """Heights in the memory of their half spectrum, which they overwrite."""
-    nx, held = spectrum.shape
-    for start in range(0, held, 64):
-        columns = slice(start, start + 64)
-        spectrum[:, columns] = scipy.fft.ifft(spectrum[:, columns], axis=0, norm="forward")
-    flat = spectrum.reshape(-1).view(float)
-    for start in range(0, nx, 64):  # a row of heights is shorter than its spectrum: it never reaches one still needed
-        rows = scipy.fft.irfft(spectrum[start : start + 64], ny, axis=1, norm="forward")
-        flat[start * ny : start * ny + rows.size] = rows.reshape(-1)
-    return flat[: nx * ny].reshape(nx, ny)
+    nx, held = amplitude.shape
+    centres = np.exp(1j * np.pi * np.arange(held) / ny)  # from the corner to the first centre, half a cell
+    spectrum = np.zeros((nx, held), dtype=complex)
+    for row, part in enumerate(amplitude):
+        count = int(np.flatnonzero(part).max(initial=-1)) + 1
+        k_x = row if 2 * row < nx else row - nx
+        streams = [
+            np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=(2 * k_x if k_x >= 0 else -2 * k_x - 1, i)))
+            for i in (0, 1)
+        ]
+        waves = np.exp(2j * np.pi * streams[0].random(count))
+        waves = waves * np.sqrt(streams[1].standard_exponential(count)) if normal else waves
+        spectrum[row, :count] = part[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
+    half = (nx - 1) // 2  # the first column holds both halves: make it Hermitian
+    spectrum[nx - half :, 0] = spectrum[1 : half + 1, 0][::-1].conj()
+    return scipy.fft.irfft(scipy.fft.ifft(spectrum, axis=0, norm="forward"), ny, axis=1, norm="forward")
 
 
 #: Function of each recipe, by its name in surface cards and studies.
