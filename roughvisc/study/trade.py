@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -204,7 +205,7 @@ def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], g
             sides = np.array(spacing(height)) * height.shape / np.array(shapes)
             times = kept_times(experiment.program, times, *map(tuple, sides)) or "all"
         changes["keep.times"] = list(times) if isinstance(times, tuple) else times
-    return vary(case, changes)
+    return replace(vary(case, changes), varied=case.varied)
 
 
 def _compared(

@@ -44,7 +44,8 @@ def variables():
     tables = (
         declared("roughvisc.variables", "VARIABLES"),
         declared("roughvisc.variables.sliding", "SLIDING"),  # of the first edition
-        declared("roughvisc.study.trade.trade", "VARIABLES"),
+        declared("roughvisc.study.trade.trade", "VARIABLES"),  # of the first edition
+        declared("roughvisc.study.trade", "VARIABLES"),
     )
     return {
         name: f"{one.dims} {one.units} {getattr(one, 'group', '')}".strip()
