@@ -34,9 +34,10 @@ WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
 _FEWEST = 16
 #: Beyond this distance from zero, heights of an array stand for missing points. [m]
 FARTHEST = 1e3
-#: A number stands for missing points if it is the extreme of the heights, occurs at least so often, and is further from
-#: the next height than so many times the range of all others.
-_REPEATED, _FAR = 4, 10.0
+#: A number stands for missing points if it is the extreme of the heights, at least this large in the file, occurs at
+#: least so often, and is further from the next height than so many times the range of all others. Exactly flat pits of
+#: a made texture are smaller numbers.
+_NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
 _READER = threading.RLock()
 
 
@@ -207,11 +208,12 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
         marked = values == number
         count, rest = int(marked.sum()), values[np.isfinite(values) & ~marked]
         spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-        if count >= _REPEATED and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
+        conventional = count >= _REPEATED and abs(number) >= _NO_DATA
+        if conventional and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
             values = np.where(marked, np.nan, values)
             complaints.append(
                 f"{count} points have the height {number:g} and all others lie within {rest.min():g} to "
-                f"{rest.max():g}: taken as missing; no_data = {number:g} states so"
+                f"{rest.max():g}: taken as missing; no_data = {number:g} states so, and any other number keeps them"
             )
     return values
 

@@ -62,8 +62,8 @@ def open_scan(
         Side of the square cells into which points x, y, z are sorted: each has the mean height of its points. Default:
         the lattice on which the points lie, to a hundredth of its steps. [m]
     no_data : float, optional
-        Number that stands for a missing point, in the unit of the file. Default: an extreme that at least four points
-        share, further from all other heights than ten times their range; a warning states it.
+        Number that stands for a missing point, in the unit of the file. Default: an extreme of at least 999 that
+        four points or more share, further from all other heights than ten times their range; a warning states it.
     height_scale : float, optional
         Factor of the heights, of a file that states a wrong unit: 1e-6 for micrometres in place of metres. [-]
 

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from scan_files import CELL, SCANS, card, real, tilted, write_x3p
 from support import refused
 
+import roughvisc as rv
 from roughvisc.cli.group import main
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.points import lattice
@@ -206,6 +207,16 @@ def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):
     for z in (np.minimum(ROUGH, 0.5), np.where(ROUGH > 0, 1.0, 0.0), np.where(ROUGH > 1, -5.0, ROUGH)):
         np.save(tmp_path / "m.npy", z)
         assert not np.isnan(open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")).any()
+
+
+def test_no_data__is_not_seen_in_the_flat_pits_of_a_texture(tmp_path):
+    h = rv.from_array(np.where(ROUGH > 1, -5e-6, 1e-8 * ROUGH), 1e-6)
+    for suffix in ("nc", "x3p"):
+        rv.save_scan(h, tmp_path / f"pits.{suffix}")
+        np.testing.assert_array_equal(rv.open_scan(tmp_path / f"pits.{suffix}"), h)
+    np.save(tmp_path / "deep.npy", np.where(ROUGH > 1, -1e4, ROUGH))
+    h = open_scan(tmp_path / "deep.npy", unit="um", spacing="1 um", no_data=1.0)
+    assert not np.isnan(h).any()
 
 
 def test_no_data__of_few_points_is_named_in_the_refusal(tmp_path):
