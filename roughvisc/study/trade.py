@@ -121,11 +121,11 @@ def trade(
     Notes
     -----
     Settings are solved in this process one after the other, from the cheapest to the dearest. The reference is the
-    finest run: it has the finest grid of the settings that the time allows, and a fifth of their smallest tolerance.
-    Its own uncertainty follows from runs with that tolerance, and on grids two and four times coarser, by Richardson
-    extrapolation with Roache's safety factors. Pressures of two grids are compared as means over the coarser cells. In
-    a slide the profile moves by whole cells. Kept times within it are those at which it has moved by whole cells of
-    every grid, at least the beginning and the end.
+    finest run: it has the finest grid of the settings that the time allows, and a fifth of their smallest tolerance, or
+    the smallest that the time allows. Its own uncertainty follows from the run with the next larger tolerance, and from
+    grids two and four times coarser, by Richardson extrapolation with Roache's safety factors. Pressures of two grids
+    are compared as means over the coarser cells. In a slide the profile moves by whole cells. Kept times within it are
+    those at which it has moved by whole cells of every grid, at least the beginning and the end.
     """
     if not isinstance(case, Case):
         case = read_study(case)
@@ -162,7 +162,7 @@ def trade(
     for one in sorted(wanted, key=work.__getitem__):
         changed = on_cells(vary(base, {"solve.tolerance": one[0]}), height, one[1])
         if (expected := work[one] * rate) > budget - spent:
-            notes[one] = f"would take about {expected:.2g} s, {budget - spent:.0f} s are left of the budget"
+            notes[one] = f"would take about {expected:.2g} s, {max(budget - spent, 0):.0f} s are left of the budget"
             continue
         if not results and not is_result_of(changed, result_path(folder, changed.key)):
             compute(changed, progress=False)  # the first solve of a process takes longer
@@ -178,8 +178,8 @@ def trade(
         spent, rate = spent + seconds, seconds / work[one]
         derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
         results[one] = result.assign(derived)
-    candidates = [(sharpest / _SHARPER, grid) for grid in finest]
-    reference = next((one for one in candidates if one in results), None)
+    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # and the sharpest run if there is no time for these
+    reference = next((one for one in (*candidates, *sorted(results)) if one in results and one[1] in finest), None)
     if reference is None:
         where = f"{case.origin}: " if case.origin else ""
         raise InputError(f"{where}the reference run: {notes[candidates[-1]]}: expected a larger budget, or fewer cells")
@@ -243,7 +243,8 @@ def _compared(
     table = xr.Dataset(columns, {"quantity": list(names)})
     table = table.set_coords(["tolerance", "coarsening", "cells_x", "cells_y"])
     # the error follows the tolerance, unevenly: hence the larger safety factor
-    by_steps = TWO_GRIDS * apart((sharp * _SHARPER, finest)) / (_SHARPER - 1)
+    looser = min((one for one in results if one[0] > sharp and one[1] == finest), default=(math.inf, finest))
+    by_steps = TWO_GRIDS * apart(looser) / (looser[0] / sharp - 1)
     second, third = (sharp, 2 * finest), (sharp, 4 * finest)
     shapes = [shape_on(case, height, grid) for grid in (finest, 2 * finest)]
     ratio, moving = math.sqrt(math.prod(shapes[0]) / math.prod(shapes[1])), "friction_coefficient" in names

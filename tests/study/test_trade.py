@@ -9,7 +9,7 @@ from support import PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, m
 
 import roughvisc as rv
 from roughvisc.experiment.grid_error import grid_uncertainty
-from roughvisc.study.neighbours import on_cells
+from roughvisc.study.neighbours import on_cells, solve
 from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade import VARIABLES, cheapest, format_tolerance, open_trade, pareto_front, uncertainty
 
@@ -205,6 +205,22 @@ def made(folder):
 def test_budget__stops_runs_and_refuses_a_reference_that_takes_too_long(tmp_path):
     with pytest.raises(rv.InputError, match="reference"):
         measured(case_of(tmp_path, ROUGH), (1e-2, 1), budget=1e-6)
+
+
+def test_reference__is_the_sharpest_run_that_there_is(tmp_path, monkeypatch):
+    """The next looser tolerance is ten times as large: Roache's factor of two runs is 3 over 10 - 1."""
+
+    def solve_loosely(cases, folder, **options):
+        if any(case.settings.tolerance < 1e-2 for case in cases):
+            raise rv.RoughviscError("too sharp")
+        return solve(cases, folder, **options)
+
+    monkeypatch.setattr("roughvisc.study.trade.solve", solve_loosely)
+    ds = measured(case_of(tmp_path), (1e-1, 1), (1e-2, 1))
+    assert ds.attrs["reference"] == "finest run: tolerance = 1e-2"
+    assert (ds.error[1] == 0).all()
+    np.testing.assert_allclose(ds.reference_time_uncertainty, ds.error[0] / 3)
+    assert np.isnan(ds.reference_grid_uncertainty).all()
 
 
 @pytest.mark.parametrize(
