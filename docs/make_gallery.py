@@ -27,7 +27,7 @@ FIGURES = {
     "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
     "load_sweep": {
         "sweep": rv.plot.sweep,
-        "histories": rv.plot.histories_of_cases,
+        "histories": rv.plot.history,
         "area": lambda results: rv.plot.area_against_load(by_load(results)),
     },
     "two_parameters": {

@@ -1,6 +1,7 @@
 """The public names of roughvisc and the modules that define them: for editors, for mypy, and for ``__init__.py``."""
 
 from roughvisc import observables as observables
+from roughvisc import plot as plot
 from roughvisc.api import friction as friction
 from roughvisc.api import run as run
 from roughvisc.api import simulate as simulate
@@ -70,7 +71,6 @@ from roughvisc.topography.synthesis import self_affine as self_affine
 from roughvisc.topography.synthesis import sphere as sphere
 from roughvisc.topography.synthesis import wavy as wavy
 from roughvisc.topography.writers import save_scan as save_scan
-from roughvisc.views import plot as plot
 from roughvisc.views.export import deformed as deformed
 from roughvisc.views.export import to_csv as to_csv
 from roughvisc.views.report.page import report as report

@@ -19,9 +19,9 @@ from roughvisc.errors import printable
 def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw figures of a result, a folder of results, or a trade.
 
-    Draws two figures of each result: history and maps, or friction curve and maps. --all also draws section and
-    surface. For a folder with several cases, also draws figures of the sweep: quantities against the varied settings,
-    and histories of all cases. File names and titles state the varied settings.
+    Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
+    the figures of the sweep: quantities against the varied settings, and the histories of all cases. --all also draws
+    section and surface, and the figures of each case. File names and titles state the varied settings.
 
     \b
     Example:
@@ -30,25 +30,21 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.study.storage.store import open_result, results_at
+    from roughvisc.plot import trade
+    from roughvisc.plot.files import write_figure
+    from roughvisc.plot.sweep_files import results_of, save_case_figures, save_sweep_figures
+    from roughvisc.study.storage.store import results_at
     from roughvisc.study.trade import is_trade, open_trade
-    from roughvisc.views.figures.files import write_figure
-    from roughvisc.views.plot import save_figures, save_sweep_figures, trade
-    from roughvisc.views.sweep_figures.files import cases_in, results_of
 
     paths = results_at(result)
-    names = cases_in(paths) if result.is_dir() else {}
-    drawn: list[Path] = []
-    for path in paths:
-        folder = out or path.parent
-        if path.is_file() and is_trade(path):
-            drawn.append(write_figure(trade(open_trade(path)), folder / f"{path.stem}.png"))
-            continue
-        stem, title = names.get(path, (path.stem, ""))
-        with open_result(path) as dataset:
-            drawn += save_figures(dataset, folder, stem, title=title, every=every)
-    if len(paths) > 1 and (together := results_of(result)) is not None:
+    trades = [path for path in paths if path.is_file() and is_trade(path)]
+    drawn = [write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png") for path in trades]
+    cases = [path for path in paths if path not in trades]
+    together = results_of(result) if len(cases) > 1 else None
+    if together is not None:
         drawn += save_sweep_figures(together, out or result)
+    if together is None or every:
+        drawn += save_case_figures(cases, out, every=every, named=result.is_dir(), progress=True)
     say_figures(Console(), drawn)
 
 

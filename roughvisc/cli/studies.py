@@ -139,13 +139,13 @@ def _choose(
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
     """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
+    from roughvisc.plot import save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
     from roughvisc.study.storage.store import open_result, result_path
     from roughvisc.views.console.result_tables import result_table
-    from roughvisc.views.plot import save_figures
 
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
@@ -257,6 +257,8 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     """
     from rich.console import Console
 
+    from roughvisc.plot import trade as figure
+    from roughvisc.plot.files import write_figure
     from roughvisc.study.case import read_study
     from roughvisc.study.execution.run import result_folder
     from roughvisc.study.storage.store import write_dataset
@@ -264,8 +266,6 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     from roughvisc.study.trade import trade as measured
     from roughvisc.units import number
     from roughvisc.views.console.accuracy_tables import trade_table
-    from roughvisc.views.figures.files import write_figure
-    from roughvisc.views.plot import trade as figure
 
     part = number(accuracy, "1", "accuracy", above=0, below=1)
     case, console = read_study(study), Console(quiet=quiet)
@@ -333,10 +333,10 @@ def budget(
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
     """Print the budget of a number, write it, and draw it."""
+    from roughvisc.plot import budget as figure
+    from roughvisc.plot.files import write_figure
     from roughvisc.study.storage.store import write_dataset
     from roughvisc.views.console.accuracy_tables import budget_table
-    from roughvisc.views.figures.files import write_figure
-    from roughvisc.views.plot import budget as figure
 
     console.print(budget_table(found))
     say_path(console, "Budget", write_dataset(found, folder / f"budget-{name}.nc"))

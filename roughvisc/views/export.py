@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.labels import heading
+from roughvisc.plot.rows import frame_at, require, rows_of
+from roughvisc.plot.sections import deformed_surface
 from roughvisc.study.storage.files import atomic_write
 from roughvisc.units import Quantity, quantities
 from roughvisc.variables import AXES, VARIABLES, axis_of
-from roughvisc.views.figures.rows import frame_at, require, rows_of
-from roughvisc.views.figures.sections import deformed_surface
 
 
 def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:

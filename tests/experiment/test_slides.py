@@ -9,9 +9,9 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.kept_times import kept_times
+from roughvisc.plot.case_text import program_words
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.si_tables import unit_of
-from roughvisc.views.sweep_figures.case_text import program_words
 
 SIDE = 1e-3
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)

@@ -8,9 +8,9 @@ import xarray as xr
 from scipy.special import erf
 
 import roughvisc as rv
+from roughvisc import plot
 from roughvisc.errors import InputError
 from roughvisc.observables import area_by_theory
-from roughvisc.views import plot
 
 SIDE = 1e-3
 SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE / 3, seed=3)

@@ -82,7 +82,7 @@ KINDS = {
     "variables": variables,
     "commands and options": commands,
     "commands": lambda: {name.split()[0]: "" for name in commands()},
-    "figures of a result": lambda: dict.fromkeys(declared("roughvisc.views.plot", "FIGURES"), ""),
+    "figures of a result": lambda: dict.fromkeys(declared("roughvisc.plot", "FIGURES"), ""),
     "errors": errors,
     "columns of a plan": lambda: {name: str(one) for name, one in declared("roughvisc.study.plan", "COLUMNS").items()},
 }

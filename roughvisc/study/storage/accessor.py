@@ -21,7 +21,7 @@ _PLOT = "plot_"
 #: Module that opens a result.
 _STORE = "roughvisc.study.storage.store"
 #: beginning of a method's name -> module whose public names follow
-_ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.views.plot"}
+_ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.plot"}
 
 
 @xr.register_dataset_accessor("roughvisc")

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.plot.case_text import case_words, varied_texts
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, Axis, axis_of
-from roughvisc.views.sweep_figures.case_text import case_words, varied_texts
 
 
 def table_row(dataset: xr.Dataset, source: Any, number: int) -> dict[str, Any]:

@@ -19,6 +19,11 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
+from roughvisc.plot import area_against_load, case_text, figures_of, style, surface
+from roughvisc.plot.coarsened import drawn
+from roughvisc.plot.fields import draw_map, label_plane, measured_part, plane_unit
+from roughvisc.plot.rows import require
+from roughvisc.plot.sweep_files import results_of, sweep_figures
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.audit.limits import Finding
 from roughvisc.study.storage.files import atomic_write
@@ -29,16 +34,9 @@ from roughvisc.study.storage.table import realisations_table
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import axis_of
-from roughvisc.views.figures import style
-from roughvisc.views.figures.coarsened import drawn
-from roughvisc.views.figures.fields import draw_map, label_plane, measured_part, plane_unit
-from roughvisc.views.figures.rows import require
-from roughvisc.views.plot import area_against_load, figures_of, surface
 from roughvisc.views.realisation_rows import realisation_rows
 from roughvisc.views.report.case_table import table_row
 from roughvisc.views.report.treatment import Treatment, treatment
-from roughvisc.views.sweep_figures import case_text
-from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 #: Cases of which figures and the audit are shown; of more, evenly spread ones.
 _PICTURED = 6

@@ -11,13 +11,13 @@ from click.testing import CliRunner
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
+from roughvisc.plot.case_text import study_text
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.store import write_result
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.table import to_table
 from roughvisc.views.report.page import report
-from roughvisc.views.sweep_figures.case_text import study_text
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = f"""

@@ -10,15 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.topography.bandwidth import off_plane
-from roughvisc.topography.grid import cell_edges, checked, spacing
-from roughvisc.topography.missing_points import fill
-from roughvisc.topography.spectrum import psd
-from roughvisc.units import Unit, unit_for
-from roughvisc.variables import VARIABLES
-from roughvisc.views.figures import style
-from roughvisc.views.figures.coarsened import drawn, stride
-from roughvisc.views.figures.fields import (
+from roughvisc.plot import style
+from roughvisc.plot.coarsened import drawn, stride
+from roughvisc.plot.fields import (
     Scale,
     bar_side,
     colour_bar,
@@ -28,6 +22,12 @@ from roughvisc.views.figures.fields import (
     plane_ratio,
     plane_unit,
 )
+from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.grid import cell_edges, checked, spacing
+from roughvisc.topography.missing_points import fill
+from roughvisc.topography.spectrum import psd
+from roughvisc.units import Unit, unit_for
+from roughvisc.variables import VARIABLES
 
 #: Robust standard deviations from the median to which the scale of heights reaches.
 _REACH = 5.0

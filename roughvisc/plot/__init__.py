@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.plot.files import write_figure
+from roughvisc.plot.rows import fullest_frame, require, rows_of
 from roughvisc.variables import axis_of
-from roughvisc.views.figures.files import write_figure
-from roughvisc.views.figures.rows import fullest_frame, require, rows_of
 
 if TYPE_CHECKING:  # for editors; at run time each is imported when it is first used
     from matplotlib.figure import Figure
@@ -24,21 +24,19 @@ if TYPE_CHECKING:  # for editors; at run time each is imported when it is first 
 
 #: Public function -> module that it is imported from when it is first used.
 _HOMES = {
-    "animate": "figures.animate",
-    "animation": "figures.animate",
-    "area_against_load": "figures.histories",
-    "budget": "figures.budget",
-    "friction": "figures.friction",
-    "friction_against_distance": "figures.friction",
-    "friction_of_cases": "sweep_figures.curves",
-    "histories_of_cases": "sweep_figures.curves",
-    "history": "figures.histories",
-    "maps": "figures.fields",
-    "save_sweep_figures": "sweep_figures.files",
-    "section": "figures.sections",
-    "surface": "figures.surfaces",
-    "sweep": "sweep_figures.sweeps",
-    "trade": "figures.trade",
+    "animate": "animations",
+    "animation": "animations",
+    "area_against_load": "histories",
+    "budget": "budgets",
+    "friction": "friction_curves",
+    "friction_against_distance": "friction_curves",
+    "history": "histories",
+    "maps": "fields",
+    "save_sweep_figures": "sweep_files",
+    "section": "sections",
+    "surface": "surfaces",
+    "sweep": "sweeps",
+    "trade": "trades",
 }
 __all__ = sorted([*_HOMES, "save_figures"])
 
@@ -46,7 +44,7 @@ __all__ = sorted([*_HOMES, "save_figures"])
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = getattr(import_module(f"roughvisc.views.{_HOMES[name]}"), name)
+    globals()[name] = getattr(import_module(f"roughvisc.plot.{_HOMES[name]}"), name)
     return globals()[name]
 
 

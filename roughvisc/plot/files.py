@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import InputError
+from roughvisc.plot import style
 from roughvisc.study.storage.files import atomic_write
-from roughvisc.views.figures import style
 
 
 def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:

@@ -7,8 +7,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc import observables
+from roughvisc.plot.fields import plane_ratio, plane_unit
 from roughvisc.topography.grid import labelled
-from roughvisc.views.figures.fields import plane_ratio, plane_unit
 
 LENGTH, WIDTH, COUNT = 200e-6, 2e-6, 50
 CELL = LENGTH / COUNT * WIDTH

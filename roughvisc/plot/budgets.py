@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
+from roughvisc.plot import style
+from roughvisc.plot.rows import RowAxis
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, axis_of
-from roughvisc.views.figures import style
-from roughvisc.views.figures.rows import RowAxis
 
 #: Bars of sources that raise and lower the number, and of those that only do one of the two.
 _BOTH, _ONE = style.BLUE, style.ORANGE

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 import roughvisc as rv
+from roughvisc.plot import coarsened
 from roughvisc.study.storage import store
-from roughvisc.views.figures import coarsened
 
 SHAPE, CELL = (50, 37), (2e-6, 3e-6)
 

@@ -14,11 +14,11 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.plot import fields, style
+from roughvisc.plot.coarsened import note, touching
+from roughvisc.plot.rows import RowAxis, fullest_frame, require, rows_of, spread_frames
 from roughvisc.units import unit_for
 from roughvisc.variables import FIELDS, VARIABLES
-from roughvisc.views.figures import fields, style
-from roughvisc.views.figures.coarsened import note, touching
-from roughvisc.views.figures.rows import RowAxis, fullest_frame, require, rows_of, spread_frames
 
 
 def _writer(path: Path, rate: float):

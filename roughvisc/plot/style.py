@@ -13,7 +13,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from roughvisc.errors import printable
 
@@ -154,6 +154,28 @@ def plain_log_ticks(axis: Axis, *, fine: bool, most: int = 99) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if fine else (1.0,), numticks=most))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def readable_ticks(axis: Axis, low: float, high: float, logarithmic: bool) -> None:
+    """Ticks at round values; on a logarithmic axis plain numbers, or powers of ten where some would not read well."""
+    if not logarithmic:
+        axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]))
+        return
+    plain_log_ticks(axis, fine=high < 300 * low, most=12)
+    if low < 0.9e-3 or high >= 1e5:
+        axis.set_major_formatter(LogFormatterSciNotation())
+
+
+def set_scale(axis: Axis, shown: np.ndarray) -> None:
+    """Scale of the y axis of some values: logarithmic for positive ones over two decades, else linear from zero."""
+    low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 1.0)
+    logarithmic = low > 0 and high >= 100 * low
+    if logarithmic:
+        axis.axes.set_yscale("log")
+        axis.axes.set_ylim(low / 1.4, high * 1.4)
+    else:
+        leave_room(axis.axes, shown)
+    readable_ticks(axis, *axis.axes.get_ylim(), logarithmic)
 
 
 def verbatim(text: str) -> str:

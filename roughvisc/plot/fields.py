@@ -22,13 +22,13 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked, leakage
+from roughvisc.plot import style
+from roughvisc.plot.coarsened import note, present, touching
+from roughvisc.plot.rows import RowAxis, frames_at, require, rows_of, telling_frames
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Unit, in_si, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
-from roughvisc.views.figures import style
-from roughvisc.views.figures.coarsened import note, present, touching
-from roughvisc.views.figures.rows import RowAxis, frames_at, require, rows_of, telling_frames
 
 #: Perceptually even maps without the colour of contact: pressure and flux darken as they rise, gap as it closes.
 COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "height": "cividis"}

@@ -10,11 +10,11 @@ from matplotlib.collections import QuadMesh
 from support import lines
 
 import roughvisc as rv
+from roughvisc import plot
 from roughvisc.errors import InputError
+from roughvisc.plot.sweep_files import results_of, sweep_figures
+from roughvisc.plot.sweeps import curves_of
 from roughvisc.study.execution.run import run_case
-from roughvisc.views import plot
-from roughvisc.views.sweep_figures.cases import cases_of
-from roughvisc.views.sweep_figures.files import results_of, sweep_figures
 
 LOADS = [0.01, 0.02, 0.04]
 DECADES = np.geomspace(1e-4, 1.0, 9).tolist()
@@ -106,7 +106,7 @@ def test_sweep__of_two_parameters_as_a_family_of_lines():
 
 def test_sweep__what_follows_from_another_parameter_takes_no_axis():
     ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
-    assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
+    assert [one.key for one in curves_of(ds).parameters] == ["program.0.load"]
     assert plot.sweep(ds).axes[0].get_xlabel() == "Load [mN]"
 
 
@@ -131,33 +131,23 @@ def test_sweep__refuses_what_cannot_be_drawn():
 # ------------------------------------------------------------------------------------------ histories of all cases
 
 
-def test_histories_of_cases__a_line_each_with_a_legend_or_a_bar():
+def test_history_of_a_sweep__a_line_each_with_a_legend_or_a_bar():
     ds = stacked(product(program__0__load=[0.01, 0.02]), by_load)
-    figure = plot.histories_of_cases(ds)
+    figure = plot.history(ds)
     (ax,) = figure.axes
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN", "kept times"]
-    drawn = [line for line in ax.lines if line.get_linestyle() != "None"]  # the others are dots at the kept times
-    for line, load in zip(drawn, (0.01, 0.02), strict=True):
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["10 mN", "20 mN"]
+    for line, load in zip(ax.lines, (0.01, 0.02), strict=True):
         np.testing.assert_allclose(line.get_ydata(), np.array([0.25, 0.5, 0.75, 1.0]) * load**0.9)
-    figure = plot.histories_of_cases(stacked(SWEEPS["hundred"], by_load))
+    figure = plot.history(stacked(SWEEPS["hundred"], by_load))
     assert len(figure.axes[0].lines) == 100
     assert not figure.legends
     assert figure.axes[1].get_yscale() == "log"
     assert figure.axes[1].get_ylabel() == "Load [mN]"
 
 
-def test_sweep__is_drawn_where_the_cases_differ():
+def test_sweep_figures__leave_out_what_is_alike_in_all_cases():
     ds = stacked(SWEEPS["two"], by_load)
-    apart = xr.DataArray([0.1, 1.0, 0.6, 0.2], dims="time") * ds["material.kelvin_viscosity"] ** 0.1
-    figure = plot.sweep(ds.assign(approach=apart.transpose("case", "time") * 1e-6), "approach")
-    assert figure.axes[0].get_title(loc="left") == "t = 100 ms, where the cases differ most"
-    shown = np.concatenate([line.get_ydata() for line in figure.axes[0].lines])
-    np.testing.assert_allclose(sorted(set(shown.round(6))), np.round(np.array(VISCOSITIES) ** 0.1, 6))
-    assert plot.sweep(ds, "contact_area").axes[0].get_title(loc="left") == "t = 10 s", "where they differ at the end"
-    assert [name for name, _, _ in sweep_figures(ds.assign(contact_area=ds.contact_area * [0, 1, 1, 0]))] == [
-        "area",
-        "histories",
-    ], "though the areas are all alike at the end"
+    assert [name for name, _, _ in sweep_figures(ds)] == ["area", "histories"], "the force is that of no parameter"
 
 
 def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
@@ -226,7 +216,7 @@ def test_sweep__of_cases_with_times_of_their_own(folder):
     at_end = [float(one[int(rows) - 1]) for one, rows in zip(held.approach, held.rows, strict=True)]
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
     np.testing.assert_allclose(ax.lines[0].get_ydata(), [scale * value for value in at_end])
-    assert len(plot.histories_of_cases(results, "approach").axes[0].lines) == 6
+    assert [len(ax.lines) for ax in plot.history(results, "approach").axes] == [3, 3], "a panel for each hold"
 
 
 def test_files__of_a_folder(folder, tmp_path):
@@ -245,7 +235,10 @@ def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures)
 
     done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path)])
     assert done.exit_code == 0
-    assert done.output == f"9 figures: {tmp_path}\n"
+    assert done.output == f"3 figures: {tmp_path}\n"
+    done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path), "--all"])
+    assert done.exit_code == 0
+    assert done.output.endswith(f"figures: {tmp_path}\n")
     assert len(list(tmp_path.glob("sweep-*.png"))) == 3
     names = {path.name for path in tmp_path.glob("*-history.png")}
     assert len(names) == 6

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
 from roughvisc.observables import contact
+from roughvisc.plot import style
+from roughvisc.plot.coarsened import largest, summed
+from roughvisc.plot.fields import measured_part, plane_unit
+from roughvisc.plot.rows import RowAxis, at_rows, frame_at, require, rows_of
 from roughvisc.topography.borders import MIRRORED
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures import style
-from roughvisc.views.figures.coarsened import largest, summed
-from roughvisc.views.figures.fields import measured_part, plane_unit
-from roughvisc.views.figures.rows import RowAxis, at_rows, frame_at, require, rows_of
 
 
 def cut_position(dataset: xr.Dataset, frame: int, across: str) -> int:

@@ -14,9 +14,8 @@ from support import lines, refused
 import roughvisc as rv
 from roughvisc import observables, plot
 from roughvisc.errors import InputError
+from roughvisc.plot import animations, rows, sections, style
 from roughvisc.topography.parameters import levelled_parameters
-from roughvisc.views.figures import animate as animation
-from roughvisc.views.figures import rows, sections, style
 
 
 def images(figure):
@@ -31,7 +30,7 @@ def test_every_figure__is_drawn_without_a_warning_and_leaves_no_global_state(dra
     assert dict(matplotlib.rcParams) == before
 
 
-@pytest.mark.parametrize("draw", [plot.history, plot.maps, plot.section])
+@pytest.mark.parametrize("draw", [plot.maps, plot.section])
 def test_figures__refuse_many_cases_and_other_things(draw):
     with pytest.raises(InputError, match=r"ds\.isel\(case=0\)"):
         draw(xr.concat([made.one_frame()] * 2, dim="case"))
@@ -352,7 +351,7 @@ def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):
     ds = made.one_frame()
     with pytest.raises(InputError, match=r"\.gif"):
         plot.animate(ds, tmp_path / "contact.txt")
-    monkeypatch.setattr(animation.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    monkeypatch.setattr(animations.FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(InputError, match="ffmpeg"):
         plot.animate(ds, tmp_path / "contact.mp4")
     with refused("field", "height"):

@@ -11,9 +11,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.plot import style
 from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures import style
 
 #: kind of grid -> marker and colour
 _GRIDS = {

@@ -11,10 +11,11 @@ from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.observables import history
+from roughvisc.plot import style
+from roughvisc.plot.rows import require
+from roughvisc.plot.sweeps import histories
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
-from roughvisc.views.figures import style
-from roughvisc.views.figures.rows import require
 
 _PANELS = (("friction_coefficient", style.BLUE), ("contact_area", style.CONTACT))
 
@@ -99,16 +100,20 @@ _TOLD = {
 
 
 @style.apply
-def friction(dataset: xr.Dataset) -> Figure:
+def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     """Friction coefficient and contact area over the nominal one, against the logarithm of the speed.
 
-    Speeds whose contact is not solved are missing. Bands show the error of the grid, if the result states it.
+    Speeds whose contact is not solved are missing. Bands show the error of the grid, if the result states it. Of a
+    sweep the friction coefficient of all cases is drawn.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of :func:`roughvisc.friction`, or of a study of friction. Merged with the result of
         :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines.
+    reduced : bool
+        Of a sweep: against the speed times the shift factor of the material's temperature, ``a_T V``. Curves of several
+        temperatures then fall on one master curve.
 
     Returns
     -------
@@ -119,6 +124,8 @@ def friction(dataset: xr.Dataset) -> Figure:
     InputError
         If the Dataset is not one of friction over the speed.
     """
+    if "case" in getattr(dataset, "dims", ()):
+        return histories(dataset, "friction_coefficient", over="reduced_speed" if reduced else "")
     for name, *_ in _DRAWN:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
             raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")

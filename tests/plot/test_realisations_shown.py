@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.collections import LineCollection, PolyCollection
 from support import lines
 
-from roughvisc.views import plot
-from roughvisc.views.sweep_figures.cases import cases_of
+from roughvisc import plot
+from roughvisc.plot.sweeps import curves_of
 
 LOADS = np.array([0.01, 0.02, 0.04])
 TIMES = np.array([0.1, 1.0, 10.0])
@@ -16,7 +16,7 @@ FACTORS = np.array([3.0, 0.8, 0.9, 1.1, 1.25])
 BANDED = {
     "sweep": lambda ds: plot.sweep(ds, times=-1),
     "several times": plot.sweep,
-    "histories": plot.histories_of_cases,
+    "histories": plot.history,
 }
 
 
@@ -49,7 +49,7 @@ def test_figures__draw_the_mean_the_band_and_the_scan_itself(draw):
     figure = BANDED[draw](patches())
     (ax,) = figure.axes
     told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert told[-4 if draw == "histories" else -3 :][:3] == [
+    assert told[-3:] == [
         "mean of 4 Gaussian surrogates",
         "95 % prediction interval",
         "measured scan",
@@ -70,13 +70,13 @@ def test_figures__draw_the_mean_the_band_and_the_scan_itself(draw):
 
 def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter():
     ds = patches(1, surface_seed=("realisation", np.arange(7, 12), {"long_name": "surface.seed"}))
-    figure = plot.histories_of_cases(ds)
+    figure = plot.history(ds)
     band = max(one.get_paths()[0].vertices[:, 1].max() for one in figure.axes[0].collections)
     assert figure.axes[0].get_ylim()[1] > band
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "mean of 5 realisations" in told
     assert "measured scan" not in told
-    assert [one.key for one in cases_of(ds).parameters] == ["program.0.load"]
+    assert [one.key for one in curves_of(ds).parameters] == ["program.0.load"]
 
 
 def test_sweep__the_band_of_a_point_alone_is_a_bar():
@@ -93,10 +93,10 @@ def test_cases_of__a_realisation_that_is_missing_does_not_count():
     ds = patches()
     hole = (ds["program_0_load"] == LOADS[1]) & (ds["realisation"] == 3)
     ds = ds.assign(contact_area=ds["contact_area"].where(~hole)).assign_coords(case_key=ds["case_key"].where(~hole, ""))
-    bands = cases_of(ds).bands
-    assert [band.count for band in bands] == [4, 3, 4]
+    curves = curves_of(ds)
+    assert curves.counts == [4, 3, 4]
     low, _ = interval(FACTORS[[1, 2, 4]])
-    assert float(bands[1].lower["contact_area"][-1]) == pytest.approx(3e-7 * LOADS[1] * low)
+    assert curves.frames[1]["lower"].iloc[-1] == pytest.approx(3e-7 * LOADS[1] * low)
 
 
 def test_cases_of__realisations_of_other_times_are_compared_at_common_places():
@@ -105,9 +105,7 @@ def test_cases_of__realisations_of_other_times_are_compared_at_common_places():
     status = xr.Variable(("case", "row"), np.array([[0] * 3, [1] * 3]), {"flag_values": np.arange(4, dtype="int8")})
     coords = {"time": (("case", "row"), times), "rows": ("case", [3, 3]), "realisation": ("case", [1, 2])}
     results = xr.Dataset({"contact_area": area, "status": status}, coords)
-    cases = cases_of(results)
-    (mean,) = cases.members
-    np.testing.assert_allclose(mean["time"], [0, 0.5, 1, 2])
-    np.testing.assert_allclose(mean["contact_area"], 1.5e-8 * mean["time"])
-    assert mean["status"].values.tolist() == [1, 1, 1, 1]
-    assert lines(plot.histories_of_cases(results).axes[0])
+    (mean,) = curves_of(results).frames
+    np.testing.assert_allclose(mean.index, [0, 0.5, 1, 2])
+    np.testing.assert_allclose(mean["value"], 1.5e-8 * mean.index)
+    assert lines(plot.history(results).axes[0])

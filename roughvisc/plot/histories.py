@@ -18,11 +18,12 @@ from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
 from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.observables.derived import material_of
+from roughvisc.plot import style
+from roughvisc.plot.rows import RowAxis, require, rows_of, spans_decades
+from roughvisc.plot.sweeps import histories
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities, unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
-from roughvisc.views.figures import style
-from roughvisc.views.figures.rows import RowAxis, require, rows_of, spans_decades
 
 _PANELS = (
     ("force", style.BLUE),
@@ -107,17 +108,26 @@ def _fraction_axis(ax: Axes, steps: xr.Dataset) -> None:
 
 
 @style.apply
-def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
-    """Draw force, approach, contact area, mean gap, work and rates over the axis of a result.
+def history(
+    dataset: xr.Dataset, quantity: str | None = None, *, by: str | None = None, persson: bool = False
+) -> Figure:
+    """Draw force, approach, contact area, mean gap, work and rates over the axis of a result; of a sweep one of them.
 
     Lines are drawn through every time step, dots at the kept times; if the dots would touch, strokes at the axis mark
     the kept times. Friction is drawn for a program that slides; leak rate and conductance are drawn if the result holds
-    them, a leak rate over decades on a logarithmic axis.
+    them, a leak rate over decades on a logarithmic axis. Of a sweep one quantity of all cases is drawn, coloured by one
+    parameter, with a panel for each value of the others; of realisations their mean, the 95 % prediction interval of a
+    single one and, of a scan, the measured scan.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result.
+        One case's result, or the results of a sweep.
+    quantity : str, optional
+        Of a sweep: a history of every case. Default: the contact area, or the contact fraction of surfaces of several
+        sizes.
+    by : str, optional
+        Of a sweep: dotted key of the parameter that colours the lines. Default: the one with the most numbers.
     persson : bool
         Whether to draw the contact area by Persson's theory too, up to where the load falls: see
         :func:`~roughvisc.observables.area_by_theory`.
@@ -129,8 +139,10 @@ def history(dataset: xr.Dataset, *, persson: bool = False) -> Figure:
     Raises
     ------
     InputError
-        If the Dataset is not one case's result, or holds none of the histories; of Persson's theory, as that.
+        If the Dataset is no result, or holds none of the histories; of Persson's theory, as that.
     """
+    if "case" in getattr(dataset, "dims", ()):
+        return histories(dataset, quantity, by=by)
     require(dataset)
     over = axis_of(dataset.variables)
     dataset = dataset.sortby(over)

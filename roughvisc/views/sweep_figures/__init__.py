@@ -1,1 +1,0 @@
-"""Figures of many results, by what was varied in them."""
