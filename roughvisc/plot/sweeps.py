@@ -26,7 +26,7 @@ from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.plot.case_text import names_of, readable_setting, setting_unit
 from roughvisc.plot.rows import RowAxis, frame_at, spread_frames
-from roughvisc.study.ensembles import statistics
+from roughvisc.study.realisations import statistics
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.parameters import identifier
 from roughvisc.study.sweep_table import DRAWN, ITSELF, REALISATION
