@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import references
 import xarray as xr
+from references import growing_contact
 
 import roughvisc as rv
 from roughvisc import closed_forms
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.closed_forms import growing_contact
 
 long = pytest.mark.long
 ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1
@@ -71,7 +71,7 @@ def step_load(material, duration, tolerance=TOLERANCE):
     times = duration * np.array([0.01, 0.5, 1.0])
     ds = simulate(BALL, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=tolerance)
     assert_a_contact_state(ds)
-    return ds, closed_forms.lee_radok_step(R, material, load).approach(times)
+    return ds, closed_forms.lee_radok(R, material, load).approach(times)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ def test_steps_of_all_sizes_in_one_program():
         program = program.hold(10.0**exponent)
     for material in (ZENER, rv.Prony(1.0, 0.0, (1.0, 1.0, 1.0), (1e-9, 1.0, 1e9))):
         ds = simulate(BALL, material, program, times=program.corners[1:])
-        exact = closed_forms.lee_radok_step(R, material, 0.1 / R).approach(ds.time.values)
+        exact = closed_forms.lee_radok(R, material, 0.1 / R).approach(ds.time.values)
         smallest = float(np.sqrt(exact[0] * R))  # the contact radius: the grid is coarse for it
         assert np.abs(ds.approach.values - exact).max() < (TOLERANCE + GRID / smallest**2) * exact.max()
 
@@ -148,7 +148,7 @@ def test_shortest_segment__is_computed():
     """A segment just as short as may be, after a long one."""
     program = rv.Program().load(0.1 / R, over=1.0).hold(1e9).load(0.2 / R, over=1.0)
     ds = simulate(BALL, ZENER, program, times=program.corners[1:])
-    assert_follows(ds, closed_forms.lee_radok(closed_forms.Paraboloid(R), ZENER, program).approach(ds.time.values))
+    assert_follows(ds, closed_forms.lee_radok(R, ZENER, program).approach(ds.time.values))
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(10_000, marks=long)])

@@ -6,8 +6,8 @@ import pathlib
 import numpy as np
 import pytest
 from references import OnSheet
+from references.indenters import Paraboloid
 
-import roughvisc as rv
 from roughvisc.api import run
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.observables import history
@@ -76,7 +76,7 @@ def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monk
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     ratio, deviation = ({line.get_label(): line.get_data() for line in axes.lines} for axes in figure.axes)
     at, computed = ratio["computed"]
-    ball = rv.closed_forms.Paraboloid(1.0)
+    ball = Paraboloid(1.0)
     on_sheet = OnSheet(ball, Sheet(1.0))
     exact = [float(on_sheet.scaled_force(on_sheet.radius_at_approach(x**2)) / ball.scaled_force(x)) for x in at]
     np.testing.assert_allclose(computed, exact, rtol=5e-3)

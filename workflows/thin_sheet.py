@@ -13,12 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 import roughvisc as rv
-from roughvisc import closed_forms
 
 RADIUS, THICKNESS, MODULUS = 10e-3, 0.1e-3, 1e6  # m, m, Pa
 DEPTHS = np.array([0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0])  # x = sqrt(R delta) / h
 FORMULA = np.polynomial.Polynomial([1, 1.133, 1.283, 0.769, 0.0975])
-BALL = closed_forms.Paraboloid(RADIUS)
 
 
 def main(cells=128, figure="thin_sheet.png"):
@@ -46,11 +44,12 @@ def main(cells=128, figure="thin_sheet.png"):
 
 def force_on_sheet(x, cells):
     """Return the force over that on a half-space at a depth x = sqrt(R delta) / h."""
-    approach = BALL.reduced(x * THICKNESS)
+    approach = (x * THICKNESS) ** 2 / RADIUS
     widest = 2.6 * np.sqrt(2) * x * THICKNESS  # of a thin sheet the contact radius is sqrt(2 R delta)
     ball, press = rv.sphere(RADIUS, widest, cells), rv.Program().approach(approach, over=0)
     ds = rv.simulate(ball, rv.sheet(rv.elastic(MODULUS), THICKNESS), press, tolerance=1e-4, progress=False)
-    return float(ds.force[-1]) / (4 * MODULUS * BALL.scaled_force(x * THICKNESS))  # contact modulus 4 G
+    hertz = 4 * MODULUS * 4 * (x * THICKNESS) ** 3 / (3 * RADIUS)  # contact modulus 4 G
+    return float(ds.force[-1]) / hertz
 
 
 if __name__ == "__main__":

@@ -16,12 +16,12 @@ from layered import (
 )
 from references import ElasticLayer, OnSheet, PunchOnSheet, full_contact_wave
 from references import sheet as sheet_module
+from references.growing_contact import StepLoad
+from references.indenters import Cone, Paraboloid
 from references.layer import layer_complement, layer_factor
 from scipy.special import j0
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms import Cone, Paraboloid
-from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.sheet import Sheet, reduction
 
 POISSON = [(0.0, 0.3), (0.3, 0.3), (0.4, 0.5), (0.5, 0.5), (0.5, 0.0)]

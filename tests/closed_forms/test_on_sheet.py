@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from references import OnSheet, PunchOnSheet
+from references.growing_contact import StepLoad
+from references.indenters import Cone, Paraboloid
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms import Cone, Paraboloid
-from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.sheet import Sheet
 
 #: W. C. Hayes, L. M. Keer, G. Herrmann, L. F. Mockros, J. Biomech. 5 (1972) 541, table 1: force over that of a

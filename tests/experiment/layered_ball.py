@@ -7,9 +7,9 @@ import math
 import sys
 
 from references import ElasticLayer, OnSheet
+from references.indenters import Paraboloid
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms import Paraboloid
 
 THICKNESS, MODULUS = 1e-5, 1e6
 RATIOS = (0.01, 0.1, 0.5, 2.0, 10.0, 100.0)

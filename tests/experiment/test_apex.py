@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import xarray as xr
+from references.indenters import Cone, Paraboloid
 
 import roughvisc as rv
-from roughvisc import closed_forms
 from roughvisc.topography.indenters import highest
 
 UNIT = rv.elastic(0.25)  # contact modulus 1
 INDENTERS = {
-    "sphere": (lambda size, shape: rv.sphere(1.0, size, shape), closed_forms.Paraboloid(1.0)),
-    "cone": (lambda size, shape: rv.cone(1.0, size, shape), closed_forms.Cone(1.0)),
+    "sphere": (lambda size, shape: rv.sphere(1.0, size, shape), Paraboloid(1.0)),
+    "cone": (lambda size, shape: rv.cone(1.0, size, shape), Cone(1.0)),
 }
 #: Contact radii in cells, and cells of a grid that follows the contact with a window, of one solved as a whole, and of
 #: one that has to grow.

@@ -89,7 +89,7 @@ def test_grid_error__is_large_where_no_grid_sees_the_contact():
 def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, control):
     """A cone as data: its peak is in no cell's centre, and force and area under given approach follow from it."""
     cells, side, slope = 24, 1 / 7, 0.01
-    exact = closed_forms.sneddon_cone(slope, 1.0, np.pi / 2 * slope)
+    exact = closed_forms.cone(slope, 1.0, np.pi / 2 * slope)
     x, y = ((np.arange(cells) - cells // 2 - shift) * side for shift in offset)
     height = rv.from_array(-slope * np.hypot(x[:, None], y), side)
     program = rv.Program().load(np.pi / 2 * slope, over=0)

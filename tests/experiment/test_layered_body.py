@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from layered_ball import POISSONS, RATIOS, WIDTHS, errors
 from references import ElasticLayer, OnSheet, PunchOnSheet
+from references.growing_contact import StepLoad
+from references.indenters import Cone, Paraboloid
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms import Cone, Paraboloid
-from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.layer import effective_compliance
 
 SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(4e6, 12e5, 4e5, 0.3)  # in proportion

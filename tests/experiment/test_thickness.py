@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from references import OnSheet, PunchOnSheet, ting
+from references.growing_contact import StepLoad
+from references.indenters import Cone, Paraboloid
 from scipy.interpolate import CubicSpline
 from support import refused
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.closed_forms import Cone, Paraboloid
-from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.case import Case, read_cases
 

@@ -6,11 +6,11 @@ import mpmath
 import numpy as np
 import pytest
 from references import OnSheet
+from references.indenters import Paraboloid
 from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.closed_forms import Paraboloid
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.half_space import love_kernel

@@ -28,13 +28,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from references.fixed_contact import punch_approach, punch_dissipation, punch_force
+from references.growing_contact import StepLoad, lee_radok_step
+from references.indenters import Paraboloid
 from references.layer import ElasticLayer
 from references.sheet import OnSheet
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.body import Body, body_of
-from roughvisc.mechanics.closed_forms.growing_contact import StepLoad
 from roughvisc.mechanics.layer import layer as layer_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.models import elastic, kelvin_voigt, maxwell, zener
@@ -131,7 +132,7 @@ def hertz(cells: int) -> Rows:
 
 def sneddon(cells: int) -> Rows:
     """The pressure is infinite at the apex: the cells about it are left out."""
-    exact, h = closed_forms.sneddon_cone(_SLOPE, 1.0, np.pi / 2 * _SLOPE), _SIZE / cells
+    exact, h = closed_forms.cone(_SLOPE, 1.0, np.pi / 2 * _SLOPE), _SIZE / cells
     ds = _press(cone(_SLOPE, _SIZE, cells), _UNIT, Program().load(np.pi / 2 * _SLOPE, over=0))
     yield "approach", _relative(ds.approach[0], exact.approach), _approach_error(cells)
     yield "contact radius", _relative(_radius(ds), exact.radius), _radius_error(h, 1) + _TOLERANCE
@@ -192,7 +193,7 @@ def _step(cells: int, material: Material) -> tuple[xr.Dataset, StepLoad, float]:
     load = 4 / 3 / _ROUND / float(material.contact_compliance(4.0))
     times = [0.5, 1.0, 2.0, 4.0] if material.contact_compliance(0.0) == 0 else [0.0, 0.5, 1.0, 2.0, 4.0]
     ds = _press(sphere(_ROUND, _SIZE, cells), material, Program().load(load, over=0).hold(4.0), times=times)
-    return ds, closed_forms.lee_radok_step(_ROUND, material, load), _SIZE / cells
+    return ds, lee_radok_step(_ROUND, material, load), _SIZE / cells
 
 
 def _lee_radok(material: Prony) -> Callable[[int], Rows]:
@@ -222,7 +223,7 @@ def _on(bodies: dict[str, tuple[Body, Sheet | ElasticLayer]]) -> Callable[[int],
 
     def rows(cells: int) -> Rows:
         for name, (body, layer) in bodies.items():
-            on = OnSheet(closed_forms.Paraboloid(_ROUND), layer)
+            on = OnSheet(Paraboloid(_ROUND), layer)
             load = float(on.scaled_force(1.0)) / float(_ZENER.contact_compliance(4.0))
             exact = StepLoad(on, _ZENER, load)
             program, times = Program().load(load, over=0).hold(4.0), [0.0, 0.5, 1.0, 2.0, 4.0]

@@ -25,7 +25,7 @@ from scipy.optimize import brentq
 from scipy.special import ive, kve
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.materials.checks import check_number as positive
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities
 

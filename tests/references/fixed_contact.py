@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from references.growing_contact import ContactRelaxation, hereditary_integral
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, hereditary_integral
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program

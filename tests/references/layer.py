@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.materials.checks import check_number as positive
 from roughvisc.units import Quantity, quantities
 
 # Below this, sinh(2x) - 2x and cosh(2x) - 1 - 2x^2 come from their series.

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from references.element_memory import AllForces, Exponentials
+from references.indenters import Indenter
 from references.sheet import OnSheet
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.closed_forms.indenters import Indenter
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.program import Program, Segment
@@ -368,7 +368,7 @@ def reduced_contact(
 
     Examples
     --------
-    >>> from roughvisc.mechanics.closed_forms.indenters import Paraboloid
+    >>> from references.indenters import Paraboloid
     >>> from roughvisc.mechanics.materials.models import elastic
     >>> press = Program().load(4 / 3, over=0.0).load(0.0, over=1.0)
     >>> found = reduced_contact(Paraboloid(1.0), elastic(0.25), press, [0.0, 1.0], steps=20)

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import j0
 
+from references.indenters import Indenter, places, positive, punch_pressure
 from references.layer import ElasticLayer
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import Indenter, places, positive, punch_pressure
 from roughvisc.mechanics.sheet import SHORTEST_WAVE, Sheet, complement, panels
 from roughvisc.units import Quantity, quantities
 
@@ -49,7 +49,7 @@ class OnSheet:
     Parameters
     ----------
     indenter : Indenter
-        The rigid indenter: a :class:`~roughvisc.mechanics.closed_forms.indenters.Paraboloid` or a ``Cone``.
+        The rigid indenter: a :class:`~references.indenters.Paraboloid` or a ``Cone``.
     sheet : Sheet or ElasticLayer
         What it is pressed on.
 
@@ -68,7 +68,7 @@ class OnSheet:
 
     Examples
     --------
-    >>> from roughvisc.mechanics.closed_forms.indenters import Paraboloid
+    >>> from references.indenters import Paraboloid
     >>> thick, thin = (OnSheet(Paraboloid(1.0), Sheet(h, base="slipping")) for h in (1e3, 1e-3))
     >>> round(float(thick.scaled_force(0.1)), 6), round(float(thin.scaled_force(0.1)), 3)  # 4 a^3/3R, pi a^4/4Rh
     (0.001333, 0.079)

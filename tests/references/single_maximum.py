@@ -10,10 +10,10 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
+from references.growing_contact import ContactRelaxation, with_decays
+from references.indenters import Indenter, places
+from references.quadrature import bisect, integrate
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.growing_contact import ContactRelaxation, with_decays
-from roughvisc.mechanics.closed_forms.indenters import Indenter, places
-from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, quantities

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from references.growing_contact import Growing, StepLoad
+from references.indenters import Paraboloid, places, positive, punch_pressure
+from references.quadrature import integrate
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.growing_contact import Growing, StepLoad
-from roughvisc.mechanics.closed_forms.indenters import Paraboloid, places, positive, punch_pressure
-from roughvisc.mechanics.closed_forms.quadrature import integrate
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, quantities
 

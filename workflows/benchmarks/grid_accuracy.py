@@ -24,7 +24,7 @@ NONE = 1e-5
 CASES = {
     "sphere": (rv.sphere, 1 / SLOPE, lambda r: -SLOPE * r**2 / 2,
                rv.closed_forms.hertz(1 / SLOPE, 1.0, LOADS["sphere"])),
-    "cone": (rv.cone, SLOPE, lambda r: -SLOPE * r, rv.closed_forms.sneddon_cone(SLOPE, 1.0, LOADS["cone"])),
+    "cone": (rv.cone, SLOPE, lambda r: -SLOPE * r, rv.closed_forms.cone(SLOPE, 1.0, LOADS["cone"])),
     "punch": (rv.flat_punch, 1.0, lambda r: np.where(r <= 1, 0.0, np.nan),
               rv.closed_forms.flat_punch(1.0, 1.0, LOADS["punch"])),
 }  # fmt: skip

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -50,9 +50,9 @@ def tabor_parameter(
     >>> round(tabor_parameter(1e-3, 3e6, 0.05, 3e-10))
     2175
     """
-    positive("radius", radius, "m")
-    positive("contact_modulus", contact_modulus, "Pa")
-    positive("attraction_range", attraction_range, "m")
+    check_number("radius", radius, "m")
+    check_number("contact_modulus", contact_modulus, "Pa")
+    check_number("attraction_range", attraction_range, "m")
     return float(np.cbrt(radius * (work_of_adhesion / contact_modulus) ** 2) / attraction_range)
 
 
@@ -89,7 +89,7 @@ def pull_off_force(radius: Quantity, work_of_adhesion: Quantity, tabor: float = 
     >>> pull_off_force(1.0, 1.0) / math.pi, pull_off_force(1.0, 1.0, tabor=0.0) / math.pi
     (1.5, 2.0)
     """
-    positive("radius", radius, "m")
+    check_number("radius", radius, "m")
     grown = 4.04 * (_MAUGIS * tabor) ** 1.4
     share = 1.0 if math.isinf(grown) else (grown - 1) / (grown + 1)
     return math.pi * work_of_adhesion * radius * (7 - share) / 4
@@ -122,8 +122,8 @@ def punch_pull_off(radius: Quantity, contact_modulus: Quantity, work_of_adhesion
     >>> round(punch_pull_off(1e-3, 3e6, 0.05), 4)
     0.0614
     """
-    positive("radius", radius, "m")
-    positive("contact_modulus", contact_modulus, "Pa")
+    check_number("radius", radius, "m")
+    check_number("contact_modulus", contact_modulus, "Pa")
     return math.sqrt(8 * math.pi * radius**3 * contact_modulus * work_of_adhesion)
 
 
@@ -205,10 +205,10 @@ def rough_attraction(
     >>> round(rough_attraction(0.1, 1e8, 1e11, 0.05, 3e-10), 3)  # h' / h'' = 1 nm: a stiff surface, rough to the atoms
     0.071
     """
-    positive("rms_slope", rms_slope, "1")
-    positive("rms_laplacian", rms_laplacian, "1/m")
-    positive("contact_modulus", contact_modulus, "Pa")
-    positive("attraction_range", attraction_range, "m")
+    check_number("rms_slope", rms_slope, "1")
+    check_number("rms_laplacian", rms_laplacian, "1/m")
+    check_number("contact_modulus", contact_modulus, "Pa")
+    check_number("attraction_range", attraction_range, "m")
     width = (rms_laplacian * attraction_range / rms_slope**2) ** (2 / 3)
     pulled = _REPULSION * work_of_adhesion / (rms_slope * contact_modulus * attraction_range)
     return math.pi * (3 / 16) ** (2 / 3) * pulled * width

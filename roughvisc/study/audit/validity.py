@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import positive
+from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.units import Quantity, quantities
 
@@ -146,9 +146,9 @@ def radiation_lag(radius: Quantity, shear_modulus: Quantity, density: Quantity) 
     >>> round(radiation_lag(1e-3, 1e6, 1000.0) * 1e6)  # a millimetre of rubber: microseconds
     27
     """
-    positive("radius", radius, "m")
-    positive("shear_modulus", shear_modulus, "Pa")
-    positive("density", density, "kg/m3")
+    check_number("radius", radius, "m")
+    check_number("shear_modulus", shear_modulus, "Pa")
+    check_number("density", density, "kg/m3")
     return 3.4 / 4 * radius * math.sqrt(density / shear_modulus)
 
 
@@ -191,9 +191,9 @@ def moving_load_excess(speed: Quantity, shear_modulus: Quantity, density: Quanti
     >>> round(moving_load_excess(3.0, 1e6, 1000.0, 0.5), 5), moving_load_excess(31.0, 1e6, 1000.0, 0.5)
     (0.00681, inf)
     """
-    positive("speed", speed, "m/s")
-    positive("shear_modulus", shear_modulus, "Pa")
-    positive("density", density, "kg/m3")
+    check_number("speed", speed, "m/s")
+    check_number("shear_modulus", shear_modulus, "Pa")
+    check_number("density", density, "kg/m3")
     square, ratio = density * speed**2 / shear_modulus, (1 - 2 * poisson) / (2 - 2 * poisson)
     if not square < 1:
         return math.inf
@@ -254,10 +254,10 @@ def flash_temperature(
     """
     if not 0 <= heat_flux < math.inf:
         raise InputError(f"heat_flux is {heat_flux!r}: expected a number >= 0 [W/m2]")
-    positive("radius", radius, "m")
-    positive("speed", speed, "m/s")
-    positive("heat_conductivity", heat_conductivity, "W/m/K")
-    positive("volumetric_heat_capacity", volumetric_heat_capacity, "J/(m3 K)")
+    check_number("radius", radius, "m")
+    check_number("speed", speed, "m/s")
+    check_number("heat_conductivity", heat_conductivity, "W/m/K")
+    check_number("volumetric_heat_capacity", volumetric_heat_capacity, "J/(m3 K)")
     peclet = speed * radius * volumetric_heat_capacity / heat_conductivity
     # int (1 - t^2)^(3/4) dt over (-1, 1) is B(1/2, 7/4)
     beta = math.sqrt(math.pi) * math.gamma(7 / 4) / math.gamma(9 / 4)

@@ -8,7 +8,6 @@ import pytest
 import references
 
 import roughvisc as rv
-from roughvisc.mechanics.closed_forms.growing_contact import lee_radok_step
 
 ROWS = np.geomspace(1e-6, 10.0, 60)
 LAWS = [rv.power_law(glassy, 1.0, exponent) for glassy in (0.3, 0.01) for exponent in (0.1, 0.5)]
@@ -70,11 +69,10 @@ def test_sphere__follows_lee_and_radok_from_the_jump_on():
     ball, settings = rv.sphere(1e-3, 2e-4, 65), {"fields": (), "progress": False}
     elastic = rv.elastic(1e6)
     press = rv.Program().load(5e-4, over=0)
-    grid = rv.simulate(ball, elastic, press, **settings).approach[-1] / lee_radok_step(1e-3, elastic, 5e-4).approach(
-        0.0
-    )
+    at_once = rv.closed_forms.lee_radok(1e-3, elastic, 5e-4).approach(0.0)
+    grid = rv.simulate(ball, elastic, press, **settings).approach[-1] / at_once
     ds = rv.simulate(ball, material, press.hold(10.0), times=times, **settings)
-    exact = lee_radok_step(1e-3, material, 5e-4).approach(np.array(times)) * float(grid)
+    exact = rv.closed_forms.lee_radok(1e-3, material, 5e-4).approach(np.array(times)) * float(grid)
     assert ds.approach.values == pytest.approx(exact, rel=1e-3, abs=0)
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import references
 from references import sticking_stiffness
+from references.indenters import Paraboloid
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics import closed_forms as cf
@@ -105,7 +107,7 @@ def test_conformal_energy__is_half_the_work_of_the_pressure_that_flattens_a_wave
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.4, "bonded"), (0.5, "bonded"), (0.5, "slipping")])
 def test_half_space_excess__is_near_the_fredholm_equation(poisson, base):
-    ball, sheet = cf.Paraboloid(1.0), Sheet(1e-2, poisson, base)
+    ball, sheet = Paraboloid(1.0), Sheet(1e-2, poisson, base)
     for a in (2e-4, 1e-3, 5e-3, 1e-2, 2e-2):
         force, approach = float(ball.scaled_force(a)), float(ball.reduced(a))
         there = references.OnSheet(ball, sheet)
@@ -144,7 +146,7 @@ def test_sticking_stiffness__goes_to_one_of_incompressible_bodies():
 
 def test_adhesion__refuses_what_is_not_positive():
     for bad in (0.0, -1.0, math.nan):
-        with pytest.raises(InputError, match="radius is"):
+        with refused("radius", bad):
             adhesion.pull_off_force(bad, 0.05)
-        with pytest.raises(InputError, match="contact_modulus is"):
+        with refused("contact_modulus", bad):
             adhesion.tabor_parameter(1.0, bad, 0.05, 3e-10)

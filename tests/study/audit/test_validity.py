@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from references import OnSheet
+from references.indenters import Paraboloid
 from scipy import special
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms import Paraboloid
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.audit import validity
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from references.indenters import Indenter, Paraboloid, places, positive
+from references.quadrature import bisect, integrate
 from roughvisc.errors import InputError
-from roughvisc.mechanics.closed_forms.indenters import Indenter, Paraboloid, places, positive
-from roughvisc.mechanics.closed_forms.quadrature import bisect, integrate
 from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program

@@ -1,0 +1,458 @@
+"""Closed forms of frictionless normal contact, to compare results with.
+
+Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``, viscoelastic ones a material with
+the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.checks import check_number
+from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.program import Program
+from roughvisc.units import Quantity, quantities
+
+__all__ = [
+    "cone",
+    "flat_punch",
+    "full_contact_pressure",
+    "hertz",
+    "johnson_greenwood_higginson",
+    "lee_radok",
+    "westergaard",
+]
+
+Array = NDArray[np.float64]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def _from_axis(r: ArrayLike) -> Array:
+    """Return distances from the axis, not negative. [m]"""
+    return np.abs(np.asarray(r, dtype=float))
+
+
+@dataclass(frozen=True)
+class RoundContact:
+    """Elastic contact of an axisymmetric indenter with a half-space.
+
+    Attributes
+    ----------
+    radius, approach, force : float
+        Contact radius [m], rigid-body approach from first touch [m], normal force [N].
+    pressure : callable
+        Pressure at distances from the axis, zero outside the contact. [m] -> [Pa]
+    displacement : callable
+        Normal displacement of the surface at distances from the axis, inside and outside the contact. [m] -> [m]
+    """
+
+    radius: float
+    approach: float
+    force: float
+    pressure: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
+    displacement: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
+
+    @property
+    def peak_pressure(self) -> float:
+        """Pressure at the centre; infinite under a cone. [Pa]"""
+        return float(self.pressure(0.0))
+
+
+@quantities(sphere_radius="m", contact_modulus="Pa", force="N")
+def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
+    r"""Elastic contact of a paraboloid ``r^2 / (2 R)`` (Hertz).
+
+    Parameters
+    ----------
+    sphere_radius : float or str
+        Radius of curvature ``R``. [m]
+    contact_modulus : float or str
+        ``E*``. [Pa]
+    force : float or str
+        Normal force ``W``. [N]
+
+    Returns
+    -------
+    RoundContact
+        ``radius``, ``approach``, ``force``, ``peak_pressure``, ``pressure(r)``, ``displacement(r)``.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+
+    Notes
+    -----
+    .. math:: a^3 = \frac{3 W R}{4 E^*}, \quad \delta = \frac{a^2}{R}, \quad
+              p = \frac{2 E^*}{\pi R} \sqrt{a^2 - r^2}
+
+    The displacement outside loses about ``(r/a)^2`` roundings far from the contact.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, sections 3.4 and 4.2.
+
+    Examples
+    --------
+    >>> contact = hertz(sphere_radius=1.0, contact_modulus=0.75, force=1.0)
+    >>> contact.radius, contact.approach
+    (1.0, 1.0)
+    """
+    curvature = check_number("sphere_radius", sphere_radius, "m")
+    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    a = float(np.cbrt(0.75 * curvature * force / modulus))
+
+    def pressure(r: ArrayLike) -> Array:
+        s = _from_axis(r)
+        return np.asarray(2 * modulus / (np.pi * curvature) * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
+
+    def displacement(r: ArrayLike) -> Array:
+        s = _from_axis(r)
+        out = np.maximum(s, a)
+        outside = (2 * a**2 - out**2) * np.arcsin(a / out) + a * np.sqrt((out - a) * (out + a))
+        return np.asarray(np.where(s <= a, (2 * a**2 - s**2) / 2, outside / np.pi) / curvature)
+
+    return RoundContact(a, a**2 / curvature, force, pressure, displacement)
+
+
+@quantities(contact_modulus="Pa", force="N")
+def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundContact:
+    r"""Elastic contact of a cone ``m r`` (Sneddon).
+
+    Parameters
+    ----------
+    slope : float
+        Slope ``m`` of the cone's side. [-]
+    contact_modulus : float or str
+        ``E*``. [Pa]
+    force : float or str
+        Normal force ``W``. [N]
+
+    Returns
+    -------
+    RoundContact
+        As for :func:`hertz`; the pressure at the apex is infinite.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+
+    Notes
+    -----
+    .. math:: W = \frac{\pi}{2} E^* m a^2, \quad \delta = \frac{\pi}{2} m a, \quad
+              p = \frac{E^* m}{2} \operatorname{arcosh} \frac{a}{r}
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 5.2.
+    """
+    slope = check_number("slope", slope, "1")
+    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    a = float(np.sqrt(2 * force / (np.pi * modulus * slope)))
+
+    def pressure(r: ArrayLike) -> Array:
+        s = _from_axis(r)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # arcosh(1 + e) without the rounding of 1 + e, which would be the whole value near the edge
+            excess = np.where(s < a, (a - s) / s, 0.0)
+            return np.asarray(modulus * slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
+
+    def displacement(r: ArrayLike) -> Array:
+        s = _from_axis(r)
+        out = np.maximum(s, a)
+        outside = a * np.arcsin(a / out) - out + np.sqrt((out - a) * (out + a))
+        return np.asarray(slope * np.where(s <= a, np.pi / 2 * a - s, outside))
+
+    return RoundContact(a, np.pi / 2 * slope * a, force, pressure, displacement)
+
+
+@quantities(radius="m", contact_modulus="Pa", force="N")
+def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
+    r"""Elastic contact of a rigid cylinder with a flat end (Boussinesq).
+
+    Parameters
+    ----------
+    radius : float or str
+        Radius ``a`` of the punch. [m]
+    contact_modulus : float or str
+        ``E*``. [Pa]
+    force : float or str
+        Normal force ``W``. [N]
+
+    Returns
+    -------
+    RoundContact
+        As for :func:`hertz`; the pressure at the edge is infinite.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+
+    Notes
+    -----
+    .. math:: \delta = \frac{W}{2 E^* a}, \quad p = \frac{W}{2 \pi a \sqrt{a^2 - r^2}}
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
+    """
+    a = check_number("radius", radius, "m")
+    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    approach = force / (2 * modulus * a)
+
+    def pressure(r: ArrayLike) -> Array:
+        s = _from_axis(r)
+        with np.errstate(divide="ignore"):
+            inside = force / (2 * np.pi * a * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
+        return np.asarray(np.where(s <= a, inside, 0.0))
+
+    def displacement(r: ArrayLike) -> Array:
+        return np.asarray(2 / np.pi * approach * np.arcsin(a / np.maximum(_from_axis(r), a)))
+
+    return RoundContact(a, approach, force, pressure, displacement)
+
+
+@dataclass(frozen=True)
+class WavyContact:
+    """Elastic contact of a one-dimensional cosine wave with a half-space, per period.
+
+    Attributes
+    ----------
+    half_width : float
+        Half-width of a contact strip; half the wavelength in full contact. [m]
+    contact_fraction : float
+        Contact area over nominal area. [-]
+    full_contact_pressure : float
+        Mean pressure ``p*`` at which the contact becomes full. [Pa]
+    pressure : callable
+        Pressure at distances from a crest, zero outside the contact. [m] -> [Pa]
+    """
+
+    half_width: float
+    contact_fraction: float
+    full_contact_pressure: float
+    pressure: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
+
+
+@quantities(amplitude="m", wavelength="m", contact_modulus="Pa", mean_pressure="Pa")
+def westergaard(
+    amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, mean_pressure: Quantity
+) -> WavyContact:
+    r"""Elastic contact of the profile ``amplitude cos(2 pi x / wavelength)``, plane strain (Westergaard).
+
+    Parameters
+    ----------
+    amplitude : float or str
+        Amplitude ``a`` of the cosine: half its height from trough to crest. [m]
+    wavelength : float or str
+        Period ``l``. [m]
+    contact_modulus : float or str
+        ``E*``. [Pa]
+    mean_pressure : float or str
+        Force over nominal area. [Pa]
+
+    Returns
+    -------
+    WavyContact
+        ``half_width``, ``contact_fraction``, ``full_contact_pressure``, ``pressure(x)`` with a crest at zero.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite.
+
+    Notes
+    -----
+    .. math:: p^* = \frac{\pi E^* a}{l}, \quad \sin^2 \frac{\pi b}{l} = \frac{\bar p}{p^*}, \quad
+              p = 2 p^* \cos\frac{\pi x}{l} \sqrt{\sin^2 \frac{\pi b}{l} - \sin^2 \frac{\pi x}{l}}
+
+    At mean pressures of ``p*`` and above contact is full and ``p = pbar + p* cos(2 pi x / l)``.
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 13.2.
+
+    Examples
+    --------
+    >>> contact = westergaard(amplitude=1e-6, wavelength=1e-3, contact_modulus=1e9, mean_pressure=0.5e6 * np.pi)
+    >>> round(contact.contact_fraction, 12)
+    0.5
+    """
+    mean = check_number("mean_pressure", mean_pressure, "Pa")
+    full = full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
+    period = check_number("wavelength", wavelength, "m")
+
+    def pressure(x: ArrayLike) -> Array:
+        phase = np.pi * np.asarray(x, dtype=float) / period
+        if mean >= full:
+            return mean + full * np.cos(2 * phase)
+        return np.asarray(2 * full * np.abs(np.cos(phase)) * np.sqrt(np.maximum(mean / full - np.sin(phase) ** 2, 0.0)))
+
+    fraction = 2 / np.pi * float(np.arcsin(np.sqrt(min(mean / full, 1.0))))
+    return WavyContact(fraction * period / 2, fraction, full, pressure)
+
+
+@quantities(amplitude="m", wavelength="m", contact_modulus="Pa")
+def full_contact_pressure(
+    amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, waves: int = 2
+) -> float:
+    """Mean pressure ``p*`` that closes the gap under a wavy surface.
+
+    Parameters
+    ----------
+    amplitude, wavelength : float or str
+        Of ``a cos(kx)`` (``waves=1``) or ``a cos(kx) cos(ky)`` (``waves=2``), ``k = 2 pi / wavelength``. [m]
+    contact_modulus : float or str
+        ``E*``. [Pa]
+    waves : {1, 2}
+        How many directions are wavy.
+
+    Returns
+    -------
+    float
+        ``pi E* a / l`` or ``sqrt(2) pi E* a / l``. [Pa]
+
+    References
+    ----------
+    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 13.2.
+    """
+    if waves not in (1, 2):
+        raise InputError(key="waves", found=waves, expected="1 or 2")
+    height, period = check_number("amplitude", amplitude, "m"), check_number("wavelength", wavelength, "m")
+    return float(np.sqrt(waves) * np.pi * check_number("contact_modulus", contact_modulus, "Pa") * height / period)
+
+
+def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
+    r"""Limits of the contact fraction of ``a cos(kx) cos(ky)`` on an elastic half-space.
+
+    Parameters
+    ----------
+    mean_over_full : array_like
+        Mean pressure over ``p* = sqrt(2) pi E* a / l`` of :func:`full_contact_pressure`. [-]
+    limit : {"low", "high"}
+        Isolated Hertzian contacts at the crests, or isolated round gaps at the troughs.
+
+    Returns
+    -------
+    ndarray
+        Contact area over nominal area. [-]
+
+    Notes
+    -----
+    With two crests and two troughs in each square of side ``l``, a crest of radius ``l^2 / (4 pi^2 a)`` and a
+    pressure free of singularity around the gap,
+
+    .. math:: \frac{A}{l^2} \to \pi \left(\frac{3 \bar p}{8 \pi p^*}\right)^{2/3}, \qquad
+              1 - \frac{A}{l^2} \to \frac{3}{2 \pi} \left(1 - \frac{\bar p}{p^*}\right)
+
+    References
+    ----------
+    .. [1] K. L. Johnson, J. A. Greenwood, J. G. Higginson, "The contact of elastic regular wavy surfaces",
+       *Int. J. Mech. Sci.* 27 (1985) 383-396.
+    """
+    ratio = np.asarray(mean_over_full, dtype=float)
+    if limit not in ("low", "high"):
+        raise InputError(key="limit", found=limit, expected="'low' or 'high'")
+    if limit == "low":
+        return np.asarray(np.pi * np.cbrt(3 * ratio / (8 * np.pi)) ** 2)
+    return np.asarray(1 - 3 / (2 * np.pi) * (1 - ratio))
+
+
+@dataclass(frozen=True)
+class GrowingContact:
+    """Contact of a sphere with a viscoelastic half-space under a load that never falls.
+
+    Attributes
+    ----------
+    sphere_radius : float
+        Radius of curvature. [m]
+    material : Prony or Creep
+        The half-space.
+    program : Program
+        The load.
+    """
+
+    sphere_radius: float
+    material: Material
+    program: Program
+
+    def radius(self, t: ArrayLike) -> Array:
+        """Contact radius at times ``t``, after a jump. [s] -> [m]"""
+        since = np.asarray(t, dtype=float)
+        crept, load = np.zeros(since.shape), 0.0  # int C dW, a sum over the corners of the program
+        for segment, start in zip(self.program.segments, self.program.corners, strict=False):
+            rise = 0.0 if segment.end is None else segment.end - load
+            age = np.maximum(since - start, 0.0)
+            if segment.duration == 0:
+                crept = crept + np.where(since >= start, rise * self.material.contact_compliance(age), 0.0)
+            elif rise:
+                later = np.maximum(age - segment.duration, 0.0)
+                risen = self.material.contact_integral(age) - self.material.contact_integral(later)
+                crept = crept + rise / segment.duration * risen
+            load += rise
+        return np.asarray(np.cbrt(0.75 * self.sphere_radius * crept))
+
+    def approach(self, t: ArrayLike) -> Array:
+        """Approach at times ``t``, after a jump. [s] -> [m]"""
+        return self.radius(t) ** 2 / self.sphere_radius
+
+
+@quantities(sphere_radius="m", load="N")
+def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Program) -> GrowingContact:
+    r"""A sphere on a viscoelastic half-space under a load that never falls (Lee and Radok).
+
+    Parameters
+    ----------
+    sphere_radius : float or str
+        Radius of curvature ``R``. [m]
+    material : Prony or Creep
+        The half-space.
+    load : float or str, or Program
+        A load ``W`` that is applied at time zero and kept [N], or rising ramps, holds and jumps of load.
+
+    Returns
+    -------
+    GrowingContact
+        ``radius(t)``, ``approach(t)``.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not positive and finite; if the load falls, or the program prescribes something else.
+
+    Notes
+    -----
+    .. math:: a(t)^3 = \tfrac{3}{4} R \int_0^t C(t - s) \, \mathrm dW(s), \quad \delta = \frac{a^2}{R}
+
+    References
+    ----------
+    .. [1] E. H. Lee, J. R. M. Radok, "The contact problem for viscoelastic bodies", *J. Appl. Mech.* 27 (1960)
+       438-444.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> press = lee_radok(1.0, rv.maxwell(shear_modulus=0.1875, viscosity=0.1875), load=1.0)
+    >>> float(press.radius(0.0)), float(press.radius(7.0))
+    (1.0, 2.0)
+    """
+    radius = check_number("sphere_radius", sphere_radius, "m")
+    if not isinstance(load, Program):
+        load = Program().load(check_number("load", load, "N"), over=0)
+    value = 0.0
+    for segment in load.segments:
+        end = value if segment.end is None else segment.end
+        if segment.control != "load" or segment.amplitude or segment.slide or end < value:
+            raise InputError(key="load", found=load, expected="a load that never falls, without cycles and slides")
+        value = end
+    return GrowingContact(radius, material, load)
