@@ -283,7 +283,7 @@ def solve(
         folder,
         watch=watch(),
         client=client,
-        workers=workers,
+        workers=workers if client is None else None,
         threads=threads,
         retry_failed=True,
     )

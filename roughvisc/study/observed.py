@@ -1,4 +1,4 @@
-"""What a study asks to be observed: derived from its finished results, and added to their files."""
+"""``observe``: derived quantities of finished results, added to their files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
 
-#: Attribute of a result that says with what its observables were asked, as JSON.
+#: Attribute of a result: the arguments of each observable that it contains, as JSON.
 OBSERVED = "observed"
 
 
@@ -83,8 +83,9 @@ def _add(case: Case, path: Path) -> bool:
     require_writable(path.parent, f"since {path.name} lacks what is to be observed")
     with lock_case(lock_path(path.parent, case.key)), open_result(path) as result:  # read again: it may have changed
         lacking = _lacking(case, result)
+        frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame
         try:
-            found = asked(_frame_by_frame(result), lacking).compute()
+            found = asked(frames, lacking).compute()
         except InputError as error:
             raise error.prefixed(str(path)) from error
         known = json.loads(result.attrs.get(OBSERVED, "{}")) | lacking
@@ -101,8 +102,3 @@ def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
     """Return the observables that a result does not have, or has for other values."""
     before = json.loads(result.attrs.get(OBSERVED, "{}"))
     return {name: values for name, values in case.observed().items() if before.get(name) != values}
-
-
-def _frame_by_frame(result: xr.Dataset) -> xr.Dataset:
-    """A result whose fields are on Dask, a frame a block."""
-    return result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})

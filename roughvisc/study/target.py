@@ -169,7 +169,8 @@ def choose(
     tell : callable
         Called with the error on each grid, as a sentence.
     client, workers, threads
-        As in :func:`roughvisc.sweep`.
+        As in :func:`roughvisc.sweep`, but without a client in this process by default: most solves wait for a coarser
+        one.
 
     Returns
     -------
@@ -189,7 +190,7 @@ def choose(
     targets = targets_of(want)
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
-    solved = partial(solve, folder=folder / FOLDER, watch=watch, client=client, workers=workers, threads=threads)
+    solved = partial(solve, folder=folder / FOLDER, watch=watch, client=client, workers=workers or 0, threads=threads)
     height, smallest = case.height(), min(targets.values())
     base = with_rows(case, [*case.settings.fields, *(field for one in observed for field in one.fields)])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from distributed import Client, LocalCluster
 from support import refused
 
 import roughvisc as rv
@@ -375,6 +376,17 @@ def test_choice__is_where_the_rule_of_three_grids_first_fits(tmp_path):
     assert found.sizes["x"] == fits[0]
     half = float(written(tmp_path, "mean_gap")["half_width"].sel(source="grid").max())
     assert half == pytest.approx(errors[[shape[0] for shape in cells[2:]].index(fits[0])], rel=1e-3)
+
+
+def test_want__is_computed_on_the_default_client(tmp_path):
+    with (
+        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster, set_as_default=False) as client,
+        client.as_current(),
+    ):
+        found = got(case(BALL, tmp_path), tmp_path, {"contact_area": "30 %"})
+        topics = client.get_events()
+    assert found.attrs["case_key"] in str(topics)
 
 
 def test_floor__above_the_wanted_error_is_refused_before_fine_grids_are_solved(tmp_path):
