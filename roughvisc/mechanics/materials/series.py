@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,7 +94,8 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     fits = _fits(material, instants, compliance, tolerance)
     error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
     if material.function is series_creep:
-        exact: Prony = material.parameters[0].scaled(material.time_factor, material.modulus_factor)
+        terms: Prony = material.parameters[0].scaled(material.time_factor, material.modulus_factor)
+        exact = replace(terms, poisson=material.poisson)  # that of a table's terms is the default
         if error > tolerance or len(found.times) >= len(exact.times):
             return exact, 0.0
     return found, error

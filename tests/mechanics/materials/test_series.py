@@ -139,6 +139,15 @@ def test_series__of_a_pair_is_the_sum(factors):
     assert hidden < 1e-3 * alone
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-9])
+def test_series__of_a_table_has_its_poisson_ratio(tolerance):
+    t = np.geomspace(1e-3, 1e2, 30)
+    table = rv.creep_table(t, 1e-6 + 1e-6 * t**0.3, poisson=0.2)
+    found, error = series(table, 1e-3, 1e2, tolerance)
+    assert error <= tolerance
+    assert true_error(table, found, 1e-3, 1e2) <= 1.05 * error + 1e-12
+
+
 @pytest.mark.parametrize(
     "wrong",
     [(0.0, 1.0, 1e-3), (2.0, 1.0, 1e-3), (1.0, np.inf, 1e-3), (1.0, 2.0, 0.0), (1.0, 2.0, np.nan), (1.0, 2e3, 1e-3)],
