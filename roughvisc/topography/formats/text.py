@@ -55,38 +55,31 @@ def read_headed(path: Path) -> ScanFile:
 
 def read_csv(path: Path) -> ScanFile:
     """Read separated values: of one maker, points, or a matrix."""
-    return _read(path, "csv", points=True)
+    text = read_text(path)
+    return _of_a_maker(text) or _points(separated_by_blanks(text)) or _matrices(path, "csv", text)
 
 
 def read_points(path: Path) -> ScanFile:
     """Read points x, y, z, one on each line, in any order."""
-    found = _read(path, "xyz", points=True)
-    if found.format == "asc":
+    text = read_text(path)
+    found = _of_a_maker(text) or _points(separated_by_blanks(text))
+    if found is None:
         raise ValueError("expected three numbers on each line")
     return found
 
 
 def read_matrix(path: Path) -> ScanFile:
     """Read a matrix of heights, whose rows run along x."""
-    return _read(path, "asc", points=False)
-
-
-def _read(path: Path, format: str, *, points: bool) -> ScanFile:
     text = read_text(path)
-    found = _of_a_maker(text)
-    if found is not None:
-        return found
-    text = separated_by_blanks(text)
-    cloud = _points(text) if points else None
-    if cloud is not None:
-        return cloud
-    if format == "xyz":
-        raise ValueError("expected three numbers on each line")
-    source = io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8")
-    matrices = read_with_surface_topography(path, "asc", source)
+    return _of_a_maker(text) or _matrices(path, "asc", text)
+
+
+def _matrices(path: Path, format: str, text: str) -> ScanFile:
+    source = io.TextIOWrapper(io.BytesIO(separated_by_blanks(text).encode()), encoding="utf-8")
+    found = read_with_surface_topography(path, "asc", source)
     complaints: list[str] = []
-    channels = [_matrix(channel, complaints) for channel in matrices.channels]
-    return replace(matrices, format=format, channels=channels, complaints=complaints)
+    channels = [_matrix(channel, complaints) for channel in found.channels]
+    return replace(found, format=format, channels=channels, complaints=complaints)
 
 
 def _of_a_maker(text: str) -> ScanFile | None:
