@@ -52,16 +52,15 @@ def budget(
         A case, its study file, or a result, whose attribute ``case`` contains the case.
     quantity : str or sequence of str
         ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate``,
-        ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or
-        what is conducted.
+        ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid or
+        the conductivities.
     at : float, str, or a sequence of these, optional
         Times or speeds. Default: all that the study keeps. [s] or [m/s]
     modulus_error, time_scale_error : float or str, optional
         Relative errors of the moduli of the material and of its times at 95 %: of a measured curve, or from batch to
         batch. Without them these sources stay open. [-]
     cutoff : float or str, optional
-        Shortest wavelength of the real surface, where it ends or no longer counts. Without it the waves that the scan
-        does not resolve stay open. [m]
+        Shortest wavelength of the real surface. Without it the waves that the scan does not resolve stay open. [m]
     population : {"patch", "ensemble"}, optional
         Whether the number is of this patch, the default, or of the roughness that it is a sample of.
     out : path, optional
@@ -95,7 +94,7 @@ def budget(
 
     See Also
     --------
-    roughvisc.audit : what the model leaves out.
+    roughvisc.audit : the assumptions of the model.
     """
     found = budgets(
         case,

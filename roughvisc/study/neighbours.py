@@ -47,8 +47,8 @@ _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 _CHANGE = 1.1
 #: Order with which the error of the grid vanishes.
 ORDER = 1.5
-#: Number of other patches. The mean of all patches lies within so many standard deviations of their logarithms in 95
-#: of 100 cases: Student's factor is 2.57, and the spectrum is that of one patch, whose longest waves scatter too.
+#: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
+#: Student's factor is 2.57; their spectrum is the spectrum of one patch, whose longest waves scatter too.
 _PATCHES, _SAMPLE_FACTOR = 6, 3.3
 #: Factor by which the wavelength above which 99 % of the slope lie may exceed the shortest wavelength of the spectrum.
 _SAME = 1.15
@@ -65,7 +65,7 @@ def is_data(case: Case) -> bool:
 
 
 def is_sample(case: Case, height: xr.DataArray) -> bool:
-    """Return whether the surface stands for a larger one, so that other patches and shorter waves have a meaning."""
+    """Return whether the surface is a sample of a larger one, which has other patches and shorter waves."""
     return case.settings.boundary != "free" and is_data(case) and bool(np.isfinite(height.values).all())
 
 
@@ -164,11 +164,11 @@ def sources_of(
     Parameters
     ----------
     base : Case
-        The case as it is solved.
+        The case.
     height : xarray.DataArray
         Its surface. [m]
     known : mapping
-        What the user states of :data:`KNOWN`, as :func:`roughvisc.budget` takes it.
+        Inputs of :data:`KNOWN`, as in :func:`roughvisc.budget`.
     coarsening : float
         Length of the cells over the length of the cells of the case: the sources are those on this grid.
     three_grids : bool
@@ -333,7 +333,7 @@ def compared(
     places : sequence of float, optional
         Times [s] or speeds [m/s] of the rows. Default: all.
     coarsening : float, optional
-        Take the case on cells so many times as long, at the rows with a force, and a third grid.
+        Use cells that are longer by this factor, rows with a force, and a third grid.
     before : mapping, optional
         Budgets on another grid, from which the rows are taken, and the errors that no grid reduces.
 

@@ -1,4 +1,4 @@
-"""Quantities whose error is asked for: how each is read from a result, and how large its error may be."""
+"""Quantities of a budget or a trade: their values in a result, and factors of their errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``choose``: the grid and the tolerance that give a number as accurately as it is wanted.
+"""``choose``: the grid and the tolerance for a wanted error of a number.
 
 Grids are solved from coarse to fine until the errors of the grid, of the steps and of the other sources together are
 as small as wanted. The other sources, which no grid reduces, are estimated once, on the coarsest grid that resolves
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 #: The tolerance over the target, at first and at least; the largest and the smallest that are chosen.
 _PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
-#: The finest grid has cells ``2**-2`` times as long as the study's; the coarsest of all has so many cells a side.
+#: Level of the finest grid, whose cells are ``2**-2`` times as long as the study's; fewest cells a side of any grid.
 _FINEST, _FEWEST = -2, 12
 #: An error that exceeds the target by less is accepted, since both are rounded in print.
 _ROUNDING = 1.005
@@ -103,7 +103,7 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a text is no target.
+        If a text is not a target.
 
     Examples
     --------
@@ -177,7 +177,7 @@ def choose(
     case : Case
         The case with the chosen grid and tolerance.
     reasons : list of str
-        What was chosen and why, in sentences.
+        The choice and its reasons, in sentences.
     budgets : dict
         Name of each quantity -> its budget.
 
@@ -220,7 +220,7 @@ def choose(
         steps = max(error_of(one, [STEPS]) / math.log1p(targets[name]) for name, one in found.items())
         if before is None and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
-            continue  # steps and solver take too much of what is wanted
+            continue  # steps and solver would take half of the target
         _refuse_missed(case, targets, found, "whatever the grid", _FLOOR)
         if all(error_of(one) <= _ROUNDING * math.log1p(targets[name]) for name, one in found.items()):
             break
@@ -262,7 +262,7 @@ def _refuse_missed(
     sources: Sequence[str] = tuple(_REMEDIES),
     before: Mapping[str, xr.Dataset] | None = None,
 ) -> None:
-    """Refuse targets that cannot be met, with the sources of the error and what would reduce the largest of them.
+    """Refuse targets that cannot be met; the message names the sources, and a remedy for the largest.
 
     With the budgets on the grid `before`, a target is missed if it is so even without a change on the next grid, whose
     error is a part of the last change at least.

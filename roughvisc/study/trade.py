@@ -69,7 +69,7 @@ _COARSER, _FINER = ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)), ((0.5, 1e-3), (0.25,
 _FEWEST, _MOST = 12, 1024
 #: The sharpest tolerance over the tolerance of the reference.
 _SHARPER = 5.0
-#: Kept times in place of all accepted steps, which differ from setting to setting and from grid to grid.
+#: Number of kept times if the study keeps all accepted steps, which differ between settings.
 _FEW = 9
 #: Wall times within this factor are taken as equal.
 _EQUAL = 1.1
@@ -92,7 +92,7 @@ def trade(
     case : Case or path
         A case, or its study file.
     settings : sequence of (float, float), optional
-        Tolerances to measure, each with the length of the cells over that of the study's cells. Default: tolerances
+        Tolerances to measure, each with the length of the cells over the length in the study. Default: tolerances
         from 1e-1 to 1e-3, and coarser grids; also finer grids if the surface is a recipe without conditioning. [-]
     quantity : str or sequence of str
         Numbers whose errors come first, or are compared on request: ``force``, ``leak_rate``, ``thermal_conductance``
@@ -153,7 +153,7 @@ def trade(
     base = _with_common_rows(case, height, fields, {grid for _, grid in wanted})
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
 
-    # work, in units of its own: the number of steps follows the root of the tolerance, iterations hardly change
+    # relative work: the number of steps follows the root of the tolerance, iterations hardly change
     axis = base.experiment().axis
     power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
     work = {one: one[0] ** -power / one[1] ** 2 for one in wanted}
@@ -178,7 +178,7 @@ def trade(
         spent, rate = spent + seconds, seconds / work[one]
         derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
         results[one] = result.assign(derived)
-    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # and the sharpest run if there is no time for these
+    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # without the time for them, the sharpest run
     reference = next((one for one in (*candidates, *sorted(results)) if one in results and one[1] in finest), None)
     if reference is None:
         where = f"{case.origin}: " if case.origin else ""
@@ -342,7 +342,7 @@ def uncertainty(dataset: xr.Dataset, quantity: str) -> float:
 def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     """Return the index of the fastest setting whose error is at most ``target``; None if there is none.
 
-    The error of a setting is the largest of its own and of all sharper tolerances on the same grid, so that a chance
+    The error of a setting is the largest error at this and all sharper tolerances on the same grid, so that a chance
     agreement does not count, plus the uncertainty of the reference. Another grid than the scan's is another surface,
     and not chosen. Among settings of nearly equal times, the first is chosen.
     """

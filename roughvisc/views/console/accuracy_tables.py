@@ -1,4 +1,4 @@
-"""Tables on the command line that say how far a result can be trusted: of an audit, a budget, a trade."""
+"""Tables of an audit, a budget and a trade on the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STYLES = {BROKEN: "bold red", DOUBTFUL: "bold", NOT_KNOWN: "dim"}
 
 
 def audit_table(audit: Audit) -> Group:
-    """What was found, a row an assumption.
+    """Return the verdict on each assumption.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def audit_table(audit: Audit) -> Group:
 
 
 def budget_table(dataset: xr.Dataset) -> Group:
-    """The number with its interval, and its sources: how large, how it was found, what it cost.
+    """Return the number with its interval, and the size, method and cost of each source.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def budget_table(dataset: xr.Dataset) -> Group:
 
 
 def _error(source: xr.Dataset, axis: str) -> str:
-    """Half-width over the rows in %, with its direction."""
+    """Return the range of a half-width over the rows, with its direction."""
     half = np.atleast_1d(source["half_width"].values)
     if str(source["state"].values) != "counted":
         return str(source["state"].values)
@@ -91,7 +91,7 @@ def _error(source: xr.Dataset, axis: str) -> str:
 
 
 def _short(half: float) -> str:
-    """A half-width of a logarithm: in % as long as it is small, then as a factor."""
+    """Return a half-width of a logarithm in %, or as a factor if it is large."""
     if half > 0.5:
         return f"factor {np.exp(half):.2g}"
     percent = 100 * half
