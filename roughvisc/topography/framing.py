@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
@@ -165,10 +166,9 @@ def combine(
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
-    if flip not in (None, "x", "y"):
-        raise InputError(key="flip", found=flip, expected="'x', 'y' or None")
-    if align not in ("grid", "centre"):
-        raise InputError(key="align", found=align, expected="'grid' or 'centre'")
+    if flip is not None:
+        one_of("flip", flip, ("x", "y"))
+    one_of("align", align, ("grid", "centre"))
     if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
         raise InputError(key="offset", found=offset, expected="a pair of lengths, along x and along y [m]")
     apart = [number("offset", d, "m", low=-np.inf) for d in offset]
@@ -176,34 +176,38 @@ def combine(
         raise InputError(key="offset", found=offset, expected="none with align='grid'; align='centre' takes one")
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
-    about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
-    sha = h2.attrs.get("source_sha256")
+    about, sha = "; ".join(str(h2.attrs.get("history", "")).splitlines()), h2.attrs.get("source_sha256")
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
-    if flip is not None:  # heights and marks in the opposite order, along a coordinate that stays
+    if flip is not None:  # heights and masks are reversed along a coordinate that stays
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
         line += f", reversed along {flip}"
     if align == "centre":
-        h1, h2 = _laid_on(h1, h2, apart)
+        h1, h2 = _on_common_cells(h1, h2, apart)
         centre = ", ".join(f"{d:.6g}" for d in apart)
         line += f", its centre ({centre}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
-    _refuse_another_grid(h1, h2)
+    near = [1e-6 * d for d in spacing(h1)]
+    if h1.shape != h2.shape or any(
+        np.abs(h1[a].values - h2[a].values).max() > d for a, d in zip("xy", near, strict=True)
+    ):
+        described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
+        raise InputError(
+            f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
+            "(see also resample and crop)"
+        )
     both = like(h1, h1.values + h2.values)
     lost = {"recipe", "highest", "missing"} | (set() if repeats else {"period"})
     both.attrs = {key: value for key, value in h1.attrs.items() if key not in lost}
-    if _absent_only(h1) and _absent_only(h2) and np.isnan(both.values).any():
+    solid = all(h.attrs.get("missing") == "absent" or np.isfinite(h.values).all() for h in (h1, h2))
+    if solid and np.isnan(both.values).any():
         both.attrs["missing"] = "absent"
-    marks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
-    both = with_filled_points(both, np.logical_or.reduce(marks) if marks else None)
-    methods = sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})
-    return noted(
-        both,
-        line + (f"; the second face: {about}" if about else ""),
-        **({"fill_method": ", ".join(methods)} if methods else {}),
-    )
+    masks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
+    both = with_filled_points(both, np.logical_or.reduce(masks) if masks else None)
+    methods = ", ".join(sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})) or None
+    return noted(both, line + (f"; the second face: {about}" if about else ""), fill_method=methods)
 
 
-def _laid_on(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr.DataArray, xr.DataArray]:
-    """Both faces on those cells of the first that the second covers wholly, laid centre on centre.
+def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return both faces on the cells of the first that the second covers completely.
 
     Parameters
     ----------
@@ -224,15 +228,14 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr
     """
     from scipy.interpolate import RectBivariateSpline  # slow to import
 
-    lengths = [n * d for n, d in zip(h2.shape, spacing(h2), strict=True)]
-    shape = [min(n, max(2, round(length / d))) for n, length, d in zip(h2.shape, lengths, spacing(h1), strict=True)]
+    sides1, sides2 = spacing(h1), spacing(h2)
+    shape = [min(n, max(2, round(n * d2 / d1))) for n, d1, d2 in zip(h2.shape, sides1, sides2, strict=True)]
     if tuple(shape) != h2.shape:
         h2 = resample(h2, (shape[0], shape[1]))
     kept, at = {}, []
-    for axis, d1, d2, by in zip(("x", "y"), spacing(h1), spacing(h2), apart, strict=True):
-        n1, n2 = h1.sizes[axis], h2.sizes[axis]
+    for axis, d1, d2, by in zip(("x", "y"), sides1, spacing(h2), apart, strict=True):
+        n1, n2, side = h1.sizes[axis], h2.sizes[axis], d1 / d2
         lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
-        side = d1 / d2
         covered = (lower >= -_ON_BORDER) & (lower + side <= n2 + _ON_BORDER)
         if covered.sum() < 2:
             raise InputError(
@@ -255,24 +258,6 @@ def _laid_on(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr
     marked = None if filled is None else laid(filled.astype(float), 1) > _ON_BORDER
     x, y = (first[axis].values for axis in ("x", "y"))
     return first, with_coordinates(heights, x, y, h2.attrs, filled=marked)
-
-
-def _absent_only(h: xr.DataArray) -> bool:
-    """Whether there is no material where no height is, if there is such a place at all."""
-    return h.attrs.get("missing") == "absent" or bool(np.isfinite(h.values).all())
-
-
-def _refuse_another_grid(h1: xr.DataArray, h2: xr.DataArray) -> None:
-    same = h1.shape == h2.shape and all(
-        np.abs(h1[axis].values - h2[axis].values).max() <= 1e-6 * d
-        for axis, d in zip(("x", "y"), spacing(h1), strict=True)
-    )
-    if not same:
-        described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
-        raise InputError(
-            f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
-            "(see also resample and crop)"
-        )
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
