@@ -58,6 +58,7 @@ from roughvisc.topography.conditioning import resample as resample
 from roughvisc.topography.conditioning import rotate90 as rotate90
 from roughvisc.topography.conditioning import without_short_waves as without_short_waves
 from roughvisc.topography.example import example_scan as example_scan
+from roughvisc.topography.inspection import inspect as inspect
 from roughvisc.topography.parameters import parameters as parameters
 from roughvisc.topography.readers import from_array as from_array
 from roughvisc.topography.readers import list_channels as list_channels

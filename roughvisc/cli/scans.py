@@ -109,7 +109,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     from roughvisc.plot.files import write_figure
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.bandwidth import level
-    from roughvisc.topography.inspection import inspect_scan
+    from roughvisc.topography.inspection import inspect
     from roughvisc.topography.parameters import parameters
     from roughvisc.topography.readers import list_channels
     from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
@@ -123,7 +123,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     for out in filter(None, (to, card, picture if plot or force else None)):
         if out.exists() and (not force or out.samefile(file)):
             raise InputError(f"{out}: already exists: expected another name" + ("" if force else ", or --force"))
-    levelled, found = level(height), inspect_scan(height)
+    levelled, found = level(height), inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = Console()
     console.print(scan_table(height, parameters(levelled), file.name, channels), "", _advice(found), "", sep="\n")
@@ -174,7 +174,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     from roughvisc.study.first_study import starter_study
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.example import EXAMPLE
-    from roughvisc.topography.inspection import inspect_scan
+    from roughvisc.topography.inspection import inspect
     from roughvisc.units import number
 
     part = number(contact, "1", "contact", above=0, below=1)
@@ -189,7 +189,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
             raise InputError(key=option, found=options[option], expected="FILE, which it belongs to")
         _write_example(source)
     height = _opened(source, options)
-    found = inspect_scan(height)
+    found = inspect(height)
     text = starter_study(source, out, options, found, first_pressure(height, found, part))
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")

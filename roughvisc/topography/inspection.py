@@ -87,8 +87,8 @@ class Inspection:
     rms_slope: float
 
 
-def inspect_scan(h: xr.DataArray) -> Inspection:
-    """Inspect a scan and recommend conditioning steps.
+def inspect(h: xr.DataArray) -> Inspection:
+    """Inspect a scan and recommend conditioning steps, as ``roughvisc scan`` prints them.
 
     Parameters
     ----------
@@ -98,13 +98,23 @@ def inspect_scan(h: xr.DataArray) -> Inspection:
     Returns
     -------
     Inspection
+        Findings, each with its numbers and the advice that follows, and the steps together.
 
     Raises
     ------
     InputError
         If all points are missing, or those present determine no plane.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> found = rv.inspect(rv.open_scan(rv.example_scan()))
+    >>> found.steps
+    {'level': 1, 'filter': 2.2e-06}
+    >>> found.findings["Missing points"].seen
+    'none'
     """
-    h = checked(h, "inspect_scan")
+    h = checked(h, "inspect")
     found: list[Finding] = []
     steps: dict[str, Any] = {}
 
@@ -243,7 +253,7 @@ def _of_the_noise(noise: dict[str, Any] | None, steps: dict[str, Any], cell: flo
 
 
 def _rms(h: xr.DataArray) -> float:
-    require_heights(h, "inspect_scan")
+    require_heights(h, "inspect")
     return float(np.nanstd(h.values))
 
 

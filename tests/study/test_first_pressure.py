@@ -9,7 +9,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.study import first_pressure as first_module
 from roughvisc.study.first_pressure import first_pressure
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.inspection import inspect_scan
+from roughvisc.topography.inspection import inspect
 
 
 def touching(surface, pressure, compliance):
@@ -26,7 +26,7 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     """A rubber of 3 and 1 MPa has the contact compliance 1 / 12 MPa at once and 1 / 3 MPa in the end."""
     monkeypatch.setattr(first_module, "MOST_PRESSED", most)
     scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=1.7e-5, seed=3)
-    found = inspect_scan(scan)
+    found = inspect(scan)
     assert found.boundary == "periodic"
     first = first_pressure(scan, found)
     assert max(first.shape) == min(most, 128)
@@ -39,11 +39,11 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
 
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
-    first = first_pressure(flat, inspect_scan(flat))
+    first = first_pressure(flat, inspect(flat))
     assert (first.pressure, first.late, first.early) == (1e3, 1.0, 1.0)
     heights = np.zeros((33, 33))
     heights[:, 11:22] = -1e-6  # the other two thirds touch under any pressure
     plateaus = rv.from_array(heights, (1e-6, 1e-6))
-    first = first_pressure(plateaus, inspect_scan(plateaus))
+    first = first_pressure(plateaus, inspect(plateaus))
     assert first.pressure > 0
     assert first.late > 0.6

@@ -5,7 +5,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.topography.conditioning import condition
-from roughvisc.topography.inspection import inspect_scan
+from roughvisc.topography.inspection import inspect
 from roughvisc.topography.readers import from_array
 
 SMOOTH = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3)
@@ -20,7 +20,7 @@ def test_spikes__are_counted_and_what_they_do_to_sq():
     places = [(5, 7), (50, 60), (80, 12)]
     for place in places:
         values[place] += 5e-6
-    found = inspect_scan(with_values(values))
+    found = inspect(with_values(values))
     spikes = found.findings["Spikes"].values
     assert spikes["points"] == len(places)
     assert found.steps["outliers"] is True
@@ -28,23 +28,23 @@ def test_spikes__are_counted_and_what_they_do_to_sq():
     assert spikes["rms_with"] > 1.3 * spikes["rms_without"]
     plane = rv.level(SMOOTH)
     assert spikes["rms_without"] == pytest.approx(float(plane.std()), rel=1e-3)
-    assert inspect_scan(SMOOTH).findings["Spikes"].values["points"] == 0
+    assert inspect(SMOOTH).findings["Spikes"].values["points"] == 0
 
 
 def test_steps__leave_out_what_is_not_needed():
     """Of a surface that repeats not even a plane: that would tear it open."""
-    assert inspect_scan(SMOOTH).steps == {"level": 0}
+    assert inspect(SMOOTH).steps == {"level": 0}
 
 
 def test_tilt__and_form_by_their_coefficients():
     x, y = np.meshgrid(SMOOTH.x.values, SMOOTH.y.values, indexing="ij")
-    tilted = inspect_scan(with_values(SMOOTH.values + 0.02 * x - 0.03 * y))
-    both = inspect_scan(SMOOTH)
+    tilted = inspect(with_values(SMOOTH.values + 0.02 * x - 0.03 * y))
+    both = inspect(SMOOTH)
     (x_tilt, y_tilt), slopes = (one.findings["Tilt"].values["slopes"] for one in (both, tilted))
     np.testing.assert_allclose(slopes, (0.02 + x_tilt, -0.03 + y_tilt), rtol=1e-9)
     assert tilted.steps["level"] == 1
     ball = (x - x.mean()) ** 2 / (2 * 1e-3)
-    curved = inspect_scan(with_values(SMOOTH.values + ball))
+    curved = inspect(with_values(SMOOTH.values + ball))
     assert curved.steps["level"] == 2
     form = curved.findings["Form"].values
     assert form["share"] > 0.9
@@ -53,9 +53,9 @@ def test_tilt__and_form_by_their_coefficients():
 
 def test_boundary__is_mirror_where_opposite_borders_differ():
     part = with_values(SMOOTH.values[:50, :41])
-    found = inspect_scan(part)
+    found = inspect(part)
     assert found.boundary == "mirror"
-    assert inspect_scan(SMOOTH).boundary == "periodic"
+    assert inspect(SMOOTH).boundary == "periodic"
     assert found.shape == (50, 41)
     assert found.area == pytest.approx(50e-6 * 41e-6)
 
@@ -66,7 +66,7 @@ def test_noise__of_known_strength_is_found(shape):
         (shape[0] * 1e-6, shape[1] * 1e-6), shape, hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3
     )
     noise = np.random.default_rng(5).normal(0, 2e-9, shape)
-    found = inspect_scan(with_values(smooth.values + noise))
+    found = inspect(with_values(smooth.values + noise))
     noise = found.findings["Noise"].values
     assert noise["floor"]
     assert noise["rms"] == pytest.approx(2e-9, rel=0.1)
@@ -77,7 +77,7 @@ def test_noise__of_known_strength_is_found(shape):
 
 def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():
     steep = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.8, rms_height=1e-7, rolloff=4e-5, seed=3)
-    found = inspect_scan(steep)
+    found = inspect(steep)
     noise = found.findings["Noise"].values
     assert not noise["floor"]
     assert noise["wavelength"] == pytest.approx(2e-6)
@@ -88,7 +88,7 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
     values = SMOOTH.values.copy()
     values[70:, :] = np.nan
     values[10, 10] = values[30, 40] = np.nan
-    found = inspect_scan(with_values(values))
+    found = inspect(with_values(values))
     assert found.findings["Missing points"].values["points"] == 2
     assert found.findings["Holes"].values["share"] == pytest.approx(26 / 96, rel=0.05)
     treated = condition(with_values(values), found.steps)
@@ -102,10 +102,10 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
 def test_noise__between_missing_points_is_found_and_overestimated_a_little(share, off):
     noisy = SMOOTH.values + np.random.default_rng(5).normal(0, 2e-9, SMOOTH.shape)
     gaps = np.random.default_rng(3).random(SMOOTH.shape) < share
-    found = inspect_scan(with_values(np.where(gaps, np.nan, noisy))).findings["Noise"].values
+    found = inspect(with_values(np.where(gaps, np.nan, noisy))).findings["Noise"].values
     assert found["floor"]
     assert 0.95 * 2e-9 < found["rms"] < (1 + off) * 2e-9
-    none = inspect_scan(with_values(np.where(gaps, np.nan, SMOOTH.values))).findings["Noise"].values
+    none = inspect(with_values(np.where(gaps, np.nan, SMOOTH.values))).findings["Noise"].values
     assert not none["floor"], "with as many gaps again the floor of filled points grows"
 
 
@@ -113,8 +113,8 @@ def test_resolution__is_advised_on_after_a_filter_too():
     """A filter at four cells leaves waves that contact does not resolve."""
     fine = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.3, rms_height=1e-7, rolloff=4e-5, shortcut=5e-6, seed=3)
     noise = np.random.default_rng(5).normal(0, 4e-9, fine.shape)
-    found = inspect_scan(with_values(fine.values + noise))
+    found = inspect(with_values(fine.values + noise))
     assert 3e-6 <= found.steps["filter"] < 8e-6
     assert found.findings["Resolution"].values["fine_slopes"] > 0.5
     assert found.findings["Resolution"].advice
-    assert not inspect_scan(SMOOTH).findings["Resolution"].advice
+    assert not inspect(SMOOTH).findings["Resolution"].advice
