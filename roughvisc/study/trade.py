@@ -24,10 +24,10 @@ from roughvisc.mechanics.grid import transform_library
 from roughvisc.steps import steps_of
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.monitor import watcher
-from roughvisc.study.execution.run import compute, is_result_of, result_folder, unconverged
+from roughvisc.study.execution.run import result_folder, unconverged
 from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
-from roughvisc.study.storage.store import NETCDF, result_path
+from roughvisc.study.storage.store import NETCDF
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import AXES, RESULT_FORMAT, Variable, axis_of
@@ -156,28 +156,27 @@ def trade(
     # relative work: the number of steps follows the root of the tolerance, iterations hardly change
     axis = base.experiment().axis
     power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
-    work = {one: one[0] ** -power / one[1] ** 2 for one in wanted}
+    work = {(tolerance, grid): tolerance**-power / grid**2 for tolerance, grid in wanted}
     results: dict[tuple[float, float], xr.Dataset] = {}
     notes: dict[tuple[float, float], str] = {}
-    for one in sorted(wanted, key=work.__getitem__):
-        changed = on_cells(vary(base, {"solve.tolerance": one[0]}), height, one[1])
-        if (expected := work[one] * rate) > budget - spent:
-            notes[one] = f"would take about {expected:.2g} s, {max(budget - spent, 0):.0f} s are left of the budget"
+    for setting in sorted(wanted, key=work.__getitem__):
+        if (expected := work[setting] * rate) > budget - spent:
+            left = max(budget - spent, 0.0)
+            notes[setting] = f"would take about {expected:.2g} s, {left:.0f} s are left of the budget"
             continue
-        if not results and not is_result_of(changed, result_path(folder, changed.key)):
-            compute(changed, progress=False)  # the first solve of a process takes longer
+        changed = on_cells(vary(base, {"solve.tolerance": setting[0]}), height, setting[1])
         try:
             (result,) = solve([changed], folder, watch=partial(watcher, progress, summary=False)).values()
         except RoughviscError as error:
-            notes[one] = str(error).removeprefix(f"{case.origin}: ")
+            notes[setting] = str(error).removeprefix(f"{case.origin}: ")
             continue
         if complaint := unconverged(result):
-            notes[one] = complaint
+            notes[setting] = complaint
             continue
         seconds = float(result["wall_time"].values[-1])
-        spent, rate = spent + seconds, seconds / work[one]
+        spent, rate = spent + seconds, seconds / work[setting]
         derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
-        results[one] = result.assign(derived)
+        results[setting] = result.assign(derived)
     candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # without the time for them, the sharpest run
     reference = next((one for one in (*candidates, *sorted(results)) if one in results and one[1] in finest), None)
     if reference is None:
@@ -225,20 +224,21 @@ def _compared(
         return _differences(results[one], results[other], names) if {one, other} <= results.keys() else missing
 
     rows = []
-    for one in rungs:
-        error, shape, cost = apart(one), shape_on(case, height, one[1]), [math.nan] * 3
-        note = notes.get(one, "")
-        if one[1] < finest:
-            note = note or "finer than the reference, for which there is no time"
-        elif one in results and np.isnan(error).all():
-            note = f"its {AXES[axis].rows} differ from those of the reference"
-        elif one in results:
-            found, steps = results[one], steps_of(results[one])
-            count = found.sizes[axis] if steps is None else steps.sizes["step"]
-            cost = [float(found["wall_time"][-1]), float(found["convolutions"].sum()), float(count)]
-        row: dict[str, Any] = {"setting": _label(*one, shape), "tolerance": one[0], "coarsening": one[1]}
-        row |= {"cells_x": shape[0], "cells_y": shape[1], "note": note, "error": missing if note else error}
-        rows.append(row | dict(zip(("run_time", "transforms", "steps"), cost, strict=True)))
+    for tolerance, grid in rungs:
+        setting, shape = (tolerance, grid), shape_on(case, height, grid)
+        found, note, error = results.get(setting), notes.get(setting, ""), apart(setting)
+        if grid < finest:
+            found, note = None, note or "finer than the reference, for which there is no time"
+        elif found is not None and np.isnan(error).all():
+            found, note = None, f"its {AXES[axis].rows} differ from those of the reference"
+        row = {"setting": _label(tolerance, grid, shape), "tolerance": tolerance, "coarsening": grid, "note": note}
+        row |= {"cells_x": shape[0], "cells_y": shape[1], "error": missing}
+        row |= {"run_time": math.nan, "transforms": math.nan, "steps": math.nan}
+        if found is not None:
+            steps = steps_of(found)
+            row |= {"run_time": float(found["wall_time"][-1]), "transforms": float(found["convolutions"].sum())}
+            row |= {"steps": found.sizes[axis] if steps is None else steps.sizes["step"], "error": error}
+        rows.append(row)
     columns = {name: (VARIABLES[name].dims, [row[name] for row in rows]) for name in rows[0]}
     table = xr.Dataset(columns, {"quantity": list(names)})
     table = table.set_coords(["tolerance", "coarsening", "cells_x", "cells_y"])
