@@ -105,14 +105,17 @@ def _valid(how: Reading) -> Reading:
 def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     """Return the heights of a channel over x and y. [m]"""
     xy, z = _metres(channel, how)
-    raw = channel.load()
     sides, spacing = channel.spacing, how.spacing
+    if how.grid is not None and (channel.kind != "points" or spacing is not None):
+        raise InputError("grid: expected none for a map, or with spacing", key="grid", found=how.grid, expected="none")
+    raw = channel.load()
     if channel.kind == "points":
-        raw, sides = _of_points(raw, xy, how, file.complaints)
-    elif how.grid is not None:
-        raise InputError("it holds a grid, not points: expected no grid", key="grid", found=how.grid)
-    values = np.asarray(raw.values if isinstance(raw, xr.DataArray) else raw, dtype=float)
-    values = _without_no_data(values, how.no_data, file.complaints)
+        points = raw[np.isfinite(raw[:, :2]).all(axis=1)]
+        points[:, 2] = _without_no_data(points[:, 2], how.no_data, file.complaints)
+        values, sides = _of_points(points, xy, how.grid, file.complaints)
+    else:
+        values = np.asarray(raw.values if isinstance(raw, xr.DataArray) else raw, dtype=float)
+        values = _without_no_data(values, how.no_data, file.complaints)
     values = values if z == 1.0 else values * z
     values = values if how.height_scale is None else values * how.height_scale
     if top_line_first(file.format):
@@ -174,14 +177,14 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
 
 
 def _of_points(
-    points: np.ndarray, metres: float, how: Reading, complaints: list[str]
+    points: np.ndarray, metres: float, grid: float | None, complaints: list[str]
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """Return heights and cell sides of points, in the unit of the file."""
     spread = np.ptp(points[:, :2], axis=0)
     if not spread.all():
         raise InputError("its points lie on one line, a profile: expected an areal scan")
-    if how.grid is not None:
-        side = how.grid / metres
+    if grid is not None:
+        side = grid / metres
         heights, empty = gridded(points, side)
         if empty:
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")

@@ -312,6 +312,20 @@ def test_points__off_any_lattice_ask_for_a_grid_and_count_empty_cells(tmp_path):
     assert float(np.isnan(fine).mean()) < 0.05
 
 
+@pytest.mark.parametrize("options", [{}, {"grid": "6 um"}])
+def test_points__without_data_are_missing_before_they_are_sorted_into_cells(options, tmp_path):
+    some = points()
+    some[:40, 2] = -9999
+    np.savetxt(tmp_path / "p.xyz", some)
+    known = np.delete(some, np.s_[:40], axis=0)
+    np.savetxt(tmp_path / "known.xyz", known)
+    with pytest.warns(UserWarning, match="40 points have the height -9999"):
+        h = open_scan(tmp_path / "p.xyz", unit="um", **options)
+    assert float(np.abs(h).max()) < 3e-6
+    np.testing.assert_array_equal(h, open_scan(tmp_path / "known.xyz", unit="um", **options))
+    np.testing.assert_array_equal(h, open_scan(tmp_path / "p.xyz", unit="um", no_data=-9999, **options))
+
+
 def test_points__two_at_one_node_are_no_lattice(tmp_path):
     some = points()
     np.savetxt(tmp_path / "p.xyz", np.vstack([some, some[:1] + np.array([0, 0, 1.0])]))
@@ -329,6 +343,9 @@ def test_grid__is_refused_for_a_map(tmp_path):
     np.save(tmp_path / "m.npy", ROUGH)
     with refused("grid"):
         open_scan(tmp_path / "m.npy", unit="um", spacing="1 um", grid="2 um")
+    np.savetxt(tmp_path / "p.xyz", points())
+    with refused("grid"):
+        open_scan(tmp_path / "p.xyz", unit="um", spacing="1 um", grid="2 um")
 
 
 def test_x3p__point_cloud_is_points_and_not_a_profile(tmp_path):
