@@ -15,6 +15,7 @@ import xarray as xr
 from PIL import Image
 
 import roughvisc as rv
+from roughvisc.study.case import Case
 
 HERE = Path(__file__).parent
 WORKFLOWS = HERE.parent / "workflows"
@@ -51,7 +52,9 @@ FIGURES = {
         "leakage": lambda ds: rv.plot.maps(ds, fields="flux"),
     },
     "friction": {
-        "curve": lambda ds: rv.plot.friction(ds.merge(rv.observables.persson(ds))),
+        "curve": lambda ds: rv.plot.friction(
+            ds.merge(rv.observables.persson(ds, Case.of_result(ds).body()))
+        ),
         "maps": rv.plot.maps,
     },
     "stability_map": {},  # drawn by its script

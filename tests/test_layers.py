@@ -20,11 +20,6 @@ LAYERS = (
     ("__init__ __main__ api cli",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}
-#: The case in the attributes of a result holds its material and program, and only the study can read it.
-EXCEPTIONS = {
-    ("observables/cycles.py", "roughvisc.study.case"),
-    ("observables/derived.py", "roughvisc.study.case"),
-}
 
 
 def imports(path):
@@ -54,7 +49,7 @@ def test_imports__point_downward():
                 if other != (layer, part) and other[0] >= layer:
                     upward.add((name.as_posix(), module))
             assert part != "mechanics" or package not in ("xarray", "netCDF4", "dask", "matplotlib"), name
-    assert upward == EXCEPTIONS
+    assert not upward
 
 
 def test_import__brings_no_heavy_library():

@@ -15,15 +15,11 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.observables.area_theories import area_by_theory
-from roughvisc.observables.conductance import conductance
-from roughvisc.observables.cycles import cycle_work
-from roughvisc.observables.densities import gap_distribution, pressure_distribution
-from roughvisc.observables.friction_theory import persson
-from roughvisc.observables.frozen import incremental_stiffness
+from roughvisc.observables.conductance import conductance, incremental_stiffness
+from roughvisc.observables.contact import cluster_areas, clusters, contact, distribution
+from roughvisc.observables.histories import cycle_work, history
 from roughvisc.observables.leakage import leakage
-from roughvisc.observables.response import history
-from roughvisc.observables.spots import cluster_areas, clusters, contact
+from roughvisc.observables.theory import area_by_theory, persson
 
 __all__ = [
     "area_by_theory",
@@ -32,12 +28,11 @@ __all__ = [
     "conductance",
     "contact",
     "cycle_work",
-    "gap_distribution",
+    "distribution",
     "history",
     "incremental_stiffness",
     "leakage",
     "persson",
-    "pressure_distribution",
 ]
 
 

@@ -1,19 +1,29 @@
-"""Thermal and electrical conductance of the contact spots."""
+"""Thermal and electrical conductance of the contact spots, and their stiffness against a fast increment of load."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 
+from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.observables.frozen import over_frames
-from roughvisc.observables.resistivity import Kind, resistivities
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
+from roughvisc.mechanics.transport.spots import frozen_contact
+from roughvisc.observables.contact import contact
+from roughvisc.observables.frames import frame_by_frame
+from roughvisc.topography.grid import spacing
+from roughvisc.units import Quantity, is_quantity, number, quantity
+
+#: Unit of each kind of resistivity.
+_UNITS: dict[str, str] = {"thermal": "K m/W", "electrical": "ohm m"}
 
 
-def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Kind | None = None) -> xr.Dataset:
+def conductance(
+    dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Literal["thermal", "electrical"] | None = None
+) -> xr.Dataset:
     r"""Conductance of the contact spots at every kept time.
 
     Parameters
@@ -50,21 +60,83 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind
     ----------
     .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
     """
-    flows, both = resistivities(resistivity, kind)
-    stiffness, error = over_frames(dataset, _punch, outputs=2)
-    name, factor = f"{flows}_conductance", 2 / sum(both)
-    found = {name: factor * stiffness, f"{name}_error": factor * error}
-    described = label(xr.Dataset(found))
+    if isinstance(resistivity, str) or not isinstance(resistivity, Sequence) or len(resistivity) != 2:
+        wanted = 'a list of two, one of each body, in K m/W or, as strings such as "2e-8 ohm m" or with kind, in ohm m'
+        raise InputError(key="resistivity", found=resistivity, expected=wanted)
+    if kind not in (None, *_UNITS):
+        raise InputError(key="kind", found=kind, expected="'thermal' or 'electrical'")
+    if kind is None:
+        texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
+        kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
+    both = [quantity(one, _UNITS[kind], "resistivity") for one in resistivity]
+    if min(both) < 0 or sum(both) == 0:
+        raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
+    stiffness, error = _frozen(dataset, HALF_SPACE)
+    name, factor = f"{kind}_conductance", 2 / sum(both)
+    described = label(xr.Dataset({name: factor * stiffness, f"{name}_error": factor * error}))
     for variable in described.data_vars.values():
-        variable.attrs["resistivity"] = list(both)
+        variable.attrs["resistivity"] = both
     return described
 
 
-def _punch(
-    touching: np.ndarray, present: np.ndarray, *, spacing: tuple[float, float], boundary: Any
-) -> tuple[float, float]:
-    """Stiffness of the spots over the contact modulus, and its error. [m]"""
-    from roughvisc.mechanics.transport.spots import frozen_contact  # slow to import
+def incremental_stiffness(
+    dataset: xr.Dataset, contact_modulus: Quantity, *, kernel: Kernel | None = None
+) -> xr.Dataset:
+    r"""Stiffness of the contact for a fast increment of load at constant contact area.
 
-    found = frozen_contact(touching, spacing, boundary, present=present)
-    return found.stiffness, found.error
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``.
+    contact_modulus : float or str
+        Contact modulus of the increment, :math:`E^* = 2G/(1-\nu)`: its complex magnitude for a small oscillation, the
+        relaxed modulus for a slow increment that does not change the area, the instantaneous modulus :math:`1/C(0)` for
+        a fast one. [Pa]
+    kernel : Kernel, optional
+        Kernel of the body if it is no half-space, such as ``rv.sheet(material, thickness).kernel``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``incremental_stiffness`` [N/m] and ``frozen_stiffness`` [m], the former over the contact modulus, each with its
+        error, over time. Without contact they are zero.
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or is of another body than a half-space and no kernel is
+        given; if the modulus is not positive.
+
+    Notes
+    -----
+    An increment of load increases the pressure like a flat punch with the shape of the contact, because the pressure at
+    a growing edge is zero. The approach is defined as in results: with periodic boundaries on a half-space it is
+    measured to the mean plane. :mod:`roughvisc.mechanics.transport.spots` describes the grid error.
+    """
+    if kernel is None and (named := {"kernel", "thickness"} & dataset.attrs.keys()):
+        name = min(named)
+        raise InputError(
+            key="kernel", found=dataset.attrs[name], expected=f"the kernel of the body, which has a {name}"
+        )
+    modulus = number(contact_modulus, "Pa", "contact_modulus", above=0)
+    stiffness, error = _frozen(dataset, kernel or HALF_SPACE)
+    found = {
+        "incremental_stiffness": stiffness * modulus,
+        "incremental_stiffness_error": error * modulus,
+        "frozen_stiffness": stiffness,
+        "frozen_stiffness_error": error,
+    }
+    return label(xr.Dataset(found))
+
+
+def _frozen(dataset: xr.Dataset, kernel: Kernel) -> Any:
+    """Return the stiffness of the contact over the contact modulus at every kept time, and its error. [m]"""
+    touching = contact(dataset)
+    present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
+    cells, boundary = spacing(dataset, "spots"), dataset.attrs.get("boundary", "free")
+
+    def measure(touching: np.ndarray, present: np.ndarray) -> tuple[float, float]:
+        found = frozen_contact(touching, cells, boundary, present=present, kernel=kernel)
+        return found.stiffness, found.error
+
+    return frame_by_frame(measure, touching, present, outputs=[(), ()])

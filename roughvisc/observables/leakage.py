@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.mechanics.transport.flow import Flow, fluxes
 from roughvisc.mechanics.transport.flow import flow as flow_through
-from roughvisc.observables.derived import need
+from roughvisc.mechanics.transport.flow import fluxes
+from roughvisc.observables.frames import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import LEAK_MEANINGS, axis_of
 
 #: Distance of the bounds, relative, up to which a leak rate counts as known.
 _CERTIFIED = 1e-6
-_FLOWS, _CLOSED, _NOT_CERTIFIED = range(len(LEAK_MEANINGS))
 
 
 @quantities(viscosity="Pa s", pressure_drop="Pa")
@@ -80,40 +79,40 @@ def leakage(
     --------
     >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
     """
-    fluid = {
-        "viscosity": number(viscosity, "Pa s", "viscosity", above=0),
-        "pressure_drop": number(pressure_drop, "Pa", "pressure_drop", above=0),
-    }
-    gap = _gap_of(dataset)
-    drop, wrap = fluid["pressure_drop"] / fluid["viscosity"], _sides_meet(dataset, sides)
+    viscosity = number(viscosity, "Pa s", "viscosity", above=0)
+    pressure_drop = number(pressure_drop, "Pa", "pressure_drop", above=0)
+    boundary = dataset.attrs.get("boundary", "free")
     if along not in ("x", "y"):
         raise InputError(key="along", found=along, expected="'x' or 'y'")
-    cells = spacing(dataset, "leakage")
-    sizes = {"x": cells[0] * gap.sizes["x"], "y": cells[1] * gap.sizes["y"]}
+    if sides not in (None, "closed", "periodic") or (sides == "periodic" and boundary != "periodic"):
+        expected = "'closed' or 'periodic'" if sides != "periodic" else f"'closed', since the boundary is {boundary!r}"
+        raise InputError(key="sides", found=sides, expected=expected)
+    wrap = boundary == "periodic" and sides != "closed"
+    need(dataset, "gap")
+    gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
     across = "y" if along == "x" else "x"
-    turned = cells if along == "x" else cells[::-1]
+    sides_of_cell = cells[along], cells[across]
 
-    def measure(field):
-        if np.isnan(field).all():  # after the last row of a case of a sweep
-            return (np.array([np.nan, np.nan, np.nan, 0]), field, field) if flow else np.array([np.nan] * 3 + [0])
-        found = _flow(field, turned, wrap)
-        numbers = np.array([found.conductance, found.lower, found.upper, _status(found)])
-        return (numbers, *fluxes(field, turned, found.pressure, wrap=wrap)) if flow else numbers
+    def measure(field: np.ndarray) -> tuple[np.ndarray, ...]:
+        missing = int(np.count_nonzero(np.isnan(field)))
+        if missing == field.size:  # after the last row of a case of a sweep
+            return (np.array([np.nan, np.nan, np.nan, 0]), field, field)[: len(outputs)]
+        if missing:
+            raise InputError(
+                f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: what "
+                "the fluid finds there is not known: expected a surface that is cropped, or filled"
+            )
+        found = flow_through(field, sides_of_cell, wrap=wrap)
+        known = found.upper - found.lower <= _CERTIFIED * found.upper
+        status = LEAK_MEANINGS.index("closed" if found.is_closed else "flows" if known else "not_certified")
+        numbers = np.array([found.conductance, found.lower, found.upper, status])
+        return (numbers, *fluxes(field, sides_of_cell, found.pressure, wrap=wrap)) if flow else (numbers,)
 
     outputs = [["number"], [along, across], [along, across]] if flow else [["number"]]
-    found = xr.apply_ufunc(
-        measure,
-        gap,
-        input_core_dims=[[along, across]],
-        output_core_dims=outputs,
-        vectorize=True,
-        dask="parallelized",
-        output_dtypes=[float] * len(outputs),
-        dask_gufunc_kwargs={"output_sizes": {"number": 4}},
-    )
-    numbers, *fields = found if flow else (found,)
+    numbers, *fields = frame_by_frame(measure, gap, outputs=outputs, sizes={"number": 4}, over=(along, across))
     conductance, lower, upper, status = (numbers.isel(number=place) for place in range(4))
-    transmissivity = conductance * (sizes[along] / sizes[across])
+    transmissivity = conductance * (cells[along] * gap.sizes[along] / (cells[across] * gap.sizes[across]))
+    drop = pressure_drop / viscosity
     variables = {
         "leak_rate": conductance * drop,
         "leak_rate_solver_lower": lower * drop,
@@ -125,49 +124,17 @@ def leakage(
     for axis, one in zip((along, across), fields, strict=False):
         variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
-    asked: dict[str, Any] = {"along": along, "sides": "periodic" if wrap else "closed"}
-    described["transmissivity"].attrs |= asked
-    described["hydraulic_aperture"].attrs |= asked
-    for name in ("leak_rate", "leak_rate_solver_lower", "leak_rate_solver_upper"):
-        described[name].attrs |= asked | fluid
+    for name in (
+        "transmissivity",
+        "hydraulic_aperture",
+        "leak_rate",
+        "leak_rate_solver_lower",
+        "leak_rate_solver_upper",
+    ):
+        described[name].attrs |= {"along": along, "sides": "periodic" if wrap else "closed"}
+        if name.startswith("leak"):
+            described[name].attrs |= {"viscosity": viscosity, "pressure_drop": pressure_drop}
     return described
-
-
-def _gap_of(dataset: xr.Dataset) -> xr.DataArray:
-    """The gap, one frame a block."""
-    need(dataset, "gap")
-    gap = dataset["gap"]
-    if gap.dims[-2:] != ("x", "y") or len(gap.dims) < 3:
-        raise InputError(f"leakage: the gap has dimensions {', '.join(map(str, gap.dims))}: expected rows, x, y")
-    return gap.chunk({dim: -1 if dim in ("x", "y") else 1 for dim in gap.dims}) if gap.chunks else gap
-
-
-def _sides_meet(dataset: xr.Dataset, sides: str | None) -> bool:
-    """Whether the two sides along the flow meet."""
-    boundary = dataset.attrs.get("boundary", "free")
-    if sides not in (None, "closed", "periodic"):
-        raise InputError(f"sides is {sides!r}: expected 'closed' or 'periodic'")
-    if sides == "periodic" and boundary != "periodic":
-        raise InputError(f"sides is 'periodic' and the result's boundary is {boundary!r}: expected 'closed'")
-    return boundary == "periodic" and sides != "closed"
-
-
-def _flow(gap: np.ndarray, cells: tuple[float, float], wrap: bool) -> Flow:
-    """Flow through the gap of one frame."""
-    missing = np.count_nonzero(np.isnan(gap))
-    if missing:
-        raise InputError(
-            f"leakage: the gap is missing in {missing} of {gap.size} cells, where the surface is absent: what the "
-            "fluid finds there is not known: expected a surface that is cropped, or filled"
-        )
-    return flow_through(gap, cells, wrap=wrap)
-
-
-def _status(found: Flow) -> int:
-    """Its place among the meanings of ``leak_status``."""
-    if found.is_closed:
-        return _CLOSED
-    return _FLOWS if found.upper - found.lower <= _CERTIFIED * found.upper else _NOT_CERTIFIED
 
 
 def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:

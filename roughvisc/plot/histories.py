@@ -16,11 +16,11 @@ from roughvisc.errors import InputError
 from roughvisc.labels import own_rows
 from roughvisc.observables import area_by_theory
 from roughvisc.observables import history as over_steps
-from roughvisc.observables.area_theories import asperity_fraction, nominal_area_of, persson_fraction
-from roughvisc.observables.derived import material_of
+from roughvisc.observables.theory import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.plot import style
 from roughvisc.plot.rows import RowAxis, require, rows_of, spans_decades
 from roughvisc.plot.sweeps import histories
+from roughvisc.study.case import Case
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import quantities, unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
@@ -148,7 +148,8 @@ def history(
     dataset = dataset.sortby(over)
     steps = steps_of(dataset)
     if persson:
-        theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs))
+        material = Case.of_result(dataset).material()
+        theory = area_by_theory(steps.assign(height=dataset["height"]).assign_attrs(dataset.attrs), material)
         steps = steps.assign(persson_contact_area=theory["persson_contact_area"])
     panels = [panel for panel in _PANELS if panel[0] in dataset]
     if not panels:
@@ -290,7 +291,7 @@ def _stated_moduli(cases: Mapping[str, xr.Dataset]) -> dict[str, float]:
     endless = first.attrs.get("boundary") in ("periodic", "mirror") and not {"thickness", "kernel"} & first.attrs.keys()
     if not (of_one_material and rough and endless):
         return {}
-    known = material_of(first)
+    known = Case.of_result(first).material()
     end = max(float(one["time"][-1]) for one in cases.values())
     named = {"at once": 0.0, f"after {unit_for([end], 's').text(end)}": end}
     compliances = {name: float(known.contact_compliance(time)) for name, time in named.items()}

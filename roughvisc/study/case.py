@@ -262,6 +262,13 @@ class Case:
         return json.dumps(stated)
 
     @classmethod
+    def of_result(cls, dataset: xr.Dataset) -> Case:
+        """Return the case of a result, as its attribute ``case`` states it."""
+        if "case" not in dataset.attrs:
+            raise InputError("the result does not record its case: expected a result of a study", key="case")
+        return cls.from_json(dataset.attrs["case"])
+
+    @classmethod
     def from_json(cls, text: str) -> Case:
         """Make a case from :meth:`to_json`, as the attribute ``case`` of a result contains it."""
         try:

@@ -14,8 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.observables.conductance import conductance
-from roughvisc.observables.frozen import incremental_stiffness
+from roughvisc.observables.conductance import conductance, incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.study.case import Case
 
@@ -91,6 +90,16 @@ def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     return found["thermal_conductance"]
 
 
+def _incremental_stiffness(result: xr.Dataset) -> xr.DataArray:
+    """Stiffness against a fast increment of load, with the instantaneous modulus."""
+    body = Case.of_result(result).body()
+    compliance = float(body.material.contact_compliance(0.0))
+    if compliance == 0:
+        expected = "a material with an instantaneous compliance"
+        raise InputError(key="quantity", found="incremental_stiffness", expected=expected)
+    return incremental_stiffness(result, 1 / compliance, kernel=body.kernel)["incremental_stiffness"]
+
+
 #: Name -> quantity.
 QUANTITIES = {
     one.name: one
@@ -109,7 +118,7 @@ QUANTITIES = {
         Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, 2.5, "area"),
         Observable(
             "incremental_stiffness",
-            lambda result, observe: incremental_stiffness(result)["incremental_stiffness"],
+            lambda result, observe: _incremental_stiffness(result),
             ("pressure",),
             2.5,
             2.5,

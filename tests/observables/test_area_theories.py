@@ -78,12 +78,11 @@ CASE = """{"surface": {"generate": "wavy", "amplitude": 1e-6, "wavelength": 1e-3
     [
         ({"boundary": "free"}, "surfaces without borders"),
         ({"thickness": 1e-3, "base": "bonded"}, "of a half-space: found a result with the thickness 0.001"),
-        ({}, "does not record its material: give material="),
     ],
 )
 def test_where_theories_do_not_hold__says_so(attrs, message):
     with pytest.raises(InputError, match=message):
-        area_by_theory(loaded([0.0, 1.0], [0.0, 1e4], **attrs))
+        area_by_theory(loaded([0.0, 1.0], [0.0, 1e4], **attrs), RUBBER)
 
 
 def test_figure__draws_both_theories_up_to_the_nominal_area():

@@ -1,12 +1,12 @@
 """Conductance and stiffness of the spots of whole results, against Hertz and against the run's own increments."""
 
-import json
 import math
 
 import dask.array
 import numpy as np
 import pytest
 import xarray as xr
+from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -87,60 +87,36 @@ def test_stiffness__is_what_a_small_increment_of_load_meets():
     loads = 0.02 * np.array([0.999, 1.001])
     below, above = (pressed(ball, load, tolerance=1e-6, cells=31).isel(time=0) for load in loads)
     slope = np.diff(loads)[0] / float(above["approach"] - below["approach"])
-    middle = pressed(ball, 0.02, tolerance=1e-6, cells=31).assign_attrs(case=_case("elastic", shear_modulus=3e6))
+    middle = pressed(ball, 0.02, tolerance=1e-6, cells=31)
     assert int(((above["pressure"] > 0) != (below["pressure"] > 0)).sum()) == 0, "choose another load"
-    found = incremental_stiffness(middle)
+    found = incremental_stiffness(middle, 12e6)
     assert float(found["incremental_stiffness"][0]) == pytest.approx(slope, rel=1e-3)
     modulus = rv.closed_forms.hertz(RADIUS, 12e6, 0.02)
     assert float(found["incremental_stiffness"][0]) == pytest.approx(2 * 12e6 * modulus.radius, rel=2e-2)
 
 
-def _case(model, **values):
-    study = {
-        "surface": {"generate": "sphere", "radius": RADIUS, "size": 1.2e-3, "shape": 16},
-        "material": {"model": model, **values},
-        "program": [{"load": 0.02, "over": 0.0}],
-    }
-    return json.dumps(study)
-
-
-def test_stiffness__of_a_rubber_is_that_at_once(ball):
-    with pytest.raises(InputError, match="does not record its material: give contact_modulus="):
-        incremental_stiffness(ball)
-    known = ball.assign_attrs(case=_case("zener", shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5))
-    found = incremental_stiffness(known)
+def test_stiffness__is_in_proportion_to_the_modulus(ball):
+    found = incremental_stiffness(ball, contact_modulus="12 MPa")
     np.testing.assert_allclose(found["incremental_stiffness"], 12e6 * found["frozen_stiffness"])
     np.testing.assert_allclose(found["incremental_stiffness_error"], 12e6 * found["frozen_stiffness_error"])
-    slow = incremental_stiffness(ball, contact_modulus="3 MPa")["incremental_stiffness"]
-    np.testing.assert_allclose(slow, found["incremental_stiffness"] / 4)
-    with pytest.raises(InputError, match="expected a positive number"):
+    with refused("contact_modulus", 0):
         incremental_stiffness(ball, contact_modulus=0)
-
-
-def test_stiffness__of_what_gives_way_at_once_by_nothing(ball):
-    known = ball.assign_attrs(case=_case("kelvin_voigt", shear_modulus=1e6, viscosity=1e5))
-    found = incremental_stiffness(known)
-    assert found["incremental_stiffness"].isnull().all()
-    assert (found["frozen_stiffness"] > 0).all()
 
 
 def test_sheet__is_pressed_as_one_and_conducts_as_a_half_space():
     ds = pressed(rv.sheet(rv.elastic(1e6, 0.3), 2e-4, "slipping"), 0.002, cells=31)
     contact = ds["pressure"].values[0] > 0
     cells = tuple(float(ds[axis][1] - ds[axis][0]) for axis in "xy")
-    with pytest.raises(InputError, match="of a sheet and does not record its material: give kernel="):
+    with refused("kernel", 2e-4):
         incremental_stiffness(ds, contact_modulus=1e6)
-    for known, options in (
-        (ds.assign_attrs(case=_case("elastic", shear_modulus=1e6, poisson=0.3)), {}),
-        (ds, {"kernel": Sheet(2e-4, 0.3, "slipping")}),
-    ):
-        stiffness = incremental_stiffness(known, contact_modulus=1e6, **options)["frozen_stiffness"][0]
-        exact = frozen_contact(contact, cells, kernel=Sheet(2e-4, 0.3, "slipping")).stiffness
-        assert float(stiffness) == pytest.approx(exact)
+    sheet = Sheet(2e-4, 0.3, "slipping")
+    stiffness = incremental_stiffness(ds, contact_modulus=1e6, kernel=sheet)["frozen_stiffness"][0]
+    exact = frozen_contact(contact, cells, kernel=sheet).stiffness
+    assert float(stiffness) == pytest.approx(exact)
     flows = float(conductance(ds, (1, 1))["thermal_conductance"][0])
     assert flows == pytest.approx(frozen_contact(contact, cells).stiffness)
     assert exact > 1.1 * flows
-    with pytest.raises(InputError, match="the result is of the kernel Mine"):
+    with refused("kernel", "Mine()"):
         incremental_stiffness(ds.assign_attrs(kernel="Mine()"), contact_modulus=1e6)
 
 

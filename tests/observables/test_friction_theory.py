@@ -12,7 +12,7 @@ from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state
-from roughvisc.observables.friction_theory import friction_of_waves
+from roughvisc.observables.theory import friction_of_waves
 
 SIDE, SPEED = 1e-3, 0.1
 RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)

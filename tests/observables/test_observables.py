@@ -1,10 +1,13 @@
 """Derived quantities against cases small enough to count by hand."""
 
+from functools import partial
+
 import dask.array
 import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
+from support import refused
 
 import roughvisc as rv
 from roughvisc import observables
@@ -92,10 +95,10 @@ def test_clusters__without_pressure_the_gap_tells():
 
 def test_pressure_distribution__integrates_to_one_over_the_contact():
     ds = made.rough_creep()
-    found = observables.pressure_distribution(ds, bins=37)
+    found = observables.distribution(ds, "pressure", bins=37)
     width = np.diff(found["pressure_bin"])[0]
     np.testing.assert_allclose(found["pressure_density"].sum("pressure_bin") * width, 1.0)
-    flat = observables.pressure_distribution(from_maps(RING, 0 * RING), bins=[0.0, 0.5, 2.0])
+    flat = observables.distribution(from_maps(RING, 0 * RING), bins=[0.0, 0.5, 2.0])
     np.testing.assert_allclose(flat["pressure_density"], [[0.0, 1 / 1.5], [np.nan, np.nan]])
     np.testing.assert_allclose(flat["pressure_bin"], [0.25, 1.25])
 
@@ -104,20 +107,29 @@ def test_gap_distribution__leaves_out_absent_cells_and_contact():
     ds = from_maps(RING)
     ds["gap"][0, 0, :] = np.nan
     ds["gap"][0, -1, :] = 3.0
-    found = observables.gap_distribution(ds, bins=[0.0, 2.0, 4.0])
+    found = observables.distribution(ds, "gap", bins=[0.0, 2.0, 4.0])
     np.testing.assert_allclose(found["gap_density"], [[7 / 12 / 2, 5 / 12 / 2]])
 
 
 @pytest.mark.parametrize("bins", [[1.0], [0.0, 2.0, 1.0]])
 def test_distributions__refuse_bad_edges(bins):
-    with pytest.raises(InputError, match="increase"):
-        observables.gap_distribution(from_maps(RING), bins=bins)
+    with refused("bins", bins):
+        observables.distribution(from_maps(RING), "gap", bins=bins)
+
+
+def test_distribution__of_an_unknown_field_is_refused():
+    with refused("name", "height"):
+        observables.distribution(from_maps(RING), "height")
 
 
 @pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame])
-@pytest.mark.parametrize("name", ["clusters", "pressure_distribution", "gap_distribution"])
-def test_observables__are_lazy_on_dask_and_the_same(make, name):
-    ds, observe = make(), getattr(observables, name)
+@pytest.mark.parametrize(
+    "observe",
+    [observables.clusters, observables.distribution, partial(observables.distribution, name="gap")],
+    ids=["clusters", "pressure", "gap"],
+)
+def test_observables__are_lazy_on_dask_and_the_same(make, observe):
+    ds = make()
     lazy = observe(ds.chunk(time=2, x=20))
     assert all(isinstance(lazy[one].data, dask.array.Array) for one in lazy.data_vars)
     xr.testing.assert_allclose(lazy.compute(scheduler="synchronous"), observe(ds))
@@ -142,8 +154,8 @@ def test_observables__merge_with_their_result(kind):
         rv.observables.clusters(ds),
         rv.observables.cycle_work(ds, program=CYCLES),
         rv.observables.cluster_areas(ds),
-        rv.observables.pressure_distribution(ds),
-        rv.observables.gap_distribution(ds),
+        rv.observables.distribution(ds),
+        rv.observables.distribution(ds, "gap"),
     ]
     assert set(ds.variables) < set(xr.merge([ds, found[0]]).variables), "as the docstring says, without options"
     merged = xr.merge([ds, *found], compat="no_conflicts", join="exact", combine_attrs="override")

@@ -90,7 +90,7 @@ def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(s
     opened.attrs["boundary"] = boundary
     loaded = opened.copy(deep=True).load()
     shapes.clear()
-    for name in ("clusters", "pressure_distribution", "gap_distribution"):
+    for name in ("clusters", "distribution"):
         observe = getattr(rv.observables, name)
         xr.testing.assert_allclose(observe(opened).compute(), observe(loaded), rtol=1e-13)
         xr.testing.assert_allclose(observe(loaded.chunk(time=1)).compute(), observe(loaded), rtol=1e-13)

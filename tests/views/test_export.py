@@ -53,9 +53,7 @@ def test_units__are_read_by_pint():
     assert {name: str(read.Unit(VARIABLES[name].units)) for name in powers} == powers
 
 
-@pytest.mark.parametrize(
-    "use", [rv.observables.pressure_distribution, rv.plot.maps, rv.deformed], ids=lambda use: use.__name__
-)
+@pytest.mark.parametrize("use", [rv.observables.distribution, rv.plot.maps, rv.deformed], ids=lambda use: use.__name__)
 def test_result__in_other_units_is_refused(use, computed):
     converted = computed.assign(pressure=(computed.pressure / 1e6).assign_attrs(units="MPa"))
     with pytest.raises(InputError, match="MPa"):

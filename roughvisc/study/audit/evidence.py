@@ -18,7 +18,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.body import separability_error
 from roughvisc.mechanics.sheet import BASE, Sheet, complement
-from roughvisc.observables.response import history
+from roughvisc.observables.histories import history
 from roughvisc.study.audit.texture import Texture, loaded_slope, texture_of
 from roughvisc.study.case import Case
 from roughvisc.study.quantities import creep_time

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from functools import partial
 
 import numpy as np
 import pytest
@@ -104,7 +105,7 @@ def test_own_times__have_observables_as_each_result(own_times):
     count = int(ds.rows[case])
     derive = {
         "clusters": rv.observables.clusters,
-        "gaps": rv.observables.gap_distribution,
+        "gaps": partial(rv.observables.distribution, name="gap"),
         "leakage": lambda one: rv.observables.leakage(one, viscosity=1e-3, pressure_drop=1e5),
     }
     with open_result(folder / f"{ds.case_key[case].item()}.nc") as alone:
@@ -374,12 +375,13 @@ def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path)
     text = (
         BALL
         + '[[sweep]]\n"surface.radius" = ["10 mm", "12 mm"]\n'
-        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n'
+        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n"material.shift_factor" = [2.0]\n'
     )
     ds = sweep(study(text), tmp_path / "out", workers=0, progress=False)
     assert list(ds["surface_radius"].values) == [10e-3, 12e-3, 10e-3]
     assert list(ds["solve_edge"].values) == ["error", "error", "accept"]
-    np.testing.assert_array_equal(ds["material_poisson"], [np.nan, np.nan, 0.4], "the others do not state it")
+    np.testing.assert_array_equal(ds["material_poisson"], [0.5, 0.5, 0.4], "the default of the others")
+    np.testing.assert_array_equal(ds["material_shift_factor"], [np.nan, np.nan, 2.0], "the others do not state it")
     assert ds.height.dims == ("case", "x", "y")
 
 

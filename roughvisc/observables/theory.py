@@ -1,22 +1,26 @@
-"""Persson's theory of rubber friction on the waves of one surface, without a solution of the contact."""
+"""Theories of rough contact: the area by Persson's theory and by asperities, and Persson's rubber friction."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 from scipy.special import erf
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
 from roughvisc.labels import label
-from roughvisc.mechanics.body import body_of
+from roughvisc.mechanics.body import Body, body_of
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
-from roughvisc.observables.derived import material_of
-from roughvisc.topography.grid import spacing
+from roughvisc.observables.frames import need
+from roughvisc.observables.histories import history
+from roughvisc.topography.grid import nominal_area, spacing
+from roughvisc.topography.parameters import rms_slope
 
 Array = NDArray[np.float64]
 
@@ -26,15 +30,99 @@ _TOLERANCE = 1e-4
 _SAME = 1e-9
 
 
-def persson(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
+def persson_fraction(strain: ArrayLike) -> Any:
+    r"""Contact area over nominal area by Persson's theory, :math:`\mathrm{erf}(\sqrt2 \, p / (E^* h'))`.
+
+    Parameters
+    ----------
+    strain : array_like
+        Nominal pressure over contact modulus and rms slope.
+    """
+    return erf(math.sqrt(2) * np.asarray(strain, dtype=float))
+
+
+def asperity_fraction(strain: ArrayLike) -> Any:
+    r"""The same by the theory of asperities at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`: 1.57 times Persson's."""
+    return math.sqrt(2 * math.pi) * np.asarray(strain, dtype=float)
+
+
+def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
+    r"""Contact area of a rough surface by Persson's theory and by asperity theory, for a load that does not fall.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``force`` and ``height``, of a half-space and periodic boundaries.
+    material : Prony or Creep
+        Material of the half-space.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing from the time at which the load falls.
+        [m2]
+
+    Raises
+    ------
+    InputError
+        If the boundaries are not periodic, the body is no half-space, or the result is not of one case.
+
+    Notes
+    -----
+    On an elastic half-space Persson's theory [1]_ gives :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
+    the nominal pressure :math:`p`, and asperities at low loads [2]_ :math:`A = A_0 \sqrt{2\pi} \, p / (E^* h')`; both
+    for a Gaussian surface with the root-mean-square slope :math:`h'` on the grid. A growing viscoelastic contact is
+    equivalent to an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`: under a constant
+    pressure by :math:`C(t) \, p`. The load is interpolated linearly between accepted steps, so a jump after the start
+    becomes a ramp over the step before it.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
+    .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
+    """
+    need(dataset, "force", "height")
+    steps, kept = history(dataset), dataset["time"].values
+    if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
+        raise InputError("the theories are of surfaces without borders: expected boundary = 'periodic' or 'mirror'")
+    for body in ("thickness", "kernel"):
+        if body in dataset.attrs:
+            raise InputError(f"the theories are of a half-space: found a result with the {body} {dataset.attrs[body]}")
+    material = check_material(material)
+    area, times, force = nominal_area_of(dataset), steps["time"].values, steps["force"].values
+    # int C(t - s) dp(s) of a pressure that is linear between the steps
+    since = np.maximum(kept[:, None] - times[None], 0.0)
+    integral = material.contact_integral(since)
+    strain = material.contact_compliance(since[:, 0]) * (force[0] / area)
+    strain = strain + (integral[:, :-1] - integral[:, 1:]) @ (np.diff(force / area) / np.diff(times))
+    falling = np.diff(force) < -1e-9 * float(force.max())
+    last = times[int(np.argmax(falling))] if falling.any() else math.inf
+    slope = rms_slope(dataset["height"], periodic=dataset.attrs["boundary"] == "periodic")
+    strain = np.where(kept <= last, strain / slope, np.nan)
+    found = {
+        "persson_contact_area": ("time", area * persson_fraction(strain)),
+        "asperity_contact_area": ("time", area * asperity_fraction(strain)),
+    }
+    return label(xr.Dataset(found, coords={"time": dataset["time"]}))
+
+
+def nominal_area_of(dataset: xr.Dataset) -> float:
+    """Area that the nominal pressure of a result refers to: the force over it, else that of the surface. [m2]"""
+    if "nominal_pressure" in dataset and float(dataset["nominal_pressure"].max()) > 0:
+        at = dataset["nominal_pressure"].argmax(...)
+        return float(dataset["force"].isel(at) / dataset["nominal_pressure"].isel(at))
+    return nominal_area(dataset)
+
+
+def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     r"""Return friction coefficient and contact fraction by Persson's theory, for the waves of the same surface.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Result of :func:`roughvisc.friction`, with ``height``.
-    material : Material or Body, optional
-        The body. Default: that of the case in the attributes.
+    material : Prony, Creep or Body
+        The body.
 
     Returns
     -------
@@ -44,7 +132,7 @@ def persson(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the Dataset is not a friction curve, or no material is known.
+        If the Dataset is not a friction curve.
 
     References
     ----------
@@ -52,7 +140,7 @@ def persson(dataset: xr.Dataset, *, material: Any = None) -> xr.Dataset:
     """
     if not {"height", "nominal_pressure", "speed"} <= set(dataset.variables) or "direction" not in dataset.attrs:
         raise InputError(key="dataset", found=list(dataset.variables), expected="a result of rv.friction with height")
-    body = body_of(material_of(dataset) if material is None else material)
+    body = body_of(material)
     height = dataset["height"]
     grid = SlidingGrid.of(-height.values, spacing(height, "height"), dataset.attrs["direction"])
     found = []

@@ -1,0 +1,200 @@
+"""Cells in contact, contact clusters, and distributions of pressure and gap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from scipy import ndimage, sparse
+
+from roughvisc.errors import InputError
+from roughvisc.labels import label
+from roughvisc.observables.frames import by_frame, frame_by_frame, need
+from roughvisc.topography.grid import spacing
+from roughvisc.units import in_si
+from roughvisc.variables import VARIABLES, axis_of
+
+
+def contact(dataset: xr.Dataset) -> xr.DataArray:
+    """Cells in contact: those that carry pressure or, where no pressure is stored, those with no gap.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``.
+
+    Returns
+    -------
+    xarray.DataArray of bool, dims (time, x, y)
+        A Dask array if that of the pressure or the gap is one.
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``.
+    """
+    if "pressure" in dataset:
+        need(dataset, "pressure")
+        return (by_frame(dataset["pressure"]) > 0).drop_attrs(deep=False)
+    need(dataset, "gap")
+    return (by_frame(dataset["gap"]) <= 0).drop_attrs(deep=False)
+
+
+def clusters(dataset: xr.Dataset) -> xr.Dataset:
+    """Number and size of the contact clusters. Cells that share only a corner are not connected.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``. If its attribute ``boundary`` is ``"periodic"``, clusters continue across
+        opposite borders. If it is ``"mirror"``, a cluster counts with its part inside the border.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``cluster_count``, ``cluster_area_mean`` and ``cluster_area_largest`` over time; areas are missing while
+        there is no contact. [1], [m2], [m2]
+
+    Raises
+    ------
+    InputError
+        If the result contains neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
+    """
+    touching = contact(dataset)
+    periodic = dataset.attrs.get("boundary") == "periodic"
+
+    def measure(frame: np.ndarray) -> tuple[float, float, float]:
+        sizes = cluster_sizes(frame, periodic)
+        return (len(sizes), sizes.mean(), sizes[0]) if len(sizes) else (0.0, np.nan, np.nan)
+
+    cell = math.prod(spacing(dataset, "clusters"))
+    count, mean, largest = frame_by_frame(measure, touching, outputs=[(), (), ()])
+    found = {
+        "cluster_count": count.astype("int64"),
+        "cluster_area_mean": mean * cell,
+        "cluster_area_largest": largest * cell,
+    }
+    return label(xr.Dataset(found))
+
+
+def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
+    """Area of every contact cluster; computed immediately, with one frame in memory at a time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``pressure`` or ``gap``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``cluster_area`` with dimensions ``(time, cluster)``, or those of another axis, largest first, missing beyond
+        the number of clusters. [m2]
+
+    Raises
+    ------
+    InputError
+        If the result holds neither ``pressure`` nor ``gap``, or is not of one case.
+    """
+    touching = contact(dataset)
+    rows = axis_of(touching.dims)
+    if touching.dims != (rows, "x", "y"):
+        raise InputError(f"the result has dimensions {touching.dims}: choose one case first")
+    periodic = dataset.attrs.get("boundary") == "periodic"
+    sizes = [cluster_sizes(frame.values, periodic) for frame in touching]
+    areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
+    for row, found in zip(areas, sizes, strict=True):
+        row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
+    return label(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))
+
+
+def label_clusters(mask: np.ndarray, periodic: bool = False) -> tuple[np.ndarray, int]:
+    """Number the connected clusters of one map. Cells that share only a corner are not connected.
+
+    Parameters
+    ----------
+    mask : array_like of bool, shape (nx, ny)
+        Cells that belong to any cluster.
+    periodic : bool
+        Whether a cluster continues across opposite borders.
+
+    Returns
+    -------
+    labels : ndarray of int, shape (nx, ny)
+        From 1 on; 0 outside the clusters.
+    count : int
+        Number of clusters.
+
+    Examples
+    --------
+    >>> ends = [[True], [False], [True]]
+    >>> label_clusters(ends)[1], label_clusters(ends, periodic=True)[1]
+    (2, 1)
+    """
+    labels, count = ndimage.label(np.asarray(mask, dtype=bool))
+    if not periodic or count < 2:
+        return labels, count
+    borders = np.concatenate(
+        [np.stack([labels[-1], labels[0]], axis=1), np.stack([labels[:, -1], labels[:, 0]], axis=1)]
+    )
+    links = np.unique(borders[(borders > 0).all(axis=1)], axis=0) - 1
+    graph = sparse.coo_array((np.ones(len(links)), links.T), shape=(count, count))
+    merged = sparse.csgraph.connected_components(graph, directed=False)[1]
+    return np.append(0, merged + 1).astype(labels.dtype)[labels], int(merged.max()) + 1
+
+
+def cluster_sizes(mask: np.ndarray, periodic: bool = False) -> np.ndarray:
+    """Return the number of cells of each cluster of one map, largest first; see :func:`label_clusters`."""
+    labels, count = label_clusters(mask, periodic)
+    return np.sort(np.bincount(labels.ravel(), minlength=count + 1)[1:])[::-1]
+
+
+def distribution(
+    dataset: xr.Dataset, name: Literal["pressure", "gap"] = "pressure", bins: int | Sequence[float | str] = 60
+) -> xr.Dataset:
+    """Probability density of the pressure over the cells in contact, or of the gap over the present cells outside.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with the field.
+    name : {"pressure", "gap"}
+        The field.
+    bins : int, or array_like of float or str
+        Number of equal bins from zero to the largest value at all times (which is read immediately), or their edges.
+        [Pa] or [m]
+
+    Returns
+    -------
+    xarray.Dataset
+        ``pressure_density`` over time and ``pressure_bin`` [1/Pa], missing while there is no contact; or
+        ``gap_density`` over time and ``gap_bin`` [1/m], missing in full contact.
+
+    Raises
+    ------
+    InputError
+        If the result does not hold the field, or edges do not increase.
+    """
+    if name not in ("pressure", "gap"):
+        raise InputError(key="name", found=name, expected="'pressure' or 'gap'")
+    need(dataset, name)
+    field, dim = by_frame(dataset[name]), f"{name}_bin"
+    if isinstance(bins, int | np.integer):
+        largest = float(field.max())
+        edges = np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
+    else:
+        edges = np.asarray(in_si(bins, VARIABLES[name].units, "bins"), dtype=float)
+    if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
+        raise InputError(key="bins", found=bins, expected="a number, or two or more edges that increase")
+
+    def measure(frame: np.ndarray) -> tuple[np.ndarray]:
+        values = frame[frame > 0]
+        inside = np.histogram(values, edges)[0]
+        return (inside / (values.size * np.diff(edges)) if values.size else np.full(len(edges) - 1, np.nan),)
+
+    (density,) = frame_by_frame(measure, field, outputs=[(dim,)], sizes={dim: len(edges) - 1})
+    middles = {dim: (dim, (edges[1:] + edges[:-1]) / 2)}
+    return label(xr.Dataset({f"{name}_density": density}).assign_coords(middles))

@@ -1,0 +1,104 @@
+"""Histories of every accepted step, and the work done by the force in each loading cycle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.labels import expect_history, label
+from roughvisc.mechanics.program import Program
+from roughvisc.observables.frames import need
+from roughvisc.steps import steps_of
+from roughvisc.variables import STEPPED
+
+#: Times closer than this part of a period are the same.
+_SAME = 1e-9
+
+
+def history(dataset: xr.Dataset) -> xr.Dataset:
+    """Histories of every accepted step, under the names of those at the kept times.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    xarray.Dataset
+        Force, approach, area, mean gap and work over ``time`` at every accepted step. If the Dataset carries no steps,
+        its rows are returned.
+
+    Raises
+    ------
+    InputError
+        If the Dataset contains several cases.
+    """
+    expect_history(dataset)
+    need(dataset, "time")
+    if "time" not in dataset.dims or "case" in dataset.dims:
+        raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
+    steps = steps_of(dataset)
+    if steps is not None:
+        return steps.swap_dims(step="time").drop_attrs(deep=False)
+    rows = dataset[[name for name in STEPPED if name in dataset]].drop_attrs(deep=False)
+    return rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
+
+
+def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
+    r"""Work done by the force in every cycle of the program, :math:`W = \oint F \, d\delta`.
+
+    If force and approach at the end of a cycle equal those at its start, this is the energy dissipated in the cycle.
+    Otherwise a part of it is stored, or was stored before.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``work``.
+    program : Program
+        The program of the result, with :meth:`Program.cycle` in it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``cycle_start`` [s] and ``cycle_work`` [J] over ``cycle``, the numbers of the cycles from 1. Cycles that the
+        result does not cover are left out.
+
+    Raises
+    ------
+    InputError
+        If the program has no whole cycle.
+
+    Notes
+    -----
+    The work of a cycle is the change of the variable ``work`` over it, which counts every accepted step. Between steps
+    it is interpolated linearly.
+    """
+    steps = history(dataset)
+    need(steps, "work")
+    times, work = steps["time"].values, steps["work"].values
+    starts, periods = [], []
+    for start, segment in zip(program.corners, program.segments, strict=False):
+        if segment.amplitude:
+            whole = math.floor(segment.duration / segment.period * (1 + _SAME))
+            starts += [start + number * segment.period for number in range(whole)]
+            periods += [segment.period] * whole
+    if not starts:
+        raise InputError(key="program", found=program, expected="a program with a whole cycle, see Program.cycle")
+    begin, slack = np.array(starts), _SAME * np.array(periods)
+    end = begin + periods
+    covered = (times[0] <= begin + slack) & (end <= times[-1] + slack)
+
+    def work_at(at: np.ndarray) -> np.ndarray:
+        """Return the work of the step there, after a jump if there is one; else interpolated."""
+        last = np.searchsorted(times, at + slack, side="right") - 1
+        return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
+
+    found = xr.Dataset(
+        {"cycle_start": ("cycle", begin[covered]), "cycle_work": ("cycle", (work_at(end) - work_at(begin))[covered])},
+        coords={"cycle": np.flatnonzero(covered) + 1},
+    )
+    return label(found)
