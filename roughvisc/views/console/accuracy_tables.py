@@ -58,7 +58,7 @@ def budget_table(dataset: xr.Dataset) -> Group:
     for source in dataset["source"].values:
         one = dataset.sel(source=source)
         cost = float(one["cost"])
-        table.add_row(str(source), _error(one, axis), Text(str(one["method"].values)), f"{cost:.2g} s" if cost else "")
+        table.add_row(str(source), _error(one), Text(str(one["method"].values)), f"{cost:.2g} s" if cost else "")
     for place in dataset[axis].values:
         at = dataset.sel({axis: place})
         low, value, high = (unit.text(float(at[end]), 3) for end in ("lower", "value", "upper"))
@@ -75,27 +75,20 @@ def budget_table(dataset: xr.Dataset) -> Group:
     return titled(title, *parts, *(Text(note, style="italic") for note in notes))
 
 
-def _error(source: xr.Dataset, axis: str) -> str:
-    """Return the range of a half-width over the rows, with its direction."""
+def _error(source: xr.Dataset) -> str:
+    """Return the range of the half-width of a source over the rows: in %, or as factors if it is large."""
     half = np.atleast_1d(source["half_width"].values)
+    half = half[np.isfinite(half)]
     if str(source["state"].values) != "counted":
         return str(source["state"].values)
-    if not np.isfinite(half).any():
+    if not half.size:
         return "-"
     towards = set(np.atleast_1d(source["direction"].values).tolist())
-    sign = {frozenset({1}): "+", frozenset({-1}): "-"}.get(frozenset(towards), "±")
-    ends = list(dict.fromkeys(_short(float(one)) for one in (np.nanmin(half), np.nanmax(half))))
-    if ends == ["0"] or ends[0].startswith("factor"):
-        return " to ".join([ends[0], *(one.removeprefix("factor ") for one in ends[1:])])
-    return sign + " to ".join(ends)
-
-
-def _short(half: float) -> str:
-    """Return a half-width of a logarithm in %, or as a factor if it is large."""
-    if half > 0.5:
-        return f"factor {np.exp(half):.2g}"
-    percent = 100 * half
-    return "0" if percent < 5e-4 else f"{percent:.2g}" if percent >= 0.01 else "<0.01"
+    side, ends = towards.pop() if len(towards) == 1 else 0, (half.min(), half.max())
+    if ends[1] > 0.5:
+        return "factor " + " to ".join(dict.fromkeys(f"{np.exp((side or 1) * one):.2g}" for one in ends))
+    shown = " to ".join(dict.fromkeys(f"{100 * one:.2g}" if one >= 1e-4 else "0" for one in ends))
+    return shown if shown == "0" else {1: "+", -1: "-"}.get(side, "±") + shown
 
 
 #: Headings of quantities that are not their names.
