@@ -208,11 +208,12 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
         return values
     for extreme in (np.fmin, np.fmax):
         number = extreme.reduce(values, axis=None)
+        if not abs(number) >= _NO_DATA:
+            continue
         marked = values == number
         count, rest = int(marked.sum()), values[np.isfinite(values) & ~marked]
         spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-        conventional = count >= _REPEATED and abs(number) >= _NO_DATA
-        if conventional and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
+        if count >= _REPEATED and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
             values = np.where(marked, np.nan, values)
             complaints.append(
                 f"{count} points have the height {number:g} and all others lie within {rest.min():g} to "
