@@ -9,6 +9,8 @@ from roughvisc.topography.grid import MOST_CELLS
 
 #: Largest distance of a point from its lattice, in steps, and gaps within one line of it, in largest gaps.
 _OFF, _GAP = 0.01, 0.1
+#: Largest deviation of the axes of a lattice from x and y. [rad]
+_OBLIQUE = 0.01
 #: Most nodes of a lattice for each point.
 _SPARSE = 64
 
@@ -30,9 +32,9 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     """
     if len(points) < 4 or not np.isfinite(points[:, :2]).all():
         return None
-    nodes, steps = [], []
-    for at in points[:, :2].T:
-        ordered = np.sort(at)
+    at, nodes = points[:, :2], np.empty((len(points), 2))
+    for axis in (0, 1):
+        ordered = np.sort(at[:, axis])
         gaps = np.diff(ordered)
         starts = np.append(0, np.flatnonzero(gaps > _GAP * gaps.max()) + 1)
         lines = np.add.reduceat(ordered, starts) / np.diff(np.append(starts, ordered.size))
@@ -40,21 +42,22 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
             return None
         between = np.diff(lines)
         step = (lines[-1] - lines[0]) / np.round(between / np.median(between)).sum()
-        node = np.round((at - lines[0]) / step)
-        off = node - node.mean()  # least squares
-        step = float(f"{off @ at / (off @ off):.12g}")
-        if np.abs(at - at.mean() - off * step).max() > _OFF * step:
-            return None
-        nodes.append(node.astype(int))
-        steps.append(step)
+        nodes[:, axis] = np.round((at[:, axis] - lines[0]) / step)
+    centred = np.column_stack([np.ones(len(points)), nodes - nodes.mean(axis=0)])
+    fit = np.linalg.lstsq(centred, at, rcond=None)[0]
+    steps = np.array([fit[1, 0], fit[2, 1]])
+    off, oblique = np.abs(at - centred @ fit).max(axis=0), np.abs([fit[1, 1], fit[2, 0]])
+    if (off > _OFF * steps).any() or (oblique > _OBLIQUE * steps).any():
+        return None
+    nodes = (nodes - nodes.min(axis=0)).astype(int).T
     shape = (int(nodes[0].max()) + 1, int(nodes[1].max()) + 1)
     if shape[0] * shape[1] > _SPARSE * len(points):
         return None
-    if np.unique(np.ravel_multi_index(nodes, shape)).size < len(points):
+    if np.unique(np.ravel_multi_index(tuple(nodes), shape)).size < len(points):
         return None
     heights = np.full(shape, np.nan)
     heights[nodes[0], nodes[1]] = points[:, 2]
-    return heights, (steps[0], steps[1])
+    return heights, (float(f"{steps[0]:.12g}"), float(f"{steps[1]:.12g}"))
 
 
 def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:

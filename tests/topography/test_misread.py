@@ -277,6 +277,20 @@ def test_points__near_a_lattice_are_that_lattice(jitter, tmp_path):
     np.testing.assert_allclose(h, 1e-6 * (np.sin(0.2 * x) + np.cos(0.15 * y)), atol=1e-6 * jitter)
 
 
+@pytest.mark.parametrize(("oblique", "is_lattice"), [(1e-3, True), (0.009, True), (0.02, False)])
+def test_points__of_oblique_rows_are_a_lattice_up_to_a_hundredth(oblique, is_lattice):
+    some = points(jitter=1e-3)
+    straight, steps = lattice(some)
+    for axis in (0, 1):
+        turned = some.copy()
+        turned[:, axis] += oblique * some[:, 1 - axis]
+        found = lattice(turned)
+        assert (found is not None) == is_lattice
+        if found is not None:
+            np.testing.assert_array_equal(found[0], straight)
+            np.testing.assert_allclose(found[1], steps, rtol=1e-5)  # jitter times the angle
+
+
 @real
 def test_points__of_the_shared_file():
     h = open_scan(SCANS / "misread" / "jj_1e-06.xyz", unit="um")
