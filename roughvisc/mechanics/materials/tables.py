@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -38,8 +39,9 @@ _SLOWER = 3.0
 #: rows hardly determine a faster term, and no rheometer measures better. Creep: a fast term rises from the given
 #: instantaneous compliance, and the terms are chosen later, for a program.
 _MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
-#: Largest ratio of moduli measured at one frequency and one temperature.
-_ONE_TEMPERATURE = 2.0
+#: Largest ratio of moduli measured at one frequency and one temperature, and the relative difference of frequencies up
+#: to which they are one.
+_ONE_TEMPERATURE, _SAME_FREQUENCY = 2.0, 1e-6
 #: Largest ratio of the times of neighbouring rows without a warning.
 _DECADE = 10.0 * (1 + 1e-9)
 
@@ -107,7 +109,7 @@ def creep_table(
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau, misfit = _fitted(columns, rows, measured, measured - glassy, measured, *_CREEP)
+    weights, tau, misfit = _Rows(columns, rows, measured, measured - glassy, measured).fitted(*_CREEP)
     note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
@@ -159,8 +161,8 @@ def relaxation_table(
     def columns(theta: Array) -> Array:
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
-    span = f"times {t[0]:g} to {t[-1]:g} s"
-    return _relaxing(columns, t[later], shear[later], shear, shear, poisson, t.size, span, "relaxation")
+    rows = _Rows(columns, t[later], shear[later], shear, shear)
+    return _relaxing(rows, poisson, t.size, f"times {t[0]:g} to {t[-1]:g} s", "relaxation")
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -218,18 +220,16 @@ def dynamic_table(
     omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
     for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
-    modulus, distinct = np.hypot(elastic, viscous), np.unique(np.round(np.log(omega), 6), return_inverse=True)[1]
-    for group in range(distinct.max() + 1) if distinct.max() + 1 < omega.size else ():
-        at = np.flatnonzero(distinct == group)
-        if modulus[at].max() > _ONE_TEMPERATURE * modulus[at].min():
-            raise InputError(
-                f"table row {at[-1]}: the moduli at {omega[at[-1]]:g} rad/s differ between rows by a factor of "
-                f"{modulus[at].max() / modulus[at].min():.2g}: several temperatures? expected the rows of one "
-                "temperature, or shift_factors"
-            )
     factor = tensile_to_shear(kind, poisson)
     elastic, viscous = elastic / factor, viscous / factor
-    size = np.hypot(elastic, viscous)
+    size, order = np.hypot(elastic, viscous), np.argsort(omega, kind="stable")
+    again = np.diff(np.log(omega[order])) < _SAME_FREQUENCY
+    apart = np.abs(np.diff(np.log(size[order]))) > np.log(_ONE_TEMPERATURE)
+    for row in order[1:][again & apart][:1]:
+        raise InputError(
+            f"table row {row}: other moduli than a row with the same frequency, {omega[row]:g} rad/s: several "
+            "temperatures? expected the rows of one temperature, or shift_factors"
+        )
     least = 1e-3 * size
     target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
 
@@ -238,68 +238,62 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return _relaxing(columns, 1 / omega, size, target, scale, poisson, omega.size, span, "dynamic")
+    rows = _Rows(columns, 1 / omega, size, target, scale)
+    return _relaxing(rows, poisson, omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", "dynamic")
 
 
-def _fitted(
-    columns: Callable[[Array], Array],
-    at: Array,
-    course: Array,
-    target: Array,
-    scale: Array,
-    faster: float,
-    accurate: float,
-) -> tuple[Array, Array, Array]:
-    """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows.
+@dataclass(frozen=True)
+class _Rows:
+    """Rows of a table and the terms that may be fitted to them.
 
-    Parameters
+    Attributes
     ----------
     columns : callable
-        Function of the times; the first of its columns has no time. It is fitted to `target`, relative to `scale`.
+        Function of the times of the terms; the first of its columns has no time. It is fitted to `target`, relative to
+        `scale`.
     at, course : ndarray
         Times of the measurements [s] and their values, by which the size of a term is judged.
-    faster, accurate : float
-        See :data:`_MODULI`.
-
-    Notes
-    -----
-    The fit with the fewest terms among those with about the smallest misfit. Few rows can be met in many ways: then
-    the spectrum with small differences between neighbouring terms is taken.
+    target, scale : ndarray
     """
-    order = np.argsort(at)
-    at, course = at[order], course[order]
-    within = float(at[0]) / faster, float(at[-1]) * _SLOWER
-    fits = []
-    sparse = target.size - 1 < _FEW * np.log10(at[-1] / at[0])
-    for per_decade in (_SMOOTH,) if sparse else _OFFERED:
-        times = lattice(*within, per_decade)
-        offered = columns(times)
-        steps = np.diff(np.diag(_STEPS / np.interp(np.log(times), np.log(at), course)), axis=0)[: sparse * times.size]
-        rows = np.vstack([offered / scale[:, None], np.pad(steps, ((0, 0), (1, 0)))])
-        weights = nonnegative(rows, np.append(target / scale, np.zeros(len(steps))), np.ones(len(rows)))
-        misfit = (offered @ weights - target) / scale
-        used = np.flatnonzero(weights[1:])
-        rms = float(np.sqrt(np.mean(misfit**2)))
-        fits.append((rms, np.append(weights[0], weights[1:][used]), times[used], misfit))
-    enough = max(_FEWER * min(fit[0] for fit in fits), accurate)
-    return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
+
+    columns: Callable[[Array], Array]
+    at: Array
+    course: Array
+    target: Array
+    scale: Array
+
+    def fitted(self, faster: float, accurate: float) -> tuple[Array, Array, Array]:
+        """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows.
+
+        Notes
+        -----
+        The fit with the fewest terms among those with about the smallest misfit; see :data:`_MODULI` for the arguments.
+        Few rows can be met in many ways: then the spectrum with small differences between neighbouring terms is taken.
+        """
+        order = np.argsort(self.at)
+        at, course = self.at[order], self.course[order]
+        fits = []
+        sparse = self.target.size - 1 < _FEW * np.log10(at[-1] / at[0])
+        for per_decade in (_SMOOTH,) if sparse else _OFFERED:
+            times = lattice(float(at[0]) / faster, float(at[-1]) * _SLOWER, per_decade)
+            rows, wanted = self.columns(times) / self.scale[:, None], self.target / self.scale
+            if sparse:
+                sizes = np.interp(np.log(times), np.log(at), course)
+                smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
+                rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
+            weights = nonnegative(rows, wanted, np.ones(len(rows)))
+            misfit = (self.columns(times) @ weights - self.target) / self.scale
+            used = np.flatnonzero(weights[1:])
+            rms = float(np.sqrt(np.mean(misfit**2)))
+            fits.append((rms, np.append(weights[0], weights[1:][used]), times[used], misfit))
+        enough = max(_FEWER * min(fit[0] for fit in fits), accurate)
+        return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
 
 
-def _relaxing(
-    columns: Callable[[Array], Array],
-    at: Array,
-    course: Array,
-    target: Array,
-    scale: Array,
-    poisson: float,
-    rows: int,
-    span: str,
-    kind: str,
-) -> Prony:
-    """Return the material of a table of moduli; the arguments are those of :func:`_fitted` and what its note states."""
-    weights, theta, misfit = _fitted(columns, at, course, target, scale, *_MODULI)
-    note = "; ".join(filter(None, (_note(theta.size + 1, rows, misfit, span), _gap(kind, np.unique(at)))))
+def _relaxing(table: _Rows, poisson: float, rows: int, span: str, kind: str) -> Prony:
+    """Return the material of a table of moduli; its note states the last three arguments."""
+    weights, theta, misfit = table.fitted(*_MODULI)
+    note = "; ".join(filter(None, (_note(theta.size + 1, rows, misfit, span), _gap(kind, np.unique(table.at)))))
     found = relaxation_series(float(weights[0]), weights[1:].tolist(), theta.tolist())
     return dataclasses.replace(found, poisson=poisson, note=note)
 
