@@ -15,14 +15,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import EdgeContactError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows, facts_of
 from roughvisc.experiment.notes import loading_warnings, table_note
-from roughvisc.experiment.profile import (
-    BEYOND,
-    GROWTH,
-    Profile,
-    choose_domain,
-    enlarged_indenter,
-    expected_contact,
-)
+from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
 from roughvisc.experiment.scene import build_scene, check_program
 from roughvisc.experiment.stated import area_error, error_columns, meets_tolerance
@@ -119,11 +112,9 @@ class LoadingRows(Rows):
         require_loading(shape, program, settings, body, in_memory=in_memory)
         profile = Profile(height, settings.missing, body.kernel)
         check_program(profile, body, program, settings)
-        expected = expected_contact(problem, program, None if state is None else state.enlarged)
-        self._start = state or LoadingState(enlarged=expected.enlarged)
-        if expected.enlarged:
-            profile = Profile(expected.height, settings.missing, body.kernel)
-        self._domain = choose_domain(profile, body, expected.approach * GROWTH**self._start.outgrown)
+        enlarged, outgrown = (None, 0) if state is None else (state.enlarged, state.outgrown)
+        profile, self._domain, enlarged, _ = choose_surface(profile, problem, program, enlarged, outgrown)
+        self._start = state or LoadingState(enlarged=enlarged)
         self._scene, self._choice = build_scene(profile, self._domain, body, program, settings)
         self.problem, self._profile = replace(problem, height=profile.height), profile
         log.info("memory: %s", self._choice.note)

@@ -179,55 +179,58 @@ def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> D
     return whole if inside.mean() > LARGEST_PART else replace(whole, cells=cells, outside=float(gap[~inside].min()))
 
 
-class Expected(NamedTuple):
-    """Surface of a run, and the contact that is expected on it.
+class Surface(NamedTuple):
+    """Surface and domain of a run.
 
     Attributes
     ----------
-    height : DataArray
-        Surface; of an indenter, enlarged until the expected contact does not reach its border. [m]
+    profile : Profile
+        The surface; an indenter is enlarged until the expected contact does not reach its border.
+    domain : Domain
+        Part of it that is solved on.
     enlarged : int
         How many times it was enlarged.
-    approach : float
-        Estimated largest approach; infinite if it is not known. [m]
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
     """
 
-    height: xr.DataArray
+    profile: Profile
+    domain: Domain
     enlarged: int = 0
-    approach: float = math.inf
     reaches_border: bool = False
 
 
-def expected_contact(problem: Problem, program: Program, enlarged: int | None = None) -> Expected:
-    """Return the surface of a run, enlarged if necessary, and its expected contact in free space.
+def choose_surface(
+    profile: Profile, problem: Problem, program: Program, enlarged: int | None = None, outgrown: int = 0
+) -> Surface:
+    """Return the surface of a run, enlarged if necessary, and its domain.
 
     Parameters
     ----------
+    profile : Profile
+        The stated surface.
     problem : Problem
         Surface, body and settings.
     program : Program
         Loads and approaches, no nominal pressures.
     enlarged : int, optional
         Number of times to enlarge the surface. Default: as often as the estimate requires.
+    outgrown : int
+        How many times contact has outgrown the domain.
     """
-    height, body, settings = problem.height, problem.body, problem.settings
-    if settings.boundary != "free" or settings.edge != "error":
-        return Expected(height)
-    if not is_indenter(height) and not (body.separates and not body.kernel.raises_surface):
-        return Expected(height)  # it is neither enlarged nor cropped
+    body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
+    may_crop = body.separates and not body.kernel.raises_surface
     times = enlarged or 0
-    for _ in range(times):
-        larger = enlarged_indenter(height)
-        assert larger is not None, "it was enlarged before"
-        height = larger
-    compliance = float(body.material.contact_compliance(program.duration))
-    approach, at_border = estimated(height, body.kernel, compliance, program)
-    while enlarged is None and at_border and (larger := enlarged_indenter(height)) is not None:
-        height, times = larger, times + 1
-        approach, at_border = estimated(height, body.kernel, compliance, program)
-    return Expected(height, times, approach, at_border)
+    if settings.boundary == "free" and settings.edge == "error" and (may_crop or is_indenter(profile.height)):
+        compliance = float(body.material.contact_compliance(program.duration))
+        for _ in range(times):
+            profile = Profile(enlarged_indenter(profile.height), settings.missing, body.kernel)
+        approach, at_border = estimated(profile, compliance, program)
+        while enlarged is None and at_border and (larger := enlarged_indenter(profile.height)) is not None:
+            profile, times = Profile(larger, settings.missing, body.kernel), times + 1
+            approach, at_border = estimated(profile, compliance, program)
+    domain = choose_domain(profile, body, approach * GROWTH**outgrown)
+    return Surface(profile, domain, times, at_border)
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
@@ -236,15 +239,13 @@ def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
     return None if larger is None or larger.size > MOST_CELLS else larger
 
 
-def estimated(height: xr.DataArray, kernel: Kernel, compliance: float, program: Program) -> tuple[float, bool]:
+def estimated(profile: Profile, compliance: float, program: Program) -> tuple[float, bool]:
     """Return the largest approach of a program [m], and whether contact reaches the border then.
 
     Parameters
     ----------
-    height : DataArray, dims (x, y)
-        The surface. [m]
-    kernel : Kernel
-        Kernel of the body.
+    profile : Profile
+        The surface.
     compliance : float
         Contact compliance after all of the program. [1/Pa]
     program : Program
@@ -254,14 +255,12 @@ def estimated(height: xr.DataArray, kernel: Kernel, compliance: float, program: 
     -----
     Infinite for a load that is found in the run and held.
     """
-    stride = math.ceil(max(height.shape) / ESTIMATED_ON)
-    gap = highest(height) - height.values[::stride, ::stride]
-    present = np.isfinite(gap)
+    stride = math.ceil(max(profile.gap.shape) / ESTIMATED_ON)
+    gap, present = profile.gap[::stride, ::stride], profile.present[::stride, ::stride]
     if not present.any():
         return math.inf, False
-    least, gap = float(gap[present].min()), np.where(present, gap, 0.0)
-    dx, dy = spacing(height, "height")
-    grid = Grid((gap.shape[0], gap.shape[1]), (stride * dx, stride * dy), "free", kernel=kernel)
+    least, (dx, dy) = float(gap[present].min()), profile.spacing
+    grid = Grid((gap.shape[0], gap.shape[1]), (stride * dx, stride * dy), "free", kernel=profile.kernel)
     approach, at_border = 0.0, False
     for number, segment in enumerate(program.segments):
         if segment.control == "approach":
@@ -273,7 +272,9 @@ def estimated(height: xr.DataArray, kernel: Kernel, compliance: float, program: 
         pushes.append({"load": program.largest_load * compliance / grid.cell_area})
     for push in pushes:
         try:
-            found = solve_contact(grid, gap, tolerance=ESTIMATE_TOLERANCE, present=present, **push)
+            found = solve_contact(
+                grid, np.ascontiguousarray(gap), tolerance=ESTIMATE_TOLERANCE, present=present, **push
+            )
         except ConvergenceError:
             return math.inf, False
         approach = max(approach, found.approach)

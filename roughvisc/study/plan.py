@@ -28,7 +28,7 @@ from roughvisc.experiment.base import Experiment, Problem
 from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
 from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.profile import Domain, Profile, choose_domain, expected_contact
+from roughvisc.experiment.profile import Domain, Profile, choose_domain, choose_surface
 from roughvisc.experiment.resources import (
     PART,
     PROCESS,
@@ -277,16 +277,10 @@ class _Setups:
             return Setup(problem, experiment, choose_domain(profile, body), area, slope, slope)
         program = experiment.program
         check_program(profile, body, program, settings)
-        expected = expected_contact(problem, program)
-        if expected.enlarged:
-            problem = replace(problem, height=expected.height)
-            profile = Profile(expected.height, settings.missing, body.kernel)
-        domain = choose_domain(profile, body, expected.approach)
-        rows, columns = domain.cells
-        local = (
-            slope if domain.is_whole and not expected.enlarged else rms_slope(problem.height.isel(x=rows, y=columns))
-        )
-        return Setup(problem, experiment, domain, area, slope, local, expected.reaches_border)
+        profile, domain, enlarged, at_border = choose_surface(profile, problem, program)
+        problem, (rows, columns) = replace(problem, height=profile.height), domain.cells
+        local = slope if domain.is_whole and not enlarged else rms_slope(problem.height.isel(x=rows, y=columns))
+        return Setup(problem, experiment, domain, area, slope, local, at_border)
 
     def choice(self, case: Case, program: Program) -> Choice:
         """Return the memory of a material, which may take a fit."""
