@@ -7,7 +7,7 @@ one. No other estimate is needed.
 An error is weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`). A kept time
 ends a pair or lies in its middle.
 
-If little of the compliance of a step is instantaneous, the step is *soft*: the pressure jumps in each cell that enters
+If little of the compliance of a pair is instantaneous, the pair is *soft*: the pressure jumps in each cell that enters
 the contact, and the pressure of an implicit step belongs to the step and not to its end. The displaced surface then
 controls the length, and a short additional step gives the pressure of a kept row.
 """
@@ -72,7 +72,7 @@ NEARLY_NOTHING = 0.02
 SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
 #: Pairs of a period of a cycle.
 PAIRS_OF_A_CYCLE = 8
-#: A step is soft if less than this part of its compliance is instantaneous.
+#: A pair of steps is soft if less than this part of its compliance is instantaneous.
 SOFT = 0.1
 #: Length of the step that gives the pressure at the end of a soft step, in steps.
 END_STEP = 1e-3
@@ -470,12 +470,14 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         middle, last = pair_ends(fine.time, length, event, next_event)
         taken = last - fine.time
         is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
-        first = take_step(scene, fine, middle, number)
-        second = take_step(scene, first, last, number)
-        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine))
-        half, whole, other = (
-            end_value(scene, here, one, number) for here, one in ((fine, first), (first, second), (coarse, once))
-        )
+        shares = [MAGNIFIED if is_soft and scene.keeps(time) else 1.0 for time in (middle, last)]
+        first = take_step(scene, fine, middle, number, share=shares[0])
+        second = take_step(scene, first, last, number, share=shares[1])
+        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine), share=shares[1])
+        half, whole, other = first, second, once
+        if is_soft:
+            half, whole = end_value(scene, fine, first, number), end_value(scene, first, second, number)
+            other = end_value(scene, coarse, once, number)
 
         # The error at the end, and of cells that have just entered, in the middle and in both solutions.
         apart = error_at(scene, fine, second, once, whole, other)
@@ -546,7 +548,7 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
         pressure = grid.xp.roll(here.pressure, -slide.sense * number, slide.axis)
         body = replace(here, history=history, pressure=pressure, before=None)
-        return take_step(scene, body, time, state.segment, guess=guess)
+        return take_step(scene, body, time, state.segment, guess=guess, share=SLIDING_SHARE)
 
     points, works = [fine], [0.0]
     for number in range(1, count + 1):
@@ -624,14 +626,13 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
 
 
 def end_value(scene: Scene, here: Point, point: Point, number: int) -> Point:
-    """Return the end of a step with the pressure of its instant, if that is kept and the step is soft.
+    """Return the end of a step of a soft pair with the pressure of its instant, if that is kept.
 
     A short step, in which the load stays or the approach changes as before, gives this pressure.
     """
-    step = point.time - here.time
-    if not (scene.keeps(point.time) and point.force > 0 and scene.is_soft(step)):
+    if not (scene.keeps(point.time) and point.force > 0):
         return point
-    ahead, value = END_STEP * step, point.force
+    ahead, value = END_STEP * (point.time - here.time), point.force
     if scene.program.segments[number].control == "approach":
         value = 2 * point.approach - scene.prescribed(number, point.time - ahead, point)
     found = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
@@ -820,6 +821,7 @@ def take_step(
     value: float | None = None,
     guess: Guess | None = None,
     rule: Rule | None = None,
+    share: float = 1.0,
 ) -> Point:
     """Return the point a step ahead.
 
@@ -839,6 +841,8 @@ def take_step(
         First guess of the pressure and its displacement per unit compliance. Default: extrapolated.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
+    share : float
+        Part of the usual tolerance of the contact solver.
 
     Raises
     ------
@@ -860,7 +864,6 @@ def take_step(
     pressure, unit = guess or extrapolated(scene, here, step)
     guess = None  # not needed while the contact is solved
     pressure, unit = alpha * pressure, None if unit is None else alpha * unit
-    share = SLIDING_SHARE if segment.slide else MAGNIFIED if scene.keeps(time) and scene.is_soft(step) else 1.0
     try:
         found = solve_contact(
             grid,
