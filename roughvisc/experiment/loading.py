@@ -18,7 +18,7 @@ from roughvisc.experiment.notes import loading_warnings, table_note
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
 from roughvisc.experiment.scene import build_scene, check_program
-from roughvisc.experiment.stated import area_error, error_columns, meets_tolerance
+from roughvisc.experiment.stated import area_error, error_columns, length_of, meets_tolerance
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.contact.neighbours import staircase
 from roughvisc.mechanics.memory import History
@@ -128,33 +128,26 @@ class LoadingRows(Rows):
         Outgrown
             If contact outgrows the domain: the run must begin again.
         """
-        scene, start = self._scene, self._start
+        scene, start, largest = self._scene, self._start, self._start.largest
         every, ends = scene.kept is None, set(scene.program.corners)
-        largest = start.largest
         for step in march(scene, start.march):
-            point, before = step.point, largest
+            point = step.point
             self._check_border(step)
-            largest = max(before[0], point.force), max(before[1], abs(point.approach))
-            of_all = max(step.state.largest_force, point.force), max(step.state.largest_approach, abs(point.approach))
-            stated = error_columns(step, scene, self._choice.series_error, largest, of_all)
+            so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
+            stated = error_columns(step, scene, self._choice.series_error, so_far)
+            kept = scene.keeps(point.time)
             if every:
                 kept = point.time in ends or meets_tolerance(step, scene, stated["stated_error"])
-            else:
-                kept = scene.keeps(point.time)
-            # with hardly any instantaneous compliance a pressure that is not kept belongs to the whole step; a given
-            # load is right all the same
-            began = point.before[0] if point.before else scene.program.corners[step.segment]
-            by_load = scene.program.segments[step.segment].control == "load"
-            is_end_value = by_load or not scene.is_soft(point.time - began)
-            largest = largest if kept else before
-            state = None
+            largest = so_far if kept else largest
+            state, values, fields = None, {}, {}
             if step.is_end:
                 state = LoadingState(step.state, largest, start.enlarged, start.outgrown, self._border)
-            if kept or (not every and is_end_value):
+            # with hardly any instantaneous compliance a pressure that is not kept belongs to the whole step; a given
+            # load is right all the same
+            by_load = scene.program.segments[step.segment].control == "load"
+            if kept or (not every and (by_load or not scene.is_soft(length_of(step, scene)))):
                 values, fields = self._row(step, stated, kept)
-                yield Row(point.time, values, fields, kept, state=state, done=point.time)
-            else:
-                yield Row(point.time, state=state, done=point.time)
+            yield Row(point.time, values, fields, kept, state=state, done=point.time)
 
     def _check_border(self, step: Step) -> None:
         """Record contact at the border of a free surface, or refuse it; find out if the domain is outgrown."""

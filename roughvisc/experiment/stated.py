@@ -21,9 +21,13 @@ AT_MOST = 3.0
 SOLVER_AT_EDGE = 3.0
 
 
-def error_columns(
-    step: Step, scene: Scene, series_error: float, largest: tuple[float, float], of_all: tuple[float, float]
-) -> dict[str, float]:
+def length_of(step: Step, scene: Scene) -> float:
+    """Return the length of a step, zero of a jump. [s]"""
+    point = step.point
+    return max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
+
+
+def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[float, float]) -> dict[str, float]:
     """Return the stated errors of a step.
 
     Parameters
@@ -32,8 +36,8 @@ def error_columns(
         An accepted step.
     series_error : float
         Relative error of the series that represents the material.
-    largest, of_all : tuple of float
-        Largest force [N] and approach [m] so far: of the kept rows, to which errors are relative, and of all steps.
+    largest : tuple of float
+        Largest force [N] and approach [m] of the kept rows so far, to which errors are relative.
 
     Returns
     -------
@@ -49,7 +53,9 @@ def error_columns(
     point, apart, control = step.point, step.difference, scene.program.segments[step.segment].control
     given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
     largest_force, largest_approach = largest
-    of_force, of_approach = series_error * of_all[0], series_error * of_all[1]
+    of_force = series_error * max(step.state.largest_force, point.force)
+    reached = max(step.state.largest_approach, abs(point.approach))
+    of_approach = series_error * reached
     unit = scene.tolerance if largest_force > 0 else 0.0
     solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
     time_error, pressure, force, approach = 0.0, solved, 0.0, 0.0
@@ -57,7 +63,7 @@ def error_columns(
         force = apart.force + solved * point.force + of_force
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + of_approach
-        approach += INHERITED_APPROACH * unit * of_all[1] if remembers else 0.0
+        approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
     relative = 0.0
     if largest_force > 0:
         time_error = max(apart.pressure, apart.force) / largest_force
@@ -93,8 +99,7 @@ def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float
     inside, outside = apart.inside, apart.outside
     if contact.any() and point.solver_error > 0:
         pressure = SOLVER_AT_EDGE * point.solver_error * float(point.pressure[contact].mean())
-        began = point.before[0] if point.before else scene.program.corners[step.segment]
-        closed = pressure * scene.grid.self_influence * scene.memory.compliance(max(point.time - began, 0.0))
+        closed = pressure * scene.grid.self_influence * scene.memory.compliance(length_of(step, scene))
         closing = ~contact & (gap <= closed)
         if scene.present is not None:
             closing &= scene.present

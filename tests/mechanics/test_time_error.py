@@ -81,7 +81,7 @@ def _true_error(scene, step, exact, largest):
 
 def stated(scene, row):
     step, largest = row
-    return error_columns(step, scene, 0.0, largest, largest)
+    return error_columns(step, scene, 0.0, largest)
 
 
 @pytest.fixture(scope="module")
