@@ -486,9 +486,14 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             break
         if lands and not is_soft:
-            creep = scene.memory.compliance(taken) / scene.memory.compliance(0.0) - 1
+            creep = memory.compliance(taken) / memory.compliance(0.0) - 1
             shared = SHARED * creep**2 * entered_force(scene, fine, second)
-        force, approach = largest_values(scene, state, first, second)
+        # Errors are relative to the largest values. Rounding cannot tell a smaller approach from none: all that a flat
+        # surface has under periodic boundaries.
+        force = max(state.largest_force, first.force, second.force, 1e-300)
+        rounding = ROUNDING * memory.compliance(last) * scene.grid.stiffest * force / scene.gap.size
+        approach = max(state.largest_approach, abs(first.approach), abs(second.approach), 1e-300)
+        approach = max(approach, rounding / scene.grid.cell_area)
         ratio = added(scene, state, second, once, force, approach)
         factor = PLANNED * max(ratio, 1e-300) ** (-1 / ORDER)
         of_pressure = max(apart.pressure / scene.stated[0], apart.pressure + shared) / force
@@ -521,7 +526,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     works = work_of_pair(scene, fine, first, second)
     if scene.motions and scene.keeps(last):
-        apart = replace(apart, friction=friction_apart(scene, whole, other, scene.motions[number]))
+        slide = scene.motions[number]
+        apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
     after = after_steps(scene, state, [first, second], once, apart, works[1], spent, length)
     inside = replace(state, work=state.work + works[0])
@@ -559,26 +565,22 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
     once = last
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
+    force = friction(scene, last, slide)
     apart = error_at(scene, fine, last, once, last, once)
-    apart = replace(apart, friction=friction_apart(scene, last, once, slide))
+    apart = replace(apart, friction=abs(force - friction(scene, once, slide)))
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
     if cells == 1 and not memory.is_elastic:  # no solution with longer steps is known
-        apart = replace(apart, friction=abs(friction_force(scene, last, slide)))
+        apart = replace(apart, friction=abs(force))
     after = after_steps(scene, state, points[1:], once, apart, works[-1], spent, distance=count * side)
     inside = replace(state, work=state.work + works[1], distance=state.distance + side)
     ends = Step(last, apart, state.segment, after)
     return [Step(points[1], apart.or_larger(state.difference), state.segment, inside, is_end=False), ends][-count:]
 
 
-def friction_force(scene: Scene, point: Point, slide: Slide) -> float:
+def friction(scene: Scene, point: Point, slide: Slide) -> float:
     """Return the friction force of a point. [N]"""
     return tangential_force(scene.grid, point.pressure, scene.memory.displacement(point.history)[0], slide)
-
-
-def friction_apart(scene: Scene, fine: Point, coarse: Point, slide: Slide) -> float:
-    """Return the difference of the friction force between both solutions. [N]"""
-    return abs(friction_force(scene, fine, slide) - friction_force(scene, coarse, slide))
 
 
 def added(scene: Scene, state: State, second: Point, once: Point, force: float, approach: float) -> float:
@@ -637,17 +639,6 @@ def end_value(scene: Scene, here: Point, point: Point, number: int) -> Point:
         value = 2 * point.approach - scene.prescribed(number, point.time - ahead, point)
     found = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
     return replace(found, time=point.time, approach=point.approach, before=point.before)
-
-
-def largest_values(scene: Scene, state: State, first: Point, second: Point) -> tuple[float, float]:
-    """Return the largest force [N] and approach [m] so far, to which errors are relative.
-
-    Rounding cannot tell a smaller approach from none: all that a flat surface has under periodic boundaries.
-    """
-    force = max(state.largest_force, first.force, second.force)
-    rounding = ROUNDING * scene.memory.compliance(second.time) * scene.grid.stiffest * force / scene.gap.size
-    approach = max(state.largest_approach, abs(first.approach), abs(second.approach))
-    return max(force, 1e-300), max(approach, rounding / scene.grid.cell_area, 1e-300)
 
 
 def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:
