@@ -166,8 +166,7 @@ def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> D
     """
     gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
     whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    may_crop = body.separates and profile.all_present and not body.kernel.raises_surface
-    if not may_crop or min(shape) < WORTH_CROPPING or math.isinf(approach):
+    if not (body.can_crop and profile.all_present) or min(shape) < WORTH_CROPPING or math.isinf(approach):
         return whole
     near = np.argwhere(gap <= MARGIN * approach)
     if not near.size:
@@ -219,9 +218,8 @@ def choose_surface(
         How many times contact has outgrown the domain.
     """
     body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
-    may_crop = body.separates and not body.kernel.raises_surface
     times = enlarged or 0
-    if settings.boundary == "free" and settings.edge == "error" and (may_crop or is_indenter(profile.height)):
+    if settings.boundary == "free" and settings.edge == "error" and (body.can_crop or is_indenter(profile.height)):
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
             profile = Profile(enlarged_indenter(profile.height), settings.missing, body.kernel)

@@ -203,8 +203,8 @@ def require_loading(
     if math.prod(shape) < WORTH_ASKING:
         return
     memory, rows = choose_memory(body, **memory_options(program, settings)).memory, least_rows(settings, program)
-    free = settings.boundary == "free" and settings.edge == "error"
-    part = 0.0 if free and body.separates and not body.kernel.raises_surface else 1.0  # the domain is not known yet
+    is_free = settings.boundary == "free" and settings.edge == "error"
+    part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
     savings = {"rv.run, which keeps the fields in a file": partial(needed, in_memory=False)} if in_memory else {}
     if in_memory and len(settings.fields) > 1:

@@ -253,6 +253,11 @@ class Body:
         return True
 
     @property
+    def can_crop(self) -> bool:
+        """Whether a part of a surface may be solved on in free space: no cell deeper than the approach touches."""
+        return self.separates and not self.kernel.raises_surface
+
+    @property
     def materials(self) -> tuple[Material, ...]:
         """Materials of the body."""
         return (self.material,)
