@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -34,7 +34,7 @@ from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
 from roughvisc.mechanics.grid import Boundary
-from roughvisc.mechanics.program import Direction
+from roughvisc.mechanics.program import DIRECTIONS, Direction, one_of
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import Settings
@@ -65,8 +65,6 @@ _COUNTING_CAUTION = 1.5
 #: speed on a rough surface it is the difference of two large forces.
 _MEANINGFUL = 0.1
 
-DIRECTIONS: tuple[str, ...] = get_args(Direction)
-
 
 @quantities(speeds="m/s", load="N", pressure="Pa")
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +74,7 @@ class SteadySliding(Experiment):
     Parameters
     ----------
     speeds, load, pressure, direction
-        As :func:`roughvisc.friction` has them; the speeds become a tuple.
+        As :func:`roughvisc.friction` has them; the speeds become a tuple, in the order given.
 
     Raises
     ------
@@ -89,7 +87,7 @@ class SteadySliding(Experiment):
     Steady sliding: 2 speeds from 1 mm/s to 1 m/s along x, under 2 N
     """
 
-    speeds: Sequence[Quantity] | Quantity
+    speeds: Any
     load: Quantity | None = None
     pressure: Quantity | None = None
     direction: Direction = "x"
@@ -105,8 +103,7 @@ class SteadySliding(Experiment):
         if speeds.ndim != 1 or not speeds.size or not (np.isfinite(speeds) & (speeds > 0)).all():
             raise InputError(key="speeds", found=self.speeds, expected="positive numbers [m/s]")
         object.__setattr__(self, "speeds", tuple(speeds.tolist()))
-        if self.direction not in DIRECTIONS:
-            raise InputError(key="direction", found=self.direction, expected=" or ".join(map(repr, DIRECTIONS)))
+        one_of(self.direction, Direction, DIRECTIONS, "direction")
         if self.load is None and self.pressure is None:
             raise InputError(key="load", expected="a load, or a pressure")
         if self.load is not None and self.pressure is not None:
@@ -116,17 +113,11 @@ class SteadySliding(Experiment):
                 raise InputError(key=name, found=value, expected=f"a positive number [{unit}]")
 
     def __repr__(self) -> str:
-        ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.asked), max(self.asked))))
-        count = f"{len(self.asked)} speeds from " if len(self.asked) > 1 else ""
+        ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.speeds), max(self.speeds))))
+        count = f"{len(self.speeds)} speeds from " if len(self.speeds) > 1 else ""
         pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
         under = unit_for([pressed[0] or 0.0], pressed[1]).text(pressed[0] or 0.0)
         return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
-
-    @property
-    def asked(self) -> tuple[float, ...]:
-        """The speeds, in the order given. [m/s]"""
-        assert isinstance(self.speeds, tuple)
-        return self.speeds
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
         """Return the steady states, from the lowest speed to the highest; the state counts those that are found.
@@ -144,11 +135,7 @@ class SteadySliding(Experiment):
         if settings.boundary not in ("periodic", "mirror"):
             yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic' or 'mirror'"
         if settings.boundary == "mirror" and self.load is not None:
-            yield (
-                "boundary",
-                "mirror",
-                "the surface is unfolded to four times its area: expected a pressure",
-            )
+            yield "boundary", "mirror", "the surface is unfolded to four times its area: expected a pressure"
         if "displacement" in settings.fields:
             yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
         if settings.missing != "refuse":
@@ -236,7 +223,7 @@ class SlidingRows(Rows):
         require_memory(shape, partial(curve_bytes, problem.settings))
         if not self._profile.present.all():  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
-        self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.asked))
+        self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.speeds))
         self._force = curve.force(self._profile.area)
         self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
         self._alone = surface_stands_alone(self._profile.height)
@@ -251,8 +238,8 @@ class SlidingRows(Rows):
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
         grid, tolerance = self._grid, self._settings.tolerance
-        for done, number in enumerate(np.argsort(self._curve.asked)[self._done :], self._done + 1):
-            speed = self._curve.asked[number]
+        for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
+            speed = self._curve.speeds[number]
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once a speed: a table takes a fit
             sliding = Sliding(law, grid.gap.shape, grid.spacing, speed)
             found = steady_state(sliding, grid.gap, self._force, tolerance=tolerance)
@@ -314,7 +301,7 @@ class SlidingRows(Rows):
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
-        attributes = facts_of(self.problem.body, longest / min(self._curve.asked), math.inf) | {
+        attributes = facts_of(self.problem.body, longest / min(self._curve.speeds), math.inf) | {
             "direction": self._curve.direction,
             "warnings": warnings_text(stated | warnings),
         }

@@ -406,8 +406,7 @@ class Program:
             raise InputError(key="speed", found=speed, expected=f"either this or over, which is {over!r}")
         lasting = number(over, "s", "over", above=0) if speed is None else far / number(speed, "m/s", "speed", above=0)
         control = self.segments[-1].control if self.segments else "load"
-        towards = one_of(direction, Direction, DIRECTIONS, "direction")
-        return self._then(Segment(control, lasting, slide=Slide(far, towards)))
+        return self._then(Segment(control, lasting, slide=Slide(far, direction)))
 
     @classmethod
     def table(

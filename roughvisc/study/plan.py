@@ -397,9 +397,9 @@ def coarse_run(setup: Setup) -> CoarseRun:
         experiment = Loading(program)
     else:
         assert isinstance(experiment, SteadySliding)
-        order = np.argsort(experiment.asked)
+        order = np.argsort(experiment.speeds)
         few_speeds = order[np.unique(np.linspace(0, len(order) - 1, min(_FEW_SPEEDS, len(order))).astype(int))]
-        experiment, count = replace(experiment, speeds=[experiment.asked[one] for one in few_speeds]), len(order)
+        experiment, count = replace(experiment, speeds=[experiment.speeds[one] for one in few_speeds]), len(order)
     problem = Problem(few, problem.body, settings)
     course = _course(problem, experiment)
     fraction, contact, tally = course.fraction, course.contact, course.tally()

@@ -156,4 +156,4 @@ def creep_time(experiment: Experiment, size: float) -> float:
     if isinstance(experiment, Loading):
         return experiment.program.duration
     assert isinstance(experiment, SteadySliding)
-    return size / min(experiment.asked)
+    return size / min(experiment.speeds)
