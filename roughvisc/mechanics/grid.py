@@ -250,17 +250,17 @@ class Grid:
             rows, columns, threads = nx, count, 1
 
         def transform_rows(part: slice) -> None:
-            spectrum[part] = fft.rows(field[part], points[1])
+            spectrum[part] = fft.waves(field[part], points[1], axes=(1,))
 
         def convolve_columns(part: slice) -> None:
             waves = self._memory((points[0], columns), spectrum.dtype)[:, : part.stop - part.start]
             waves[:nx], waves[nx:] = spectrum[:, part], 0
             waves = fft.columns(waves)
             self.multiply(waves, symbol[:, part])
-            spectrum[:, part] = fft.columns_back(waves)[:nx]
+            spectrum[:, part] = fft.columns(waves, back=True)[:nx]
 
         def rows_back(part: slice) -> None:
-            found[part] = fft.rows_back(spectrum[part], points[1])[:, :ny]
+            found[part] = fft.waves_back(spectrum[part], points[1:], axes=(1,))[:, :ny]
 
         on_threads(transform_rows, nx, rows, threads)
         on_threads(convolve_columns, count, columns, threads)
@@ -355,37 +355,23 @@ if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
 
 
 class Transforms:
-    """Transforms along both axes by SciPy, or by CuPy.
-
-    The way back may overwrite its argument.
-    """
+    """Transforms along both axes, or one, by SciPy, or by CuPy. The way back may overwrite its argument."""
 
     def __init__(self, fft: Any, **settings: Any) -> None:
         self.fft, self.settings = fft, settings
 
-    def waves(self, field: Array) -> Array:
-        """Return the Fourier transform, shape (nx, ny // 2 + 1)."""
-        return self.fft.rfftn(field, **self.settings)
+    def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
+        """Return the Fourier transform, half of it along y, of a field; along y alone also of the field and zeros."""
+        return self.fft.rfftn(field, s=None if points is None else (points,), axes=axes, **self.settings)
 
-    def waves_back(self, spectrum: Array, shape: tuple[int, int]) -> Array:
+    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
         """Return the field of a Fourier transform."""
-        return self.fft.irfftn(spectrum, s=shape, overwrite_x=True, **self.settings)
+        return self.fft.irfftn(spectrum, s=points, axes=axes, overwrite_x=True, **self.settings)
 
-    def rows(self, field: Array, points: int) -> Array:
-        """Return the Fourier transform along y of the field and zeros."""
-        return self.fft.rfft(field, points, axis=1, **self.settings)
-
-    def columns(self, spectrum: Array) -> Array:
-        """Return the Fourier transform along x, which may overwrite the spectrum."""
-        return self.fft.fft(spectrum, axis=0, overwrite_x=True, **self.settings)
-
-    def columns_back(self, spectrum: Array) -> Array:
-        """Return the inverse Fourier transform along x."""
-        return self.fft.ifft(spectrum, axis=0, overwrite_x=True, **self.settings)
-
-    def rows_back(self, spectrum: Array, points: int) -> Array:
-        """Return the field of a Fourier transform along y."""
-        return self.fft.irfft(spectrum, points, axis=1, overwrite_x=True, **self.settings)
+    def columns(self, spectrum: Array, back: bool = False) -> Array:
+        """Return the Fourier transform along x, or the inverse one, which may overwrite the spectrum."""
+        transform = self.fft.ifft if back else self.fft.fft
+        return transform(spectrum, axis=0, overwrite_x=True, **self.settings)
 
     def cosines(self, field: Array) -> Array:
         """Return the cosine transform, type 2."""
@@ -401,28 +387,22 @@ class DuccTransforms(Transforms):
 
     def __init__(self, threads: int) -> None:
         super().__init__(ducc0.fft, nthreads=threads)
-        self.back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, "nthreads": threads}
 
-    def waves(self, field: Array) -> Array:
-        return self.fft.r2c(field, axes=(0, 1), **self.settings)
+    def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
+        if points is not None:
+            longer = _apart((field.shape[0], points), field.dtype)
+            longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
+            field = longer
+        return self.fft.r2c(field, axes=axes, **self.settings)
 
-    def waves_back(self, spectrum: Array, shape: tuple[int, int]) -> Array:
-        return self.fft.c2r(spectrum, axes=(0, 1), lastsize=shape[1], **self.back)
+    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
+        out = _apart((len(spectrum), points[-1]), spectrum.real.dtype) if axes == (1,) else None
+        back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, **self.settings}
+        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back)
 
-    def rows(self, field: Array, points: int) -> Array:
-        longer = _apart((field.shape[0], points), field.dtype)
-        longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
-        return self.fft.r2c(longer, axes=(1,), **self.settings)
-
-    def columns(self, spectrum: Array) -> Array:
-        return self.fft.c2c(spectrum, axes=(0,), out=spectrum, **self.settings)
-
-    def columns_back(self, spectrum: Array) -> Array:
-        return self.fft.c2c(spectrum, axes=(0,), forward=False, inorm=2, out=spectrum, **self.settings)
-
-    def rows_back(self, spectrum: Array, points: int) -> Array:
-        out = _apart((spectrum.shape[0], points), spectrum.real.dtype)
-        return self.fft.c2r(spectrum, axes=(1,), lastsize=points, out=out, **self.back)
+    def columns(self, spectrum: Array, back: bool = False) -> Array:
+        norm = 2 if back else 0
+        return self.fft.c2c(spectrum, axes=(0,), forward=not back, inorm=norm, out=spectrum, **self.settings)
 
     def cosines(self, field: Array) -> Array:
         return self.fft.dct(field, type=2, axes=(0, 1), **self.settings)
