@@ -173,25 +173,20 @@ def with_grid_error(
         log.warning("no grid error: the coarser solve failed: %s", error)
         return _with_errors(dataset, {name: np.full(len(places), math.nan) for name in ("pressure", *histories)})
     ratio = math.sqrt(height.size / few.size)
-    apart = {name: np.abs(coarse[name].values - dataset[name].values) / _largest(dataset, name) for name in histories}
-    apart["pressure"] = pressure_distance(coarse, dataset) / _largest(dataset, "force")
+    known = {"force", "approach", "contact_area", "mean_gap", *histories} & set(map(str, dataset.variables))
+    largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in known}
+    off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
+    apart = {name: off[name] / largest[name] for name in histories}
+    apart["pressure"] = pressure_distance(coarse, dataset) / largest["force"]
     found = {}
     for name, difference in apart.items():
         safety, order = _ONE_COARSER[name]
         found[name] = safety * difference / (ratio**order - 1)
-    hidden = [_hidden_opening(dataset, number) for number in range(len(places))]
-    hidden_area, hidden_gap = (np.array(column) for column in zip(*hidden, strict=True))
-    left_open = [_left_open(dataset, number) for number in range(len(places))]
-    from_edge, from_counting, from_outline = (np.array(column) for column in zip(*left_open, strict=True))
-    off = np.abs(coarse["approach"].values - dataset["approach"].values)
-    given = off < _GIVEN * _largest(dataset, "approach")
-    peak = _from_peak(dataset, _peak(height), given)
-    outline = {"force": np.where(given, from_outline, 0.0), "approach": np.where(given, 0.0, from_outline)}
-    edge = {"pressure": np.maximum(from_edge, peak["force"]), "contact_area": from_counting}
-    opening = {"contact_area": hidden_area, "mean_gap": hidden_gap}
-    for name, error in (*peak.items(), *outline.items(), *edge.items(), *opening.items()):
-        if name in found:  # a result over an axis of its own may do without
-            found[name] = np.maximum(found[name], error)
+    given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
+    for row in range(len(places)):
+        for name, error in _least_errors(dataset, row, largest, bool(given[row]), peak).items():
+            if name in found:  # a result over an axis of its own may do without
+                found[name][row] = np.maximum(found[name][row], error)
     return _with_errors(dataset, found)
 
 
@@ -203,10 +198,6 @@ def _with_errors(dataset: xr.Dataset, found: Mapping[str, Array]) -> xr.Dataset:
         errors[variable] = np.maximum(errors[variable], error) if variable in errors else error
     errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
     return dataset.assign({name: (axis, values) for name, values in errors.items()})
-
-
-def _largest(dataset: xr.Dataset, name: str) -> float:
-    return float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300))
 
 
 def _peak(height: xr.DataArray) -> float:
@@ -223,49 +214,56 @@ def _peak(height: xr.DataArray) -> float:
     return float(sum(values[at] - low for low in lowest)) / 2
 
 
-def _from_peak(dataset: xr.Dataset, peak: float, given: Mask) -> dict[str, Array]:
-    """Errors by quantity if the peak is so much higher [m], relative to the largest.
+def _least_errors(
+    dataset: xr.Dataset, row: int, largest: Mapping[str, float], given: bool, peak: float
+) -> dict[str, float]:
+    """Return the errors of a row by quantity, relative to the largest, that its own grid leaves open.
 
-    Where the approach is given, the gap is wider by as much, and force and area follow from it; under a cone both with
-    its square, under a ball with lower powers.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result.
+    row : int
+        Number of the row.
+    largest : mapping
+        Largest values of force [N], approach [m], contact area [m2] and, if it is known, mean gap. [m]
+    given : bool
+        Whether the approach is given, and not the load.
+    peak : float
+        How much higher the surface may be between the highest cells. [m]
     """
-    approach = np.abs(dataset["approach"].values)
-    part = np.where(given & (approach > 0), 2 * peak / np.maximum(approach, peak or 1.0), 0.0)
-    found = {name: part * dataset[name].values / _largest(dataset, name) for name in ("force", "contact_area")}
-    found["approach"] = np.where(given, 0.0, peak / _largest(dataset, "approach"))
-    found["mean_gap"] = np.where(given, peak / _largest(dataset, "mean_gap"), 0.0) if "mean_gap" in dataset else part
-    return found
+    here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
+    wide = largest.get("mean_gap", math.inf)
+    force, area = here["force"] / largest["force"], here["contact_area"] / largest["contact_area"]
 
+    # The peak: under a given approach the gap is wider by as much, and force and area follow from it; under a cone both
+    # with its square, under a ball with lower powers. Under a given load the approach is less.
+    depth = abs(here["approach"])
+    part = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
+    least = {"pressure": part * force, "force": part * force, "contact_area": part * area}
+    least |= {"approach": 0.0 if given else peak / largest["approach"], "mean_gap": peak / wide if given else 0.0}
 
-def _left_open(dataset: xr.Dataset, row: int) -> tuple[float, float, float]:
-    """Errors of pressure and contact area, relative to the largest, that the edge of a contact may hide.
-
-    And of approach or force, by the cells of the outline where the material ends: a wider punch sinks in less.
-    """
-    pressure = dataset["pressure"].values[row]
-    contact = pressure > 0
+    pressure, height = dataset["pressure"].values[row], dataset["height"].values
+    contact, present = pressure > 0, np.isfinite(height)
     if not contact.any():
-        return 0.0, 0.0, 0.0
-    present = np.isfinite(dataset["height"].values)
+        return least
+    # Small openings that full contact may hide.
+    hidden, gap = hidden_opening(pressure, height, dataset.attrs["boundary"] == "periodic")
+    least["contact_area"] = max(least["contact_area"], hidden * area)
+    least["mean_gap"] = max(least["mean_gap"], gap / max(gap, wide) if gap > 0 else 0.0)
+    # The edge of the contact lies anywhere in its cells.
     at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"])
-    counted = counting_error(contact, faces)
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
-    hidden = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # all of it where no cell lies inside
-    hidden += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
-    force = float(dataset["force"][row]) / _largest(dataset, "force")
-    area = float(dataset["contact_area_counted"][row]) / _largest(dataset, "contact_area")
-    return hidden * force, counted * area, counting_error(contact, ends)
-
-
-def _hidden_opening(dataset: xr.Dataset, row: int) -> tuple[float, float]:
-    """Errors of contact area and mean gap, relative to the largest, by an opening that full contact may hide."""
-    height = dataset["height"].values
-    area, gap = hidden_opening(dataset["pressure"].values[row], height, dataset.attrs["boundary"] == "periodic")
-    area *= float(dataset["contact_area"][row]) / _largest(dataset, "contact_area")
-    if "mean_gap" in dataset and gap > 0:
-        gap /= max(gap, _largest(dataset, "mean_gap"))
-    return area, gap
+    unknown = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # all of it where no cell lies inside
+    unknown += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
+    counted = here["contact_area_counted"] / largest["contact_area"]
+    least["pressure"] = max(least["pressure"], unknown * force)
+    least["contact_area"] = max(least["contact_area"], counting_error(contact, faces) * counted)
+    # The outline where the material ends: a wider punch sinks in less, or carries more.
+    found = "force" if given else "approach"
+    least[found] = max(least[found], counting_error(contact, ends))
+    return least
 
 
 def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[float, float]:
