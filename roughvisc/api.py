@@ -280,7 +280,7 @@ def run(
         message names the file.
     """
     from roughvisc.study.case import Case, read_study
-    from roughvisc.study.execution.single import run_stated
+    from roughvisc.study.execution.run import run_stated
 
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None:

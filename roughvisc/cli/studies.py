@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from roughvisc.study.case import Case
-    from roughvisc.study.execution.task import Outcome
+    from roughvisc.study.execution.outcome import Outcome
 
 _QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 #: Most messages on failed cases.
@@ -128,10 +128,10 @@ def _choose(
     """Return the case with the chosen grid and tolerance, and its budgets; print what was chosen and why."""
     from functools import partial
 
-    from roughvisc.study.execution.monitor import watcher
+    from roughvisc.study.execution.display import Display
     from roughvisc.study.target import choose, parse_targets
 
-    watch, tell = partial(watcher, not console.quiet, console, summary=False), partial(say, console)
+    watch, tell = partial(Display, not console.quiet, console, summary=False), partial(say, console)
     chosen, reasons, budgets = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
     tell("\n  ".join(["Chosen", *reasons]))
     return chosen, budgets
@@ -182,7 +182,7 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Client | None, **computing: Any) -> None:
     """Compute and summarise a sweep."""
-    from roughvisc.study.execution.monitor import watcher
+    from roughvisc.study.execution.display import Display
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.index import index_of
@@ -190,7 +190,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Clien
     from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
     from roughvisc.views.console.tables import realisations_tables, sweep_table
 
-    outcomes = run_cases(cases, folder, client=client, watch=watcher(not console.quiet, console), **computing)
+    outcomes = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
@@ -209,7 +209,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Clien
 
 def _fail_if_any(cases: Sequence[Case], outcomes: Mapping[str, Outcome], log: Path) -> None:
     """Write the messages of the cases that are not done, and end with the status of the sweep."""
-    from roughvisc.study.execution.task import REFUSED
+    from roughvisc.study.execution.outcome import REFUSED
     from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
 
     bad, number = (

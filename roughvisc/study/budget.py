@@ -12,7 +12,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
-from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
 from roughvisc.study.neighbours import at_rows, compared, solve, with_rows
 from roughvisc.study.quantities import quantity_of
@@ -139,7 +139,7 @@ def budgets(
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, [field for one in observed for field in one.fields], places)
     own = _own_result(case, finished, base, places)
-    solved = partial(solve, folder=folder, watch=partial(watcher, progress), client=client, workers=workers)
+    solved = partial(solve, folder=folder, watch=partial(Display, progress), client=client, workers=workers)
     return compared(base, base.height(), known, observed, solved, own=own, places=places)
 
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.study.case import Case, vary
-from roughvisc.study.execution.monitor import Monitor
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable, creep_time
 from roughvisc.study.storage.store import open_result, result_path
@@ -255,7 +255,7 @@ def solve(
     cases: Iterable[Case],
     folder: Path,
     *,
-    watch: Callable[[], Monitor],
+    watch: Callable[[], Display],
     client: Client | None = None,
     workers: int | None = 0,
     threads: int | None = None,
@@ -281,7 +281,7 @@ def solve(
     outcomes = run_cases(
         list(distinct.values()),
         folder,
-        watch=watch(),
+        display=watch(),
         client=client,
         workers=workers if client is None else None,
         threads=threads,

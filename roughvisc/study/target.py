@@ -24,9 +24,8 @@ from roughvisc.settings import Settings
 from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.monitor import Monitor, watcher
-from roughvisc.study.execution.run import is_result_of, result_folder
-from roughvisc.study.execution.single import run_stated
+from roughvisc.study.execution.display import Display
+from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
 from roughvisc.study.neighbours import (
     GRID,
     KNOWN,
@@ -133,7 +132,7 @@ def run(
 ) -> xr.Dataset:
     """Return the result of the case that is chosen for wanted errors; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
-    watch = partial(watcher, progress, summary=False)
+    watch = partial(Display, progress, summary=False)
     chosen, reasons, budgets = choose(
         case, want, folder, watch=watch, tell=log.info, client=default_client(), threads=threads
     )
@@ -147,7 +146,7 @@ def choose(
     want: Mapping[str, Any],
     folder: Path,
     *,
-    watch: Callable[[], Monitor],
+    watch: Callable[[], Display],
     tell: Callable[[str], None],
     client: Client | None = None,
     workers: int | None = 0,

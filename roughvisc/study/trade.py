@@ -23,7 +23,7 @@ from roughvisc.labels import label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.steps import steps_of
 from roughvisc.study.case import Case, read_study, vary
-from roughvisc.study.execution.monitor import watcher
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged
 from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
@@ -166,7 +166,7 @@ def trade(
             continue
         changed = on_cells(vary(base, {"solve.tolerance": setting[0]}), height, setting[1])
         try:
-            (result,) = solve([changed], folder, watch=partial(watcher, progress, summary=False)).values()
+            (result,) = solve([changed], folder, watch=partial(Display, progress, summary=False)).values()
         except RoughviscError as error:
             notes[setting] = str(error).removeprefix(f"{case.origin}: ")
             continue

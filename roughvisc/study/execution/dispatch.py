@@ -1,254 +1,231 @@
-"""Cases on the workers of a Dask client: one future each, submitted again if its worker is lost."""
+"""Cases on the workers of a Dask client: the task of a worker, and the loop that submits cases and records their ends.
+
+Dask submits the case of a lost worker again, and the case resumes from its checkpoint.
+"""
 
 from __future__ import annotations
 
 import concurrent.futures
 import logging
 import secrets
+import signal
 import threading
 import time
-from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from typing import Any
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from distributed import CancelledError, Client, KilledWorker, as_completed
+from distributed import CancelledError, Client, KilledWorker, as_completed, get_worker
+from distributed.core import Status
 
 from roughvisc.errors import RoughviscError
-from roughvisc.study.execution.monitor import SweepLog
-from roughvisc.study.execution.task import Outcome, Report, on_worker, stop_sweep
+from roughvisc.study.case import Case
+from roughvisc.study.execution.outcome import Outcome, attempt
+from roughvisc.study.storage.lock import lock_path
+
+if TYPE_CHECKING:
+    from distributed import Future, Worker
+
+    from roughvisc.study.execution.sweep import Record
 
 log = logging.getLogger("roughvisc")
 
-#: A case is given up for now when its worker was lost so often while it computed it, and it came no further.
-_LOSSES = 2
-#: Coming further is to pass the furthest point so far by this part of the program.
-_FURTHER = 0.01
-#: Whatever is known of a case, it is submitted no more often than this.
-_SUBMISSIONS = 20
-#: A worker that was lost may hold the lock of its case for so long. [s]
-_LINGERING = 90.0
-#: Seconds that running cases get to reach the end of their step when a sweep is interrupted.
+#: Time between two reports of one case. [s]
+_REPORT_EVERY = 0.5
+#: Time that running cases have to end their step when a sweep is interrupted. [s]
 _PATIENCE = 120.0
-#: The message if the scheduler does not answer any more.
-_LOST = "the scheduler was lost: finished results are kept; repeat the command to resume"
-#: Without any worker for so long, the user is told; and so often it is looked. [s]
-_ALONE_AFTER, _LOOK_EVERY = 30.0, 5.0
+#: Time without any worker after which a message says so. [s]
+_ALONE_AFTER = 30.0
+#: States of a worker that is leaving: by a signal, or at the end of its lifetime.
+_LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
+#: A worker computes one case at a time, with all its threads.
+_one_at_a_time = threading.Lock()
 
 
-@dataclass
-class _CaseStatus:
-    """What is known of a case on its way.
-
-    Attributes
-    ----------
-    submissions : int
-        How often it was submitted.
-    begun : int
-        How often a worker began with it.
-    tries : int
-        The same, since it last came further.
-    furthest : float
-        Part of the program that was computed at most.
-    worker : str
-        Address of the worker that began with it last.
-    refused : float or None
-        When it was first found locked by a worker that was lost. [s]
-    """
-
-    submissions: int = 0
-    begun: int = 0
-    tries: int = 0
-    furthest: float = 0.0
-    worker: str = ""
-    refused: float | None = None
-
-    def heard(self, report: Report) -> None:
-        """A worker reports."""
-        if not report["end"]:
-            self.begun, self.tries, self.worker = self.begun + 1, self.tries + 1, report["worker"]
-        elif (reached := report["now"] / report["end"]) > self.furthest + _FURTHER:
-            self.furthest, self.tries = reached, 1
-
-    def is_lingering(self) -> bool:
-        """Whether the worker that was lost may be what locks the case."""
-        self.refused = self.refused or time.monotonic()
-        return self.begun > 1 and time.monotonic() - self.refused < _LINGERING
-
-
-@dataclass
-class _Dispatch:
-    """Cases on their way to their ends.
-
-    Attributes
-    ----------
-    waiting : deque of str
-        Keys of the cases that are to be submitted.
-    """
-
-    client: Client
-    book: SweepLog
-    texts: Mapping[str, str]
-    arguments: tuple[Any, ...]
-    name: str
-    finished: Any
-    courses: dict[str, _CaseStatus]
-    futures: dict[Any, str] = field(default_factory=dict)
-    waiting: deque[str] = field(default_factory=deque)
-
-    def feed(self) -> None:
-        """Submit the waiting cases."""
-        while self.waiting:
-            self.submit(self.waiting.popleft())
-
-    def submit(self, key: str) -> None:
-        """Submit a case."""
-        course = self.courses[key]
-        course.submissions += 1
-        name = f"{self.name}-{key}-{course.submissions}"
-        future = self.client.submit(on_worker, self.texts[key], key, *self.arguments, key=name, pure=False)
-        self.futures[future] = key
-        self.finished.add(future)
-
-    def heard(self, event: tuple[float, Report]) -> None:
-        report = event[1]
-        self.courses[report["key"]].heard(report)
-        self.book.watch.reached(report["key"], report["now"], report["end"])
-
-    def take(self, going_on: bool) -> None:
-        """Record finished cases; submit those again, if the sweep goes on, that a lost worker has left behind."""
-        full: OSError | None = None
-        for future, result in self.finished.next_batch(block=False):
-            key = self.futures.pop(future)
-            outcome = _outcome(key, result, self.courses[key], self.client)
-            if outcome.kind != "interrupted":
-                try:
-                    self.book.ended(outcome)
-                except OSError as error:  # after the others, which have ended too
-                    full = error
-            elif going_on:
-                log.info("%s: resumes on another worker", key)
-                self.waiting.append(key)
-        if full is not None:
-            raise full
-
-
-def distribute(texts: Mapping[str, str], book: SweepLog, client: Client, threads: int | None, link: str) -> None:
-    """Bring cases to their ends on the workers of a client.
+def distribute(
+    texts: Mapping[str, str], record: Record, client: Client, threads: int | None, *, own: bool = False
+) -> None:
+    """Compute cases on the workers of a client.
 
     Parameters
     ----------
     texts : dict
         Key -> case as JSON.
-    book : Book
-        Keeps account; its folder is that of the results.
+    record : Record
+        Record of the sweep; its folder is that of the results.
     client : distributed.Client
-        Of the workers.
+        Client of the workers.
     threads : int or None
-        Of the transforms; None: as many as a worker has.
-    link : str
-        Address of Dask's dashboard, if there is one.
+        Number of threads of each case. None: those of its worker.
+    own : bool
+        Whether the workers are child processes of this one, which answers their signals.
 
     Raises
     ------
     RoughviscError
         If the scheduler was lost.
+    OSError
+        If the disk is full.
     KeyboardInterrupt, SystemExit
-        If interrupted; the running cases have written a checkpoint by then, if their workers are there.
+        If interrupted. The running cases have written a checkpoint by then, unless their workers were lost.
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
+    stop_file = record.folder / f".{name}.stop"
+    shared: dict[str, Any] = {"folder": str(record.folder), "name": name, "threads": threads, "own": own}
+    futures: dict[Future[Outcome], str] = {}
+    number, taken_over = count(), set[str]()
+    workers: dict[str, list[str]] = {key: [] for key in texts}  # that began each case
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
-    courses = {key: _CaseStatus() for key in texts}
-    cases = _Dispatch(client, book, texts, (str(book.folder), name, threads), name, finished, courses)
-    client.subscribe_topic(name, cases.heard)
+
+    def submit(keys: Sequence[str], *, takes_over: bool = False) -> None:
+        names = [f"{name}-{key}-{next(number)}" for key in keys]
+        json = [texts[key] for key in keys]
+        new = client.map(on_worker, json, keys, key=names, pure=False, takes_over=takes_over, **shared)
+        futures.update(zip(new, keys, strict=True))
+        finished.update(new)
+
+    def heard(event: tuple[float, dict[str, Any]]) -> None:
+        key, worker, now, end = event[1].values()
+        if not end:
+            if workers[key]:
+                log.info("%s: worker %s has gone, resumes on %s", key, workers[key][-1], worker)
+                record.display.say(f"worker {workers[key][-1]} has gone; the case resumes on {worker}", key)
+            workers[key].append(worker)
+        record.display.reached(key, now, end)
+
+    client.subscribe_topic(name, heard)
+    seen, said = time.monotonic(), False
     try:
-        book.begin(link)
-        cases.waiting.extend(texts)
-        try:
-            _go_on(cases)
-        except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue makes a Ctrl-C a SystemExit
-            if isinstance(error, OSError) and client.status != "running":
-                raise RoughviscError(_LOST) from error
-            book.watch.stopping()
-            _stop(cases)
-            raise
-    finally:
-        with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be gone
-            client.unsubscribe_topic(name)
-
-
-def _go_on(cases: _Dispatch) -> None:
-    """Record finished cases until none is left; tell the user if the cluster has no worker."""
-    looked = seen = time.monotonic()
-    said = False
-    while cases.futures or cases.waiting:
-        cases.feed()
-        cases.take(going_on=True)
-        cases.book.watch.tick()
-        time.sleep(0.1)
-        if time.monotonic() - looked < _LOOK_EVERY:
-            continue
-        looked = time.monotonic()
-        if _workers(cases.client):
-            seen, said = looked, False
-        elif looked - seen >= _ALONE_AFTER and not said:
-            said = True
-            cases.book.tell(
-                f"the cluster has had no worker for {looked - seen:.0f} s "
-                f"({len(cases.futures) + len(cases.waiting)} cases to go): start "
-                "workers (dask worker), or check whether their jobs are queued (squeue); the cases start as soon as "
-                "one joins. Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
-            )
-
-
-def _stop(cases: _Dispatch) -> None:
-    """Have the running cases stop at the end of their step, and wait for those whose workers are there."""
-    client = cases.client
-
-    def tell() -> None:
-        with suppress(OSError, RuntimeError, ValueError):  # a worker that does not answer holds up nothing
-            client.run(stop_sweep, cases.name, on_error="ignore")
-
-    threading.Thread(target=tell, daemon=True).start()
-    until = time.monotonic() + _PATIENCE
-    with suppress(RoughviscError, OSError):  # the scheduler is gone, and they with it; or the disk is full again
-        while time.monotonic() < until:
-            cases.take(going_on=False)
-            there = _workers(client)
-            if not any(cases.courses[key].worker in there for key in cases.futures.values()):
-                break
-            cases.book.watch.tick()
+        submit(list(texts))
+        while futures:
+            for future, found in finished.next_batch(block=False):
+                key = futures.pop(future)
+                outcome = _outcome(key, found)
+                if outcome.kind == "held" and len(workers[key]) > 1 and key not in taken_over:
+                    taken_over.add(key)  # a worker of this sweep that does not answer holds it
+                    submit([key], takes_over=True)
+                elif outcome.kind != "interrupted":
+                    record.ended(outcome)
+                elif client.status == "running":  # its worker is leaving, or another client has restarted the workers
+                    submit([key])
+                else:
+                    raise ConnectionError
             time.sleep(0.1)
-    client.cancel(list(cases.futures))
+            if said or time.monotonic() - seen < _ALONE_AFTER:
+                continue
+            seen = time.monotonic()
+            if not client.nthreads():
+                said = True
+                record.warn(
+                    f"the cluster has had no worker for a while ({len(futures)} cases to go): start workers (dask "
+                    "worker), or check whether their jobs are queued (squeue); the cases start as soon as one joins. "
+                    "Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
+                )
+    except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue makes a Ctrl-C a SystemExit
+        if isinstance(error, OSError) and client.status != "running":
+            lost = "the scheduler was lost: finished results are kept; repeat the command to resume"
+            raise RoughviscError(lost) from error
+        record.display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
+        with suppress(OSError):  # the disk is full, or the scheduler is lost now
+            stop_file.touch()
+            until = time.monotonic() + _PATIENCE
+            while time.monotonic() < until:
+                running = [workers[key][-1] for future, key in futures.items() if workers[key] and not future.done()]
+                if not client.nthreads().keys() & running:
+                    break
+                time.sleep(0.1)
+        raise
+    finally:
+        with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be lost
+            client.cancel(list(futures))
+            client.unsubscribe_topic(name)
+        stop_file.unlink(missing_ok=True)
 
 
-def _workers(client: Client) -> set[str]:
-    """Addresses of the workers that the scheduler knows."""
-    return set(client.nthreads())
-
-
-def _outcome(key: str, result: Any, course: _CaseStatus, client: Client) -> Outcome:
-    """Return how a future ended; ``interrupted`` is a case that is to be submitted again."""
-    if isinstance(result, tuple):  # as_completed gives an exception as sys.exc_info does
-        result = result[1]
-    again = course.submissions < _SUBMISSIONS
-    if isinstance(result, Outcome):
-        lingers = result.kind == "held" and course.is_lingering()
-        return Outcome(key, "interrupted") if lingers else result
-    if isinstance(result, KilledWorker):
-        if course.tries < _LOSSES and again:  # it merely queued there, or had come further
-            return Outcome(key, "interrupted")
-        return Outcome(
-            key,
-            "hindered",
-            f"the worker that computed it was lost {course.tries} times, the last at {result.last_worker.address}: "
-            "killed, out of memory (roughvisc plan says how much a case needs), or out of time; repeat the command to "
-            "resume from the last checkpoint",
-            "KilledWorker",
+def _outcome(key: str, found: Any) -> Outcome:
+    """Return the outcome of a case from what its future holds: an outcome, or an exception as of ``sys.exc_info``."""
+    if isinstance(found, Outcome):
+        return found
+    error = found[1] if isinstance(found, tuple) else found
+    if isinstance(error, CancelledError | concurrent.futures.CancelledError):
+        return Outcome(key, "interrupted")
+    message = f"{type(error).__name__}: {error}"
+    if isinstance(error, KilledWorker):
+        message = (
+            f"its worker was lost {error.allowed_failures + 1} times, the last at {error.last_worker.address}: killed, "
+            "out of memory (roughvisc plan says how much a case needs), or out of time; repeat the command to resume "
+            "from the last checkpoint"
         )
-    if isinstance(result, CancelledError | concurrent.futures.CancelledError):
-        if client.status == "running" and again:  # another client has restarted the workers
+    return Outcome(key, "hindered", message, type(error).__name__)
+
+
+def on_worker(
+    text: str, key: str, *, folder: str, name: str, threads: int | None, own: bool, takes_over: bool
+) -> Outcome:
+    """Compute a case on a worker; the outcome is ``interrupted``, with a checkpoint, if the case is to stop.
+
+    Parameters
+    ----------
+    text, key : str
+        The case as JSON, and its key.
+    folder : str
+        Results folder, absolute.
+    name : str
+        Name of the sweep, the topic of its reports.
+    threads : int or None
+        Number of threads. None: those of the worker.
+    own : bool
+        Whether the worker is a child process of that of the sweep.
+    takes_over : bool
+        Whether the lock of the case belongs to a lost worker.
+    """
+    worker = get_worker()
+    task, stop_file, last = worker.get_current_task(), Path(folder, f".{name}.stop"), 0.0
+    worker.loop.add_callback(_take_signals, worker, own)
+
+    def report(now: float, end: float) -> None:
+        nonlocal last
+        if not end or time.monotonic() - last >= _REPORT_EVERY:
+            last = time.monotonic()
+            worker.log_event(name, {"key": key, "worker": worker.address, "now": float(now), "end": float(end)})
+
+    def stop() -> bool:
+        state = worker.state.tasks.get(task)  # cancelled if the client has gone
+        return worker.status in _LEAVING or state is None or state.state == "cancelled" or stop_file.exists()
+
+    with _one_at_a_time:
+        if stop():
             return Outcome(key, "interrupted")
-        raise RoughviscError(_LOST)
-    return Outcome(key, "hindered", f"{type(result).__name__}: {result}", type(result).__name__)
+        report(0.0, 0.0)
+        if not Path(folder).is_dir():
+            expected = "expected a results folder that every worker shares, under the same path"
+            return Outcome(key, "hindered", f"on {worker.address}: {folder}: does not exist: {expected}")
+        try:
+            case = Case.from_json(text)
+            if case.key != key:
+                there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
+                return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
+            if takes_over:
+                lock_path(Path(folder), key).unlink(missing_ok=True)
+            return attempt(case, Path(folder), progress=report, stop=stop, threads=threads or worker.state.nthreads)
+        except RoughviscError as error:  # a file that this machine does not have
+            expected = "expected the files of the study where every worker can read them, under the same path"
+            return Outcome(key, "hindered", f"on {worker.address}: {error}; {expected}", type(error).__name__)
+        except KeyboardInterrupt:  # would end the worker
+            return Outcome(key, "interrupted")
+
+
+def _take_signals(worker: Worker, own: bool) -> None:
+    """Have the process of a sweep answer the signals of its workers, and another worker close in order at SIGTERM.
+
+    Terminals send Ctrl-C, and batch systems SIGTERM, to every process of a job.
+    """
+    if threading.current_thread() is not threading.main_thread():  # a worker in a thread of the user's process
+        return
+    if own:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    else:
+        signal.signal(signal.SIGTERM, lambda *_: worker.loop.add_callback(worker.close, nanny=False, reason="SIGTERM"))

@@ -214,21 +214,6 @@ def run_case(
     return path
 
 
-def set_aside_damaged(case: Case, folder: Path) -> str:
-    """Rename the file of a case if it is damaged, unless a run is at work on it; return the line that says so.
-
-    Raises
-    ------
-    InputError
-        If a file of that name cannot be read or is something else.
-    """
-    path = result_path(folder, case.key)
-    if not is_result_of(case, path):
-        with suppress(OSError), lock_case(lock_path(folder, case.key), patience=0.0):
-            return _set_aside_if_damaged(path)
-    return ""
-
-
 def _set_aside_if_damaged(path: Path) -> str:
     try:
         open_result(path).close()
@@ -251,6 +236,20 @@ def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: Checkpo
     except KeyboardInterrupt:
         keeper.save()
         raise
+
+
+def run_stated(
+    case: Case, out: str | Path | None = None, *, progress: bool | Progress = True, threads: int | None = None
+) -> xr.Dataset:
+    """Run a case unless its result exists, and open the result; see :func:`roughvisc.run`."""
+    folder = result_folder(case, out, to_write=False)
+    if not is_result_of(case, result_path(folder, case.key)):
+        require_writable(folder, "since the case is not finished")
+    path = run_case(case, folder, progress=progress, threads=threads)
+    dataset = open_result(path)
+    if complaint := unconverged(dataset):
+        raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
+    return dataset
 
 
 def is_result_of(case: Case, path: Path) -> bool:

@@ -1,11 +1,14 @@
-"""Many cases on Dask: one task and one file each; what is finished is kept, and what fails stops nothing else."""
+"""Many cases: one file each, in this process or on Dask; a finished case is kept, and a failed one stops no other."""
 
 from __future__ import annotations
 
+import errno
 import importlib.util
+import json
 import logging
-from collections.abc import Mapping, Sequence
-from contextlib import nullcontext, suppress
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,13 +24,15 @@ from roughvisc.study.execution.cluster import (
     side_by_side,
     threads_each,
 )
-from roughvisc.study.execution.monitor import Monitor, SweepLog
-from roughvisc.study.execution.run import result_folder, set_aside_damaged
-from roughvisc.study.execution.task import REFUSED, Outcome, outcome_of, run_case_safely
-from roughvisc.study.storage.failures import forget_failure, log_file, recorded_failure
+from roughvisc.study.execution.display import Display
+from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attempt, outcome_of
+from roughvisc.study.execution.run import result_folder
+from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
 from roughvisc.study.storage.files import is_writable, require_writable
-from roughvisc.study.storage.index import Index, index_of, warn_of
+from roughvisc.study.storage.index import Entry, Index, index_of, save_index
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
+from roughvisc.study.storage.table import write_table
 from roughvisc.study.storage.upkeep import clean_folder
 
 if TYPE_CHECKING:
@@ -35,6 +40,9 @@ if TYPE_CHECKING:
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
+
+#: Time between two savings of the index and the table of a running sweep. [s]
+_SAVE_EVERY = 60.0
 
 
 def sweep(
@@ -95,8 +103,6 @@ def sweep(
     folder = result_folder(cases[0], out, to_write=False).absolute()
     if client is None and workers is None:
         client = default_client()
-    from roughvisc.study.execution.monitor import watcher
-
     outcomes = run_cases(
         cases,
         folder,
@@ -104,7 +110,7 @@ def sweep(
         workers=workers,
         retry_failed=retry_failed,
         threads=threads,
-        watch=watcher(progress),
+        display=Display(progress),
     )
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
     for outcome in bad:
@@ -119,25 +125,25 @@ def run_cases(
     cases: Sequence[Case],
     folder: Path,
     *,
-    watch: Monitor,
+    display: Display,
     client: Client | None = None,
     workers: int | None = None,
     retry_failed: bool = False,
     threads: int | None = None,
 ) -> dict[str, Outcome]:
-    """Bring all cases to their files; see :func:`sweep`.
+    """Compute the cases without a result; see :func:`sweep`.
 
     Returns
     -------
     dict
-        Key of each distinct case -> how it ended, in the order of the cases.
+        Key of each distinct case -> its outcome, in the order of the cases.
 
     Raises
     ------
     InputError
         If a setting is wrong, or a file under the name of a result cannot be read.
     OSError
-        If the disk is full; the cases that are left are not begun.
+        If the disk is full; no further case is begun.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt
@@ -148,33 +154,37 @@ def run_cases(
         raise InputError(f"workers is {workers}: {problem}")
     if client is not None and client.asynchronous:
         raise InputError("client is asynchronous: expected a Client(asynchronous=False)")
-    distinct = {case.key: case for case in cases}
-    folder = folder.absolute()
+    distinct, folder = {case.key: case for case in cases}, folder.absolute()
     writable = is_writable(folder)
-    if not folder.exists():
-        require_writable(folder)
-        folder.mkdir(parents=True)
     with log_file(folder) if writable else nullcontext():
-        if writable:
-            clean_folder(folder)
-        index = index_of(folder, warn=False)
-        outcomes = _known(distinct, folder, index, retry_failed)
+        index = Index({})
+        if folder.exists():
+            if writable:
+                clean_folder(folder)
+            index = index_of(folder)
+        outcomes = {}
+        for key in distinct:
+            if entry := index.entries.get(key):
+                outcomes[key] = outcome_of(entry, reused=True)
+            elif (failed := recorded_failure(folder, key)) and not retry_failed:
+                outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
+        processes = 0
         if todo:
             require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
-        processes = 0 if client is not None else _processes(workers, list(todo.values()))
-        if processes:
-            try:
+            if client is None and workers is None:
+                processes = side_by_side(list(todo.values()), min(cores(), len(todo))) if len(todo) > 1 else 0
+            elif client is None:
+                processes = min(workers or 0, len(todo))
+            if processes:
                 refuse_unguarded_script()
-            except InputError:
-                with suppress(OSError):  # of other results in it
-                    folder.rmdir()
-                raise
+            folder.mkdir(parents=True, exist_ok=True)
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        book = SweepLog(folder, cases, outcomes, watch, [o.entry for o in outcomes.values() if o.entry])
+        record = Record(folder, cases, outcomes, display)
+        if not writable:
+            record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
-            _tell_beforehand(book, index, todo, writable)
-            _compute(todo, folder, book, client, processes, threads)
+            _compute(todo, record, client, processes, threads)
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
             raise
@@ -182,76 +192,106 @@ def run_cases(
             log.warning("%s", error.strerror or error)
             raise
         finally:
-            book.save()
-            watch.close()
-        hindered = {key: case for key, case in todo.items() if outcomes[key].kind in ("hindered", "held")}
-        for key, entry in index_of(folder).entries.items() if hindered else ():
-            if key in hindered:  # another run has finished it meanwhile
-                outcomes[key] = outcome_of(entry, reused=True)
+            record.save()
+            display.close()
     return {key: outcomes[key] for key in distinct}
 
 
-def _tell_beforehand(book: SweepLog, index: Index, todo: Mapping[str, Case], writable: bool) -> None:
-    """Say what there is to say of the folder before anything is computed, each thing once."""
-    if not writable:
-        book.tell(f"{book.folder}: is not writable: all cases are finished, and nothing is written")
-    problems = dict(index.problems)
-    for key in index.problems.keys() & todo.keys():
-        if told := set_aside_damaged(todo[key], book.folder):
-            book.watch.message(told)
-            del problems[key]
-    warn_of(book.folder, problems)
+def _compute(todo: dict[str, Case], record: Record, client: Client | None, processes: int, threads: int | None) -> None:
+    """Compute cases on the workers of a client, in some processes of a local cluster, or in this process."""
+    if todo and (client is not None or processes):
+        from roughvisc.study.execution.dispatch import distribute  # slow to import
 
-
-def _known(distinct: Mapping[str, Case], folder: Path, index: Index, retry_failed: bool) -> dict[str, Outcome]:
-    """What needs not be computed: finished cases, and those that are known to fail."""
-    outcomes = {}
-    for key in distinct:
-        record = recorded_failure(folder, key)
-        entry = index.entries.get(key)
-        if entry is not None:
-            forget_failure(folder, key)
-            outcomes[key] = outcome_of(entry, reused=True)
-        elif record is not None and not retry_failed:
-            outcomes[key] = Outcome(key, "failed", record["message"], record["error"], reused=True)
-    return outcomes
-
-
-def _compute(
-    todo: Mapping[str, Case],
-    folder: Path,
-    book: SweepLog,
-    client: Client | None,
-    processes: int,
-    threads: int | None,
-) -> None:
-    if not todo or (client is None and not processes):
-
-        def report(key: str, now: float, end: float) -> None:
-            book.watch.reached(key, now, end)
-            book.watch.tick()
-
-        book.begin()
-        for key, case in todo.items():
-            progress, here = partial(report, key), threads or cores()
-            book.ended(run_case_safely(case, folder, progress=progress, stop=None, threads=here))
+        texts = {key: case.to_json() for key, case in todo.items()}
+        if client is not None:
+            require_same_version(client)
+            record.begin(client.dashboard_link)
+            distribute(texts, record, client, threads)
+        else:
+            with local_client(processes) as own:
+                record.begin(own.dashboard_link if importlib.util.find_spec("bokeh") else "")
+                distribute(texts, record, own, threads or threads_each(processes), own=True)
         return
-    from roughvisc.study.execution.dispatch import distribute
-
-    texts = {key: case.to_json() for key, case in todo.items()}
-    if client is not None:
-        require_same_version(client)
-        distribute(texts, book, client, threads, client.dashboard_link)
-        return
-    with local_client(processes) as own:
-        link = own.dashboard_link if importlib.util.find_spec("bokeh") else ""
-        distribute(texts, book, own, threads or threads_each(processes), link)
+    record.begin()
+    for key, case in todo.items():
+        progress = partial(record.display.reached, key)
+        record.ended(attempt(case, record.folder, progress=progress, threads=threads or cores()))
 
 
-def _processes(workers: int | None, cases: Sequence[Case]) -> int:
-    """Processes of the default cluster for some cases; 0: this process."""
-    if workers is not None:
-        return min(workers, len(cases))
-    if len(cases) <= 1:
-        return 0
-    return side_by_side(cases, min(cores(), len(cases)))
+class Record:
+    """Record of a running sweep: outcomes of its cases, log, table and index.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    cases : sequence of Case
+        Cases in the order of the study.
+    outcomes : dict
+        Key -> outcome of each case that has ended, to which this adds.
+    display : Display
+        Display of the sweep.
+    """
+
+    def __init__(self, folder: Path, cases: Sequence[Case], outcomes: dict[str, Outcome], display: Display) -> None:
+        self.folder, self.display = folder, display
+        self._cases, self._outcomes = cases, outcomes
+        self._by_key = {case.key: case for case in cases}
+        self._listed = sweep_cases(cases)
+        self._saved = time.monotonic()
+        if is_writable(folder):
+            write_sweep(folder, self._listed)
+
+    def begin(self, link: str = "") -> None:
+        """Display the cases, and the address of Dask's dashboard."""
+        if link:
+            log.info("dashboard: %s", link)
+        self.display.begin(self._cases, link)
+        for outcome in self._outcomes.values():
+            self.display.ended(outcome)
+
+    def ended(self, outcome: Outcome) -> None:
+        """Record the end of a case.
+
+        Raises
+        ------
+        OSError
+            If the disk was full, which further cases would only repeat.
+        """
+        self._outcomes[outcome.key] = outcome
+        case, level = self._by_key[outcome.key], logging.INFO if outcome.kind == "done" else logging.WARNING
+        told = (outcome.key, IN_WORDS[outcome.kind], outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
+        log.log(level, "%s %s %.3g s %s %s", *told)
+        if outcome.trace:
+            log.error("%s", outcome.trace)
+        if outcome.kind == "failed" and len(self._by_key) > 1:
+            record_failure(self.folder, case, outcome.message, outcome.error, outcome.trace)
+        self.display.ended(outcome)
+        if len(self._by_key) > 1 and time.monotonic() - self._saved > _SAVE_EVERY:
+            self.save()
+        if outcome.disk_full:
+            finished = len(self._entries())
+            raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self._by_key)} cases are finished)")
+
+    def warn(self, text: str) -> None:
+        """Display and log an urgent message."""
+        log.warning("%s", text)
+        self.display.warn(text)
+
+    def save(self) -> None:
+        """Write the index and the table of the folder, and take over results that another run has finished."""
+        self._saved = time.monotonic()
+        if not is_writable(self.folder):
+            return
+        index = index_of(self.folder, self._entries())
+        for key, outcome in self._outcomes.items():
+            if key in index.entries:
+                forget_failure(self.folder, key)
+                if outcome.entry is None:
+                    self._outcomes[key] = outcome_of(index.entries[key], reused=True)
+        save_index(self.folder, index)
+        held = {key: outcome.message for key, outcome in self._outcomes.items() if outcome.kind == "held"}
+        write_table(self.folder, index, self._listed, held)
+
+    def _entries(self) -> list[Entry]:
+        return [outcome.entry for outcome in self._outcomes.values() if outcome.entry]

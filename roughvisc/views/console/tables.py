@@ -20,7 +20,7 @@ from roughvisc.views.realisation_rows import realisation_rows
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roughvisc.study.execution.task import Outcome
+    from roughvisc.study.execution.outcome import Outcome
 
 #: What is stated of accuracy, and its parts, each at its worst.
 _ERRORS = {

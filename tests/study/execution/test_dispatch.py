@@ -17,7 +17,7 @@ import roughvisc as rv
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, default_client
-from roughvisc.study.execution.monitor import Monitor
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.failures import record_path
 
@@ -63,16 +63,20 @@ def worker_process(client, *options):
         process.wait(60)
 
 
-class Ear(Monitor):
-    """Keeps what a sweep is told: times reached, and messages."""
+class Ear(Display):
+    """Keeps what a sweep displays: times reached, lines, and urgent messages."""
 
     def __init__(self):
-        self.heard, self.messages = [], []
+        super().__init__(False)
+        self.heard, self.lines, self.messages = [], [], []
 
     def reached(self, key, now, end):
         self.heard.append((key, now, end))
 
-    def message(self, text):
+    def say(self, text, key=""):
+        self.lines.append(text)
+
+    def warn(self, text):
         self.messages.append(text)
 
     def wait_until(self, condition):
@@ -100,7 +104,7 @@ def test_worker_with_another_version__is_refused_by_its_address(study, tmp_path)
         client.wait_for_workers(1, timeout=60)
         ((address, _),) = client.nthreads().items()
         with refused(f"worker {address}", "0.0.7"):
-            run_cases(study(), tmp_path / "out", watch=Monitor(), client=client)
+            run_cases(study(), tmp_path / "out", display=Display(False), client=client)
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
@@ -113,7 +117,7 @@ def test_scan_that_a_worker_cannot_read__fails_no_case(study, tmp_path):
     (tmp_path / "rough.nc").rename(tmp_path / "elsewhere.nc")
     with thread_workers(1) as client:
         ((address, _),) = client.nthreads().items()
-        (outcome,) = run_cases(cases, tmp_path / "out", watch=Monitor(), client=client).values()
+        (outcome,) = run_cases(cases, tmp_path / "out", display=Display(False), client=client).values()
     assert outcome.kind == "hindered"
     assert str(tmp_path / "rough.nc") in outcome.message
     assert address in outcome.message
@@ -141,7 +145,7 @@ def test_restart__by_another_client_loses_nothing(study, tmp_path):
     (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
     restarted = []
 
-    class Restarter(Monitor):
+    class Restarter(Display):
         def reached(self, key, now, end):
             if now > 0 and not restarted:
                 restarted.append(now)
@@ -152,10 +156,10 @@ def test_restart__by_another_client_loses_nothing(study, tmp_path):
             other.restart()
 
     with bare_cluster() as client, worker_process(client):
-        outcomes = run_cases([case], tmp_path / "out", watch=Restarter(), client=client)
+        outcomes = run_cases([case], tmp_path / "out", display=Restarter(False), client=client)
     assert restarted
     assert [o.kind for o in outcomes.values()] == ["done"]
-    run_cases([case], tmp_path / "calm", watch=Monitor(), workers=0)
+    run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
 
 
@@ -247,23 +251,16 @@ def kill_working(client, times):
 @pytest.mark.timeout(60)  # Ctrl-C waits for nobody where there is nobody
 def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch):
     monkeypatch.setattr(dispatch, "_ALONE_AFTER", 0.3)
-    monkeypatch.setattr(dispatch, "_LOOK_EVERY", 0.1)
 
     class CtrlC(Ear):
-        def tick(self):
-            if self.messages and not self.pressed:
-                self.pressed = True
-                raise KeyboardInterrupt
-
-        def stopping(self):
-            self.stopped = True
-
-        pressed = stopped = False
+        def warn(self, text):
+            super().warn(text)
+            raise KeyboardInterrupt
 
     ear = CtrlC()
     with bare_cluster() as client, pytest.raises(KeyboardInterrupt):
-        run_cases(study(), tmp_path / "out", watch=ear, client=client)
-    assert ear.stopped
+        run_cases(study(), tmp_path / "out", display=ear, client=client)
+    assert ear.lines[-1].startswith("stopping")
     (message,) = ear.messages
     assert "no worker" in message
     assert message in (tmp_path / "out" / "sweep.log").read_text()
@@ -278,7 +275,7 @@ def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
     with bare_cluster() as client:
 
         def work():
-            outcomes.update(run_cases([case], tmp_path / "out", watch=ear, client=client))
+            outcomes.update(run_cases([case], tmp_path / "out", display=ear, client=client))
 
         thread = threading.Thread(target=work)
         with worker_process(client) as first:
@@ -293,5 +290,5 @@ def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
     assert [o.kind for o in outcomes.values()] == ["done"]
     second = [end for _, _, end in ear.heard].index(0.0, 1)
     assert ear.heard[second + 1][1] > left_at, "it did not begin anew"
-    run_cases([case], tmp_path / "calm", watch=Monitor(), workers=0)
+    run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))

@@ -11,7 +11,7 @@ from roughvisc.api import run
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.monitor import Monitor
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.failures import record_path
 
@@ -59,7 +59,7 @@ def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan
     before = hashlib.sha256(scan.read_bytes()).hexdigest()
     cases = read_cases(study)
     pressed = after_the_first(monkeypatch, lambda: bump(scan, 2e-5))
-    outcomes = list(run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0).values())
+    outcomes = list(run_cases(cases, tmp_path / "out", display=Display(False), workers=0).values())
     assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
     assert len(pressed) == 1
     assert f"{scan}: was changed after the study was read" in outcomes[1].message
@@ -78,7 +78,7 @@ def test_sweep__a_scan_that_is_gone_for_a_while_fails_no_case(study, scan, tmp_p
     cases = read_cases(study)
     content = scan.read_bytes()
     after_the_first(monkeypatch, lambda: scan.write_bytes(content[: len(content) // 2]))
-    outcomes = list(run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0).values())
+    outcomes = list(run_cases(cases, tmp_path / "out", display=Display(False), workers=0).values())
     assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
     scan.write_bytes(content)
     assert sweep(study, tmp_path / "out", workers=0, progress=False).sizes["case"] == 2

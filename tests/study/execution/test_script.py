@@ -22,5 +22,5 @@ def test_sweep__of_a_script_without_a_guard_is_refused_in_one_sentence(tmp_path)
     text = f"import roughvisc as rv\n\nrv.sweep({str(study)!r}, {str(tmp_path / 'out')!r}, workers=2, progress=False)\n"
     with pytest.raises(rv.InputError) as error:
         run(tmp_path, text)
-    assert "script.py, line 3" in str(error.value)
+    assert f"{tmp_path / 'script.py'}: " in str(error.value)
     assert not (tmp_path / "out").exists()

@@ -17,10 +17,10 @@ from rich.console import Console
 from support import BALL, LONG, assert_same, numbers
 
 from roughvisc.errors import InputError, RoughviscError
+from roughvisc.study.execution import outcome as outcome_module
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution import task as task_module
 from roughvisc.study.execution.cluster import connect
-from roughvisc.study.execution.monitor import LiveMonitor, Monitor
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX
@@ -112,13 +112,13 @@ POISON = '[sweep]\n"program.0.load" = ["4 mN", "50 N", "5 mN", 5e-3]\n'
 def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_path, monkeypatch, caplog):
     cases = study(BALL + POISON)
     computed = []
-    bring = task_module.run_case
+    bring = outcome_module.run_case
 
     def counted(case, folder, **settings):
         computed.append(case.varied["program.0.load"])
         return bring(case, folder, **settings)
 
-    monkeypatch.setattr(task_module, "run_case", counted)
+    monkeypatch.setattr(outcome_module, "run_case", counted)
     ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
     assert computed == [4e-3, 50.0, 5e-3], "those alike are computed once"
     assert list(ds["program_0_load"]) == [4e-3, 5e-3]
@@ -128,11 +128,11 @@ def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_p
     assert record["case"]["varied"] == {"program.0.load": 50.0}
     assert "failed" in (tmp_path / "out" / "sweep.log").read_text()
 
-    outcomes = run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
+    outcomes = run_cases(cases, tmp_path / "out", display=Display(False), workers=0)
     assert computed == [4e-3, 50.0, 5e-3], "nothing is computed again"
     assert [o.kind for o in outcomes.values()] == ["done", "failed", "done"]
     assert all(o.reused for o in outcomes.values())
-    run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0, retry_failed=True)
+    run_cases(cases, tmp_path / "out", display=Display(False), workers=0, retry_failed=True)
     assert computed == [4e-3, 50.0, 5e-3, 50.0]
 
 
@@ -142,7 +142,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     def broken(case, folder, **settings):
         return 1 / 0
 
-    monkeypatch.setattr(task_module, "run_case", broken)
+    monkeypatch.setattr(outcome_module, "run_case", broken)
     with pytest.raises(RoughviscError, match="none of 4 cases could be finished; the first: ZeroDivisionError"):
         sweep(cases, tmp_path / "out", workers=0, progress=False)
     record = json.loads(record_path(tmp_path / "out", cases[0].key).read_text())
@@ -166,8 +166,8 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     def hindered(case, folder, **settings):
         raise error
 
-    monkeypatch.setattr(task_module, "run_case", hindered)
-    outcomes = run_cases(cases, tmp_path / "out", watch=Monitor(), workers=0)
+    monkeypatch.setattr(outcome_module, "run_case", hindered)
+    outcomes = run_cases(cases, tmp_path / "out", display=Display(False), workers=0)
     assert {o.kind for o in outcomes.values()} == {kind}
     assert not list((tmp_path / "out").glob("*.failed.json"))
     monkeypatch.undo()
@@ -187,9 +187,9 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
 
     if workers:  # the processes of a local cluster are forked from one that has not seen this
         monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
-    monkeypatch.setattr(task_module, "run_case", full)
+    monkeypatch.setattr(outcome_module, "run_case", full)
     with pytest.raises(OSError, match=r"x\.nc: No space left .*make room \(1 of 4 cases are finished\)$") as caught:
-        run_cases(cases, tmp_path / "out", watch=Monitor(), workers=workers)
+        run_cases(cases, tmp_path / "out", display=Display(False), workers=workers)
     assert caught.value.errno == errno.ENOSPC
     begun = len(list(tmp_path.glob("begun*")))
     assert begun == 2 if workers == 0 else begun < 4
@@ -207,7 +207,7 @@ def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capf
 
 def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
     for _ in range(2):
-        outcomes = run_cases(study()[:1], tmp_path / "out", watch=Monitor(), workers=0)
+        outcomes = run_cases(study()[:1], tmp_path / "out", display=Display(False), workers=0)
         (outcome,) = outcomes.values()
         assert outcome.kind == "unconverged"
         assert "1 of 3 kept times did not converge, first at t = 100 ms" in outcome.message
@@ -262,20 +262,19 @@ def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
 
 
 def outcome(key, kind="done", **more):
-    return task_module.Outcome(key, kind, **more)
+    return outcome_module.Outcome(key, kind, **more)
 
 
 @pytest.mark.parametrize("terminal", [False, True])
 def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
     cases = study()
     stream = io.StringIO()
-    watch = LiveMonitor(Console(file=stream, force_terminal=terminal, width=160))
+    watch = Display(True, Console(file=stream, force_terminal=terminal, width=160))
     monkeypatch.setattr("roughvisc.progress.LINE_EVERY", 0.0)
     watch.begin(cases, "http://127.0.0.1:8787/status")
     watch.ended(outcome(cases[0].key))
     watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))
     watch.reached(cases[2].key, 0.05, 0.2)
-    watch.tick()
     watch.close()
     for words in ("http://127.0.0.1:8787/status", "too [much] load", "1 of 4 cases done, 1 failed, 1 running"):
         assert words in stream.getvalue()
@@ -285,15 +284,16 @@ def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
 def test_watch__hears_from_workers(study, tmp_path):
     heard = {}
 
-    class Ear(Monitor):
+    class Ear(Display):
         def reached(self, key, now, end):
             heard.setdefault(key, []).append(now)
 
-        def begin(self, cases, link):
+        def begin(self, cases, link=""):
+            super().begin(cases, link)
             heard["cases"] = len(cases)
 
     cases = study(LONG)
-    run_cases(cases, tmp_path / "out", watch=Ear(), workers=1)
+    run_cases(cases, tmp_path / "out", display=Ear(False), workers=1)
     assert heard["cases"] == 1
     times = heard[cases[0].key]
     assert times == sorted(times)

@@ -9,7 +9,7 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases
-from roughvisc.study.execution.monitor import Monitor
+from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.storage.store import open_result
 from roughvisc.study.storage.table import CASES
@@ -29,7 +29,7 @@ def folder(tmp_path_factory):
     """Results of a sweep of four cases, two of which fail."""
     folder = tmp_path_factory.mktemp("sweep")
     (folder / "balls.toml").write_text(SMALL.replace('"A ball"', '"Bälle, größer"') + SWEEP, encoding="utf-8")
-    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, watch=Monitor())
+    run_cases(read_cases(folder / "balls.toml"), folder / "out", workers=0, display=Display(False))
     return folder / "out"
 
 
@@ -101,7 +101,7 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
 def test_table__holds_no_formula(tmp_path, sign):
     title = f"{sign}HYPERLINK(1)"
     (tmp_path / "balls.toml").write_text(SMALL.replace("A ball", title) + '[sweep]\n"solve.edge" = ["error"]\n')
-    run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, watch=Monitor())
+    run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, display=Display(False))
     written = pd.read_csv(tmp_path / "out" / CASES)
     assert written["title"].tolist() == [f"'{title}"]
     assert rv.to_table(tmp_path / "out")["title"].tolist() == [title]

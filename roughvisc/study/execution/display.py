@@ -1,0 +1,109 @@
+"""Display of a running sweep: a bar for the sweep, one for each running case, and lines on cases that end badly."""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+from rich.console import Console
+
+from roughvisc.errors import printable
+from roughvisc.progress import Bars, clock
+from roughvisc.study.case import Case
+from roughvisc.study.execution.outcome import IN_WORDS, Outcome
+from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+
+#: Largest number of messages on cases that end badly.
+_SHOWN = 8
+
+
+class Display:
+    """Bars and messages of a sweep; times in seconds.
+
+    Parameters
+    ----------
+    show : bool
+        Whether to show more than urgent messages.
+    console : rich.console.Console, optional
+        Default: the standard error. Without a terminal it shows a line every few seconds.
+    summary : bool
+        Whether the last line states how many cases are done.
+    """
+
+    def __init__(self, show: bool = True, console: Console | None = None, *, summary: bool = True) -> None:
+        self._shows, self._sums_up = show, summary
+        self._bars = Bars(console if show else Console(quiet=True))
+        self._lock = threading.Lock()
+        self._names: dict[str, str] = {}
+        self._at: dict[str, Callable[[float, float], str]] = {}
+        self._running: dict[str, float] = {}  # computed fraction of each program
+        self._ended: dict[str, Outcome] = {}
+        self._complaints, self._began = 0, time.monotonic()
+
+    def begin(self, cases: Sequence[Case], link: str = "") -> None:
+        """Show the cases, in the order of the study, and the address of Dask's dashboard."""
+        numbers = number_by_key(sweep_cases(cases))
+        for case in reversed(cases):
+            varied = ", ".join(f"{name} = {case.written.get(name) or json.dumps(x)}" for name, x in case.varied.items())
+            shortened = varied if len(varied) <= 60 else f"{varied[:57]}..."
+            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({shortened})" if varied else "")
+            self._at[case.key] = case.at
+        if link:
+            self._bars.say(f"Dashboard: {link}")
+        self._bars.start()
+        with self._lock:
+            self._move()
+
+    def reached(self, key: str, now: float, end: float) -> None:
+        """Move the bar of a running case, from any thread; both times are zero when it begins."""
+        with self._lock:
+            if key not in self._ended:
+                self._running[key] = now / end if end else 0.0
+                self._bars.reached(self._names[key], now, end, self._at[key](now, end) if end else "")
+                self._move()
+
+    def ended(self, outcome: Outcome) -> None:
+        """Close the bar of a case, and write its message if it ended badly."""
+        with self._lock:
+            self._ended[outcome.key] = outcome
+            self._running.pop(outcome.key, None)
+            self._bars.close(self._names[outcome.key])
+            self._move()
+        if outcome.kind != "done" and not outcome.reused:
+            self._complaints += 1
+            if self._complaints <= _SHOWN:
+                self._bars.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+            elif self._complaints == _SHOWN + 1:
+                self._bars.say("further cases that end badly are counted here, and named in the log")
+
+    def say(self, text: str, key: str = "") -> None:
+        """Write a line, on a case if `key` names one."""
+        self._bars.say(f"{self._names[key]}: {text}" if key else text)
+
+    def warn(self, text: str) -> None:
+        """Write an urgent message."""
+        if self._shows:
+            self._bars.say(text)
+        else:
+            print(f"roughvisc: {printable(text)}", file=sys.stderr)
+
+    def close(self) -> None:
+        """End the display."""
+        self._bars.stop()
+        if self._names and self._sums_up:
+            self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
+
+    def _move(self) -> None:
+        """Move the bar of the sweep."""
+        self._bars.reached("sweep", sum(self._running.values()) + len(self._ended), len(self._names), self._summary())
+        self._bars.line("sweep")
+
+    def _summary(self) -> str:
+        kinds = [outcome.kind for outcome in self._ended.values()]
+        parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
+        for kind in ("unconverged", "failed", "hindered", "held"):
+            parts += [f"{kinds.count(kind)} {IN_WORDS[kind]}"] if kind in kinds else []
+        return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])
