@@ -84,13 +84,13 @@ def test_table__leaves_out_what_is_not_known(folder, tmp_path):
 
 
 def test_table__names_cases_that_were_not_reached(tmp_path):
-    class Stop(Monitor):
+    class Stop(Display):
         def ended(self, outcome):
             raise KeyboardInterrupt
 
     (tmp_path / "balls.toml").write_text(SMALL + '[sweep]\n"program.0.load" = ["1 mN", "2 mN"]\n')
     with pytest.raises(KeyboardInterrupt):
-        run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, watch=Stop())
+        run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, display=Stop(False))
     written = pd.read_csv(tmp_path / "out" / CASES)
     assert written["status"].tolist() == ["converged", "not computed"]
     assert written["program.0.load [mN]"].tolist() == [1, 2]
