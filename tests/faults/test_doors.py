@@ -81,7 +81,7 @@ def test_x3p__a_bomb_is_not_unpacked(tmp_path):
             for _ in range(300):
                 stream.write(bytes(1 << 20))
         parts.writestr("main.xml", "<p/>")
-    with pytest.raises(InputError, match=r"bomb\.x3p: it would take 3\.15e\+08 bytes in memory, \d+ times as many"):
+    with pytest.raises(InputError, match=r"bomb\.x3p"):
         rv.open_scan(path)
 
 
