@@ -23,7 +23,7 @@ def terminated(folder, *options, whole_group, after):
     command = [sys.executable, "-m", "roughvisc", "run", "s.toml", "-q", "--no-plots", "--out", "out", *options]
     process = subprocess.Popen(command, cwd=folder, stdout=-1, stderr=-1, text=True, start_new_session=True)
     cases = len(read_cases(folder / "s.toml"))
-    while len(list(folder.glob("out/.*.unfinished/rows"))) < cases:
+    while len(list(folder.glob("out/.*.unfinished"))) < cases:
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
     time.sleep(after)
@@ -47,11 +47,11 @@ def test_run__writes_its_checkpoint_and_ends_quietly(tmp_path, text, options, wh
     for after in (0.2, 0.4, 0.8, 1.6, 3.2):  # on a busy machine there is no step to keep so early
         ended = terminated(tmp_path, *options, whole_group=whole_group, after=after)
         assert ended == ("", "roughvisc: interrupted; finished work is kept; repeat the command to resume\n", 143)
-        if all([*tmp_path.glob(f"out/.{case.key}.unfinished/checkpoint.*")] for case in cases):
+        if all([*tmp_path.glob(f"out/.{case.key}.unfinished/state.npz")] for case in cases):
             break
     for case in read_cases(tmp_path / "s.toml"):
         unfinished = tmp_path / "out" / f".{case.key}.unfinished"
-        assert list(unfinished.glob("checkpoint.*")), "long before one is due"
+        assert list(unfinished.glob("state.npz")), "long before one is due"
         reached = []
         path = run_case(case, tmp_path / "out", progress=lambda now, end, all=reached: all.append(now))
         assert min(reached) > 0, "it goes on"

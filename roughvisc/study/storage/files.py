@@ -6,12 +6,9 @@ import logging
 import os
 import secrets
 import stat
-import struct
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from roughvisc.errors import InputError
 
@@ -135,19 +132,6 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def pack_with_checksum(layout: struct.Struct, *values: Any) -> bytes:
-    """Some values and, in the last four bytes of their layout, a checksum of these."""
-    head = layout.pack(*values, 0)[:-4]
-    return head + zlib.crc32(head).to_bytes(4, "little")
-
-
-def unpack_with_checksum(layout: struct.Struct, found: bytes) -> tuple[Any, ...] | None:
-    """The values; None if these bytes are not what was packed."""
-    if len(found) < layout.size or zlib.crc32(found[:-4]) != int.from_bytes(found[-4:], "little"):
-        return None
-    return layout.unpack(found)[:-1]
 
 
 def warn_once(path: Path, message: str) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from roughvisc.errors import InputError
+from roughvisc.study.storage.checkpoint import STATE
 from roughvisc.study.storage.files import require_file, require_folder
 from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.store import NETCDF, open_result, require_hdf5, result_path, results_at
@@ -141,9 +142,7 @@ def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> lis
     """Remove what no run of one case can use, while its lock is held."""
     lock, result = lock_path(folder, key), result_path(folder, key)
     finished = everything or _opens(result)
-    needed = [
-        path for path in paths if path.suffix == ".unfinished" and any(path.glob("checkpoint.*")) and not finished
-    ]
+    needed = [path for path in paths if path.suffix == ".unfinished" and (path / STATE).exists() and not finished]
     if needed == paths:
         return []
     with suppress(OSError), lock_case(lock, patience=0.0):

@@ -315,7 +315,7 @@ def test_clean__keeps_the_checkpoint_of_a_case_whose_result_is_damaged(copied):
     _, case, path = copied
     unfinished = path.parent / f".{case.key}.unfinished"
     unfinished.mkdir()
-    (unfinished / "checkpoint.0").write_bytes(b"state")
+    (unfinished / "state.npz").write_bytes(b"state")
     os.truncate(path, 100)
     clean_folder(path.parent)
     assert unfinished.exists()

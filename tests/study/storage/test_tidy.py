@@ -19,7 +19,7 @@ KEYS = [f"{i:016x}" for i in range(4)]
 def leave(folder, key, *, checkpoint=True):
     """What a run of a case leaves that is killed at its worst moment."""
     (folder / f".{key}.unfinished").mkdir(parents=True)
-    (folder / f".{key}.unfinished" / ("checkpoint.0" if checkpoint else "rows")).write_bytes(b"0")
+    (folder / f".{key}.unfinished" / ("state.npz" if checkpoint else "rows-0000.npz")).write_bytes(b"0")
     (folder / f".{key}.lock").write_text("")
     (folder / f".{key}.1a2b3c4d.part.nc").write_bytes(b"0")
     (folder / f".{key}.failed.1a2b3c4d.part.json").write_bytes(b"0")
