@@ -1,9 +1,9 @@
-"""Quantities derived from a result: what the contact looks like, and what it means mechanically.
+"""Quantities derived from a result: contact spots, distributions, leakage, conductance, theories.
 
-Every function takes a result and returns a Dataset of the new variables alone (``xarray.merge`` or
-``Dataset.update`` puts them beside the others). Leading dimensions other than time, such as ``case``, pass through;
-fields on Dask are worked on frame by frame, lazily unless a docstring says otherwise. Names and units are declared in
-:mod:`roughvisc.variables`.
+Every function takes a result and returns a Dataset of the new variables alone; ``xarray.merge`` or ``Dataset.update``
+adds them to the result. Leading dimensions other than time, such as ``case``, are kept. Fields on Dask or in a file are
+processed frame by frame, lazily unless a docstring states otherwise. :mod:`roughvisc.variables` declares names and
+units.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray of bool, dims (time, x, y)
-        A Dask array if that of the pressure or the gap is one.
+        A Dask array if the field is one, or is not read from its file yet.
 
     Raises
     ------

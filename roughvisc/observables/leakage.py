@@ -1,4 +1,4 @@
-"""Leakage: what a pressure drives through the gap of a contact."""
+"""Leakage of a fluid through the gap of a contact."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def leakage(
 ) -> xr.Dataset:
     r"""Leak rate of a fluid through the gap, from one side of the map to the opposite one.
 
-    The gap is that of the dry contact: the fluid pressure does not deform the surfaces.
+    The fluid pressure does not deform the surfaces.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
 
 
 def nominal_area_of(dataset: xr.Dataset) -> float:
-    """Area that the nominal pressure of a result refers to: the force over it, else that of the surface. [m2]"""
+    """Return the nominal area of a result: force over nominal pressure if known, else the area of the surface. [m2]"""
     if "nominal_pressure" in dataset and float(dataset["nominal_pressure"].max()) > 0:
         at = dataset["nominal_pressure"].argmax(...)
         return float(dataset["force"].isel(at) / dataset["nominal_pressure"].isel(at))

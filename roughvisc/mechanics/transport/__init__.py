@@ -1,1 +1,1 @@
-"""What flows through a contact, or past it: through its spots, and through the gap. Arrays only."""
+"""Conduction through contact spots, and leakage through the gap. Arrays only."""

@@ -1,4 +1,4 @@
-"""Bounds on the conductance of a network: from above by any pressure, from below by any flux that is conserved."""
+"""Bounds on the conductance of a network: from above by any pressures, from below by any conserved flux."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from roughvisc.mechanics.transport.network import Array, Network, Numbers
 
 
 def imbalance(network: Network, pressure: Array) -> Array:
-    """Fluid that comes into each cell less what goes out, by the pressures of the cells. [-]"""
+    """Return inflow less outflow of each cell for given pressures of the cells. [-]"""
     flux = network.conductance * (pressure[network.first] - pressure[network.second])
     left = network.entrance * (1.0 - pressure) - network.exit * pressure
     np.add.at(left, network.second, flux)
@@ -25,8 +25,8 @@ def bounds(network: Network, pressure: Array) -> tuple[float, float]:
     network : Network
         Cells and faces.
     pressure : ndarray, shape (n,)
-        Pressures of the cells, 1 being that where the fluid comes in and 0 where it goes out: the better they are,
-        the closer the bounds. [-]
+        Pressures of the cells, relative to the pressure drop: 1 at the inlet, 0 at the outlet. Better pressures give
+        closer bounds. [-]
 
     Returns
     -------
@@ -37,10 +37,10 @@ def bounds(network: Network, pressure: Array) -> tuple[float, float]:
     -----
     Dirichlet's principle: with the conductances :math:`c` of the faces and the jumps :math:`\Delta P` of any pressures
     that have the values given on the two sides, :math:`G \le \sum c \, \Delta P^2`. Thomson's: with any flux
-    :math:`q` that is conserved in every cell and amounts to :math:`Q`, :math:`G \ge Q^2 / \sum q^2 / c`. The flux
-    taken is that of the pressures, :math:`c \, \Delta P`; what it leaves in a cell is led to a side along the widest
-    path, the maximum spanning tree of the conductances. Both are exact for the solution of the discrete equations; of
-    an approximate one they differ by the square of its error.
+    :math:`q` that is conserved in every cell and amounts to :math:`Q`, :math:`G \ge Q^2 / \sum q^2 / c`. Here the flux
+    is :math:`c \, \Delta P` plus a correction: the imbalance of each cell flows to a side along the maximum spanning
+    tree of the conductances. Both bounds are exact for the solution of the discrete equations. For an approximate
+    solution they differ by the square of its error.
 
     References
     ----------
@@ -63,7 +63,7 @@ def bounds(network: Network, pressure: Array) -> tuple[float, float]:
 
 
 def _lead_away(network: Network, left: Array, flux: Array, into: Array, out: Array) -> None:
-    """Lead what is left in the cells to the sides, along the widest paths; the fluxes are changed in place."""
+    """Add to the fluxes, in place, a flow of the imbalances to the sides along the maximum spanning tree."""
     side = len(left)  # both sides together are the root of the tree
     at_sides = np.maximum(network.entrance, network.exit)
     touching = np.flatnonzero(at_sides)
@@ -89,9 +89,9 @@ def _lead_away(network: Network, left: Array, flux: Array, into: Array, out: Arr
 
 
 def _summed_upward(order: Numbers, above: Numbers, left: Array) -> Array:
-    """What each cell passes on to the one above it in the tree: its own and all that lies below.
+    """Return the sum of the imbalances of each cell and of all cells below it in the tree.
 
-    The order goes through the tree level by level, from its root, so that the cells above have ascending places.
+    The order is breadth-first from the root, so that the cells above have ascending places.
     """
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))

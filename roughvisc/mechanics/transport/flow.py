@@ -13,9 +13,10 @@ from roughvisc.mechanics.transport.bounds import bounds, imbalance
 from roughvisc.mechanics.transport.network import Array, Network, equations, faces_of, factors, network_of
 from roughvisc.mechanics.transport.two_grids import pressures_on_two_grids
 
-#: Distance of the bounds, relative, at which no better pressures are sought.
+#: Relative distance of the bounds at which the iteration ends.
 _CLOSE = 1e-9
-#: How often they are sought at most: on two grids, if there are so many cells, and by factors after that.
+#: Largest number of rounds on two grids, the number of cells from which these are used, and the largest number of
+#: rounds with direct factors after them.
 _ON_TWO_GRIDS, _LARGE = 2, 2**12
 _BY_FACTORS = 8
 
@@ -27,11 +28,11 @@ class Flow:
     Attributes
     ----------
     conductance : float
-        Volume flow times viscosity over pressure drop; zero where nothing connects the sides. [m^3]
+        Volume flow times viscosity over pressure drop; zero if no path connects the sides. [m^3]
     lower, upper : float
-        Bounds on it, of the discrete equations. [m^3]
+        Bounds on the conductance of the discrete equations. [m^3]
     pressure : ndarray, shape (nx, ny)
-        Pressure of the fluid: 1 where it comes in, 0 where it goes out, missing where nothing flows through. [-]
+        Pressure of the fluid: 1 at the inlet, 0 at the outlet, missing in cells without flow. [-]
     """
 
     conductance: float
@@ -55,7 +56,7 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     wrap : bool
-        Whether the other two sides meet, as those of a periodic map do, or are walls.
+        Whether the other two sides are joined, as in a periodic map; otherwise they are walls.
 
     Returns
     -------
@@ -73,12 +74,12 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     .. math:: \nabla \cdot \left(\frac{g^3}{12 \eta} \nabla P\right) = 0,
 
     by cell-centred finite volumes: see :func:`roughvisc.mechanics.transport.network.faces_of` for the conductances.
-    They are exact where the gap depends on one coordinate alone and is constant in each cell, and of second order in
-    the cells' sides where it is smooth. Small maps are solved by SciPy's factors in the order of minimum degree, others
-    by conjugate gradients on two grids; if the conductances span too many decades for these, by factors, too.
+    They are exact for a gap that depends on one coordinate and is constant in each cell, and of second order in the
+    sides of the cells for a smooth gap. Small maps are solved with SciPy's direct factors in minimum-degree order,
+    large ones by conjugate gradients on two grids. If the conductances span too many decades for these, factors follow.
 
-    The conductance given is the mean of its bounds. By factors they are as close as rounding allows, on two grids
-    within 1e-9, and for most gaps within 1e-11.
+    The conductance is the mean of its bounds. With factors the bounds differ by rounding, on two grids by at most 1e-9
+    and for most gaps by less than 1e-11.
 
     References
     ----------
@@ -97,20 +98,20 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
 
 
 def fluxes(gap: Array, spacing: tuple[float, float], pressure: Array, *, wrap: bool = False) -> tuple[Array, Array]:
-    """Flux of the fluid in the cells: the mean of that through their faces.
+    """Return the flux in the cells, the mean over opposite faces.
 
     Parameters
     ----------
     gap, spacing, wrap
         As in :func:`flow`.
     pressure : ndarray, shape (nx, ny)
-        What :func:`flow` found.
+        Pressure from :func:`flow`.
 
     Returns
     -------
     along, across : ndarray, shape (nx, ny)
-        Volume flow over the length of the face, for a unit of pressure drop over viscosity: per metre of the map a
-        mobility [m^3] times a gradient [1/m]. Zero where nothing flows through. [m^2]
+        Volume flow per length of the face and per pressure drop over viscosity: a mobility [m^3] times a gradient
+        [1/m]. Zero in cells without flow. [m^2]
     """
     faces = faces_of(gap, spacing, wrap)
     inside = np.where(np.isnan(pressure), 0.0, pressure)
@@ -125,10 +126,9 @@ def fluxes(gap: Array, spacing: tuple[float, float], pressure: Array, *, wrap: b
 
 
 def _solved(network: Network, width: int) -> tuple[Array, float, float]:
-    """Pressures of the cells that conserve the fluid in each, and bounds on the conductance. [-]
+    """Return the pressures of the cells, and bounds on the conductance. [-]
 
-    A lake behind narrow slits loses digits in the factors, as many as the slits are narrower than it is wide; each
-    round brings some back.
+    For a wide basin behind narrow slits the factors lose digits; each round of refinement recovers some.
     """
     pressure = np.zeros(len(network.cells))
     lower, upper = 0.0, np.inf
@@ -138,11 +138,11 @@ def _solved(network: Network, width: int) -> tuple[Array, float, float]:
         lower, upper = max(lower, below), min(upper, above)
         if upper - lower <= _CLOSE * upper:
             break
-    return pressure, min(lower, upper), upper  # that rounding may turn round
+    return pressure, min(lower, upper), upper  # rounding may exchange them
 
 
 def _solvers(network: Network, width: int) -> Iterator[Callable[[Array], Array]]:
-    """What gives the pressures in each round: two grids, if the network is large, and factors if that was in vain."""
+    """Yield the solver of each round: two grids for a large network, then direct factors."""
     if len(network.cells) >= _LARGE:
         yield from itertools.repeat(functools.partial(pressures_on_two_grids, network, width), _ON_TWO_GRIDS)
     yield from itertools.repeat(factors(equations(network)), _BY_FACTORS)

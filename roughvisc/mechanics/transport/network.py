@@ -1,4 +1,4 @@
-"""The gap as a network: cells that a fluid may fill, and the faces through which it flows from one to the other."""
+"""The gap as a network of cells and of the faces between them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Network:
     Attributes
     ----------
     cells : ndarray of int, shape (n,)
-        Their places in the flattened map.
+        Indices in the flattened map.
     first, second : ndarray of int, shape (m,)
         Numbers of the cells that each face joins, the first below the second; sorted, each pair once.
     conductance : ndarray, shape (m,)
@@ -76,8 +76,8 @@ def faces_of(gap: Array, spacing: tuple[float, float], wrap: bool) -> Faces:
     Notes
     -----
     The mobility of a cell is its gap cubed over 12. Between the centres of two cells the two halves are in series: the
-    conductance is the harmonic mean of their mobilities times the length of the face over the distance; that of a side,
-    at half the distance, is twice the mobility of the cell times the same.
+    conductance is the harmonic mean of their mobilities times the length of the face over the distance. A side is at
+    half the distance: its conductance is twice the mobility of the cell times the same ratio.
     """
     widest = float(gap.max(initial=0.0))
     if not widest > 0:
@@ -93,15 +93,15 @@ def faces_of(gap: Array, spacing: tuple[float, float], wrap: bool) -> Faces:
 
 
 def _in_series(one: Array, other: Array) -> Array:
-    """Harmonic mean; without the product, which a double may not hold."""
+    """Return the harmonic mean without a product, which may underflow."""
     low, high = np.minimum(one, other), np.maximum(one, other)
     return 2 * low / (1 + np.divide(low, high, where=high > 0, out=np.zeros_like(low)))
 
 
 def network_of(faces: Faces) -> Network | None:
-    """The cells on some path from one side to the other; None where nothing connects the two.
+    """Return the cells on any path from one side to the other, with dead ends; None if no path connects the sides.
 
-    Cells that share only a corner are apart. Dead ends of the paths are among the cells.
+    Cells that share only a corner are not connected.
     """
     nx, ny = faces.across.shape
     number = np.arange(nx * ny).reshape(nx, ny)
@@ -119,14 +119,14 @@ def network_of(faces: Faces) -> Network | None:
     open_ = open_[kept[first[open_]]]
     one, other = new[first[open_]], new[second[open_]]
     ends = np.minimum(one, other), np.maximum(one, other)
-    # two cells across whose borders meet share two faces: one of both together
+    # two periodic cells across the flow share two faces, which are added
     joined = sparse.coo_array((conductance[open_], ends), shape=(len(cells), len(cells))).tocsr()
     rows = np.repeat(np.arange(len(cells), dtype=joined.indices.dtype), np.diff(joined.indptr))
     return Network(cells, rows, joined.indices, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
 
 
 def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leaving: NDArray[np.bool_]) -> NDArray:
-    """Cells of the connected parts that touch both sides."""
+    """Return which cells belong to connected parts that touch both sides."""
     count = len(entering)
     graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
     _, part = sparse.csgraph.connected_components(graph, directed=False)
@@ -135,7 +135,7 @@ def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leav
 
 
 def equations(network: Network) -> sparse.csr_array:
-    """The matrix of the balance of fluid in each cell: times the pressures it is what flows out."""
+    """Return the matrix whose product with the pressures is the net outflow of each cell."""
     count = len(network.cells)
     diagonal = network.entrance + network.exit
     diagonal += np.bincount(network.first, network.conductance, count)
@@ -148,7 +148,7 @@ def equations(network: Network) -> sparse.csr_array:
 
 
 def factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
-    """The solution of symmetric equations, by factors of them scaled by the root of their diagonal."""
+    """Return a solver of symmetric equations by direct factors, after scaling by the root of the diagonal."""
     scale = 1 / np.sqrt(matrix.diagonal())
     scaling = sparse.diags_array(scale)
     scaled = (scaling @ matrix @ scaling).tocsc()

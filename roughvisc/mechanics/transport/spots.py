@@ -1,19 +1,19 @@
-r"""Contact spots as one flat punch: the stiffness of a contact whose area is frozen, and so what flows through it.
+r"""Contact spots as one flat punch: the stiffness of a contact at constant area, which gives its conductance.
 
 A body of resistivity ``rho`` whose surface is at one potential ``V`` on the spots and insulated elsewhere carries the
-current ``I = 2 k V / rho``, where ``F = E* k delta`` presses a flat punch of these spots: potential and displacement
-are both ``1/(2 pi r)`` of what is put in, times ``rho`` and ``2 / E*`` [1]_. Two bodies in series conduct
-``2 k / (rho_1 + rho_2)``.
+current ``I = 2 k V / rho``, where ``F = E* k delta`` presses a flat punch of these spots: the Green's function of both
+problems is ``1/(2 pi r)``, times ``rho`` for the potential and ``2 / E*`` for the displacement [1]_. Two bodies in
+series conduct ``2 k / (rho_1 + rho_2)``.
 
-The grid's part, as measured on discs, squares at any angle, strips and Hertz contacts:
+The grid error, as measured on discs, squares at any angle, strips and Hertz contacts:
 
-1. Where a contact ends because the gap opens, counted cells take the spot for too large, and a punch of cells is too
-   soft, as if it were smaller. The two cancel: the punch has the stiffness of the spot with the corrected area, and it
-   is the slope of the grid's own force over its approach. Nothing is corrected there.
-2. Where a contact ends with the material, the outline is known, and the punch is too soft to first order. It is solved
-   again on cells of half the side, and extrapolated: by twice the difference for an outline along the cells, which
-   the finer ones share, and by 1.2 times for an oblique one, whose staircase is not its outline: the spot meant is a
-   smooth one of the same area. How many of the outline's faces belong to steps tells which it is.
+1. At an edge where the gap opens, counting cells overestimates the spot, and a punch of cells is too soft. The two
+   errors cancel: the punch has the stiffness of the spot with the corrected area, and it is the derivative of force by
+   approach on the same grid. There is no correction.
+2. At an edge of the material the outline is known, and the punch is too soft to first order. It is solved again on
+   cells of half the side, and extrapolated: by twice the difference for an outline along the cells, and by 1.2 times
+   for an oblique one, whose cells form a staircase around the smooth outline. The share of faces that belong to steps
+   distinguishes the two.
 
 .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
 """
@@ -35,13 +35,13 @@ from roughvisc.mechanics.grid import Boundary, Grid
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Parts of the difference to cells of half the side: along the cells, oblique, and the share of faces in steps from
+# Factors of the difference to cells of half the side: along the cells, oblique, and the share of faces in steps from
 # which an outline counts as oblique (a disc has 0.59). Squares of 64 cells at 0 to 45 degrees: within 9e-4.
 _ALONG, _OBLIQUE, _STEPS = 2.0, 1.2, 0.6
-# Part of the same difference by which the extrapolated value may be off.
+# Error of the extrapolated value over the same difference.
 _OFF = 0.4
-# Where the gap opens, each face of the outline lies somewhere in its cell: by so many cells it may be off in all, and
-# three standard deviations of a face. Rough surfaces of 32 to 128 cells: within 0.6 of what that comes to.
+# Error of an edge where the gap opens, in cells: common to all faces, and three standard deviations of one face, which
+# lies anywhere in its cell. Rough surfaces of 32 to 128 cells: within 0.6 of the estimate.
 _SHARED, _SCATTER = 0.03, 1.0
 # Error of the pressure over the square root of the error of the stiffness, which is of second order.
 _OF_PRESSURE = 0.1
@@ -57,7 +57,7 @@ class FrozenContact:
         Force over approach, over the contact modulus. A single disc has twice its radius; infinite where a uniform
         pressure displaces nothing and all is in contact. [m]
     error : float
-        What the grid and the solver may have it off by. [m]
+        Error of the stiffness by grid and solver. [m]
     iterations : int
         Of the contact solver.
     """
@@ -85,15 +85,15 @@ def frozen_contact(
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic", "mirror"}
-        With periodic or mirror boundaries the approach is that to the mean plane of a half-space, and the stiffness
-        that of these cells.
+        With periodic or mirror boundaries the approach is measured to the mean plane of a half-space, and the stiffness
+        is that of one period or of the map.
     present : ndarray of bool, shape (nx, ny), optional
-        Cells where there is material; None: all. Spots end for certain beside the others, and at the border of free
-        space.
+        Cells with material; None: all. The outline of a spot is known exactly next to absent cells and at the border of
+        free space.
     kernel : Kernel
         Of the body.
     tolerance : float
-        Part of the stiffness that the solver leaves, about.
+        Approximate relative error of the stiffness by the solver.
 
     Returns
     -------
@@ -114,7 +114,9 @@ def frozen_contact(
     punch = _punch(body, contact, tolerance)
     stiffness, off = _variational(punch, body.cell_area)
     ends, opens, scatter = _edge_energies(rimmed, rim, punch.pressure, spacing)
-    images = math.prod(2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis)))  # their faces err alike
+    images = math.prod(
+        2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis))
+    )  # their faces have equal errors
     error = off + _SHARED * opens + _SCATTER * math.sqrt(images) * scatter
     found = FrozenContact(stiffness, error, punch.iterations)
     if ends == 0:
@@ -126,7 +128,7 @@ def frozen_contact(
 def _extrapolated(
     coarse: FrozenContact, contact: Mask, body: Grid, tolerance: float, *, share: float, oblique: float
 ) -> FrozenContact:
-    """With the part of the edge that is known for certain extrapolated from cells of half the side."""
+    """Return the stiffness with its error at edges of the material extrapolated from cells of half the side."""
     split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
     finer = body.on((split.shape[0], split.shape[1]))
     punch = _punch(finer, split, tolerance)
@@ -147,16 +149,16 @@ def _punch(body: Grid, contact: Mask, tolerance: float) -> ContactState:
 
 
 def _variational(punch: ContactState, cell: float) -> tuple[float, float]:
-    """Stiffness from below, with an error of second order in that of the pressure, and a bound on what it lacks. [m]
+    """Return a lower bound of the stiffness, with a second-order error in the pressure, and a bound on this error. [m]
 
-    ``k = max 2 sum p - p.Kp``, and the duality gap is half of what is missing at most.
+    ``k = max 2 sum p - p.Kp``; the error is at most twice the duality gap.
     """
     energy = float(np.sum(punch.pressure * punch.displacement))
     return cell * (2 * punch.load - energy), cell * energy * punch.bound**2
 
 
 def _bounds(contact: Mask) -> tuple[slice, slice]:
-    """The smallest rectangle of cells that holds the contact."""
+    """Return the smallest rectangle of cells around the contact."""
     along = [np.flatnonzero(contact.any(axis=1 - axis)) for axis in (0, 1)]
     x, y = (slice(int(found[0]), int(found[-1]) + 1) for found in along)
     return x, y
@@ -165,9 +167,10 @@ def _bounds(contact: Mask) -> tuple[slice, slice]:
 def _edge_energies(
     contact: Mask, rim: Mask, pressure: Array, spacing: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Stiffness over the distance, in cells, that an edge might move by: where the material ends, where the gap opens.
+    """Return the change of stiffness per cell of displacement of an edge of the material, and of an opening gap. [m]
 
-    The third is that of independent moves of the latter's faces, the root of their sum of squares.
+    The third number is the change by independent displacements of the faces of an opening gap, the root of the sum of
+    squares.
 
     A punch gains ``K^2 ds / 2`` of stiffness for an edge that moves out by ``ds``, where ``K`` is the strength of the
     singularity there; the edge cell's pressure squared times the cell's side is in proportion to ``K^2``. [m]
@@ -193,7 +196,7 @@ def _edge_energies(
 
 
 def _staircase(contact: Mask) -> float:
-    """Share of an outline's faces that belong to steps, two for each inner corner; one more cell on every side."""
+    """Return the share of the outline's faces in steps, two per inner corner, of a map with a rim of one cell."""
     faces = sum(int(np.count_nonzero((contact & ~seen)[1:-1, 1:-1])) for seen in neighbours(contact, "free"))
     around = contact[1:, 1:].astype(int) + contact[:-1, 1:] + contact[1:, :-1] + contact[:-1, :-1]
     return 2 * int(np.count_nonzero(around == 3)) / max(faces, 1)

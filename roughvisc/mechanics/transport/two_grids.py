@@ -23,14 +23,14 @@ _BLOCK = 4
 _STRONG = 0.02
 #: Jacobi's relaxation, in the prolongation and in the iterations; eigenvalues of ``D^-1 A`` lie below two.
 _RELAXATION = 3 / 4
-#: Part of the energy that the pressures lack at most where the iterations end; and the most iterations.
+#: Relative error of the energy at which the iteration ends, and the largest number of iterations.
 _ENOUGH, _MOST = 1e-17, 100
-#: What is added to the diagonal of the coarse equations, relative to what joins the cells to all others.
+#: Shift of the diagonal of the coarse equations, relative to the diagonal of the cells.
 _SHIFT = 1e-14
 
 
 def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array:
-    """Pressures of the cells at which what comes into each of them flows out again.
+    """Return the pressures of the cells for a source in each cell, by preconditioned conjugate gradients.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array
     width : int
         Number of the map's cells across the flow.
     source : ndarray, shape (n,)
-        What comes into each cell.
+        Inflow into each cell.
 
     Returns
     -------
     ndarray, shape (n,)
-        What the iterations have reached, if they do not converge.
+        The last iterate if the iteration does not converge.
     """
     matrix = equations(network)
     diagonal = matrix.diagonal()
@@ -80,7 +80,7 @@ def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array
 
 
 def _prolongation(network: Network, width: int, matrix: sparse.csr_array, diagonal: Array) -> sparse.csr_array:
-    """Pressures of the cells from those of the coarse cells; cells without a strong face belong to none of these."""
+    """Return the prolongation from coarse cells to cells; cells without a strong face belong to no coarse cell."""
     first, second, count = network.first, network.second, len(diagonal)
     strong = network.conductance > _STRONG * np.sqrt(diagonal[first] * diagonal[second])
     first, second = first[strong], second[strong]
