@@ -45,8 +45,9 @@ MODULUS, TIME_SCALE = "modulus", "time scale"
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Relative change of a modulus or a time scale that shows the slope of a number.
 _CHANGE = 1.1
-#: Order with which the error of the grid vanishes.
+#: Order with which the error of the grid vanishes, and Roache's factor of two grids at this order.
 ORDER = 1.5
+GRID_FACTOR = 3 / (2**ORDER - 1)
 #: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
 #: Student's factor is 2.57; their spectrum is the spectrum of one patch, whose longest waves scatter too.
 _PATCHES, _SAMPLE_FACTOR = 6, 3.3
@@ -157,7 +158,7 @@ class Source:
 
 
 def sources_of(
-    base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0, three_grids: bool = False
+    base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0
 ) -> dict[str, Source]:
     """Return the sources of error of the numbers of a case, by name.
 
@@ -171,9 +172,6 @@ def sources_of(
         Inputs of :data:`KNOWN`, as in :func:`roughvisc.budget`.
     coarsening : float
         Length of the cells over the length of the cells of the case: the sources are those on this grid.
-    three_grids : bool
-        Whether the error of the grid takes a third grid even if the surface is a sample, of which two may agree by
-        chance. Default: the third grid of a sample would be another surface.
 
     Raises
     ------
@@ -186,12 +184,10 @@ def sources_of(
     if cutoff is not None:
         cutoff = number(cutoff, "m", "cutoff", above=0)
     sample = is_sample(base, height)
-    own, coarse = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0))
-    grids, words = [Neighbour(coarse, 1.0, own)], "cells twice as long"
-    if three_grids or not sample:
-        grids.append(Neighbour(on_cells(base, height, 4 * coarsening), 2**-ORDER, coarse))
-        words = "cells twice and four times as long"
-    found = {STEPS: Source("errors that the result states"), GRID: Source(words, tuple(grids))}
+    own, coarse, coarsest = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0, 4.0))
+    # two grids may agree by chance
+    grids = Neighbour(coarse, GRID_FACTOR, own), Neighbour(coarsest, GRID_FACTOR / 2**ORDER, coarse)
+    found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
 
     if not sample:
         found[SAMPLE] = Source("the surface is the whole body, and no sample", state="none")
@@ -333,7 +329,7 @@ def compared(
     places : sequence of float, optional
         Times [s] or speeds [m/s] of the rows. Default: all.
     coarsening : float, optional
-        Use cells that are longer by this factor, rows with a force, and a third grid.
+        Use cells that are longer by this factor, and the rows with a force.
     before : mapping, optional
         Budgets on another grid, from which the rows are taken, and the errors that no grid reduces.
 
@@ -342,7 +338,7 @@ def compared(
     dict of str to xarray.Dataset
         As :func:`roughvisc.budget` returns them.
     """
-    sources = sources_of(base, height, known, coarsening or 1.0, three_grids=coarsening is not None)
+    sources = sources_of(base, height, known, coarsening or 1.0)
     new = sources if before is None else {name: sources[name] for name in (STEPS, GRID)}
     case, axis = on_cells(base, height, coarsening or 1.0), base.experiment().axis
     near = [one.case for source in new.values() for one in source.neighbours]
@@ -430,7 +426,7 @@ def _error(
         half_width = np.max(np.abs(change), axis=0)
     if name == OCTAVE:
         return quantity.octave_factor * half_width, -np.sign(np.nan_to_num(change[0]))
-    return quantity.grid_factor * half_width if name == GRID else half_width, both
+    return half_width, both
 
 
 def together(table: xr.Dataset, side: int) -> Array:

@@ -35,12 +35,9 @@ class Observable:
         Gives it over the axis, from a result and the arguments of its observable. Default: the result contains it.
     fields : tuple of str
         Fields that it is derived from.
-    grid_factor : float
-        Error of the grid over the difference to cells twice as long. Default: Roache's factor of two grids, at the
-        order 1.5. The larger factors, and the next, were chosen on 45 rough surfaces, and their coverage was measured
-        on 45 others (workflows/benchmarks/whole_error.py). [-]
     octave_factor : float
-        Change by the next octave of waves, at most, over the change by the last one. [-]
+        Change by the next octave of waves, at most, over the change by the last one. The factors were chosen on 45
+        rough surfaces, and their coverage was measured on others (workflows/benchmarks/whole_error.py). [-]
     follows : {"pressure", "approach", "area", "gap"}
         What its error follows.
     """
@@ -48,7 +45,6 @@ class Observable:
     name: str
     derive: Callable[[xr.Dataset, Observe], xr.DataArray] | None = None
     fields: tuple[str, ...] = ()
-    grid_factor: float = 3 / (2**1.5 - 1)
     octave_factor: float = 1.1
     follows: Literal["pressure", "approach", "area", "gap"] = "pressure"
 
@@ -115,12 +111,11 @@ QUANTITIES = {
             ("gap",),
             follows="gap",
         ),
-        Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, 2.5, "area"),
+        Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, "area"),
         Observable(
             "incremental_stiffness",
             lambda result, observe: _incremental_stiffness(result),
             ("pressure",),
-            2.5,
             2.5,
             "area",
         ),

@@ -28,6 +28,7 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
 from roughvisc.study.neighbours import (
     GRID,
+    GRID_FACTOR,
     KNOWN,
     MODULUS,
     OCTAVE,
@@ -272,7 +273,7 @@ def _refuse_missed(
         if before is not None:
             with np.errstate(divide="ignore", invalid="ignore"):
                 change = np.abs(np.log(budget["value"].values / before[name]["value"].values))
-            part = QUANTITIES[name].grid_factor * change / 2**ORDER
+            part = GRID_FACTOR * change / 2**ORDER
             least = budget.assign(half_width=budget["half_width"].where(budget["source"] != GRID, part))
         if error_of(least, sources) <= _ROUNDING * wanted:
             continue
