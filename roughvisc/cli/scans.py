@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,7 +69,12 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
         for key in ("spacing", "grid"):
             options[key] = in_si(options[key], "m", key)
         try:
-            return open_scan(file, **options)
+            with warnings.catch_warnings(record=True) as complaints:
+                warnings.simplefilter("always", UserWarning)
+                height = open_scan(file, **options)
+            for complaint in complaints:
+                click.echo(f"Warning: {complaint.message}", err=True)
+            return height
         except InputError as error:
             lacks = error.key in _QUESTIONS and options[error.key] is None
             if not (lacks and sys.stdin.isatty() and sys.stderr.isatty()):

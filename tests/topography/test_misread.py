@@ -203,6 +203,17 @@ def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
         np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
 
 
+def test_no_data__is_said_by_the_command_in_one_line(tmp_path, monkeypatch):
+    z = ROUGH.copy()
+    z[3:5, 4:9] = -9999
+    np.savetxt(tmp_path / "m.csv", z, delimiter=",")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(main, ["scan", "m.csv", "--unit", "um", "--spacing", "1 um"], catch_exceptions=False)
+    assert done.exit_code == 0
+    (said,) = done.stderr.splitlines()
+    assert said.startswith("Warning: m.csv: 10 points have the height -9999")
+
+
 def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):
     for z in (np.minimum(ROUGH, 0.5), np.where(ROUGH > 0, 1.0, 0.0), np.where(ROUGH > 1, -5.0, ROUGH)):
         np.save(tmp_path / "m.npy", z)
@@ -251,6 +262,7 @@ def test_keys__of_cards_and_options_of_the_command(tmp_path, monkeypatch):
     options = ["--no-data", "-0.5", "--height-scale", "0.5", "--card"]
     done = CliRunner().invoke(main, ["scan", "s.x3p", *options], catch_exceptions=False)
     assert done.exit_code == 0
+    assert "Warning" not in done.output
     assert "no_data = -0.5\nheight_scale = 0.5" in done.output
     assert "no_data = -0.5\nheight_scale = 0.5" in (tmp_path / "s.toml").read_text()
 

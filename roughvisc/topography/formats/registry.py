@@ -144,14 +144,10 @@ def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Scan
     InputError
         If the name or a suffix belongs to a format that roughvisc reads itself.
     """
-    known = {name: theirs for name, (theirs, _) in _OWN.items()} | {"card": ("toml",)}
-    theirs = {suffix for suffixes in known.values() for suffix in suffixes}
     given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
-    if format in known or theirs & set(given):
-        raise InputError(
-            f"format {format!r} with suffixes {', '.join(given) or 'none'}: expected others than the formats "
-            f"{', '.join(sorted(known))} and their suffixes {', '.join(sorted(theirs))}"
-        )
+    own = {"card", "toml", *_OWN, *(suffix for theirs, _ in _OWN.values() for suffix in theirs)}
+    if taken := own & {format, *given}:
+        raise InputError(f"format {format!r}: found {', '.join(sorted(taken))} of roughvisc itself: expected others")
     _ADDED[format] = given, read
 
 
