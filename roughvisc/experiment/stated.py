@@ -15,8 +15,6 @@ Array = NDArray[np.float64]
 INHERITED, INHERITED_APPROACH = 0.02, 0.005
 #: Least stated error of a pressure without a past, over the tolerance. Measured there too.
 LEAST = 0.015
-#: If every step is a row, steps with a larger stated error, in tolerances, are left out.
-AT_MOST = 3.0
 #: Error of a pressure at the edge of contact, over the mean one.
 SOLVER_AT_EDGE = 3.0
 
@@ -111,11 +109,9 @@ def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float
 
 
 def meets_tolerance(step: Step, scene: Scene, stated: float) -> bool:
-    """Return whether a step is a row if every step is kept: one that states about the tolerance, or less.
+    """Return whether a step is a row if every step is kept: one that states at most the tolerance.
 
-    With hardly any instantaneous compliance the pressure jumps in each cell that enters: only the approach meets the
-    tolerance there, and :data:`AT_MOST` tolerances are allowed for the rest.
+    Steps of a given length, and those of a slide, are all rows: no others can be had.
     """
-    if scene.time_step is not None or scene.program.segments[step.segment].slide is not None:
-        return True
-    return stated <= (AT_MOST if scene.hardly_jumps else 1.0) * scene.tolerance
+    is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
+    return is_given or stated <= scene.tolerance
