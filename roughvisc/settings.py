@@ -64,7 +64,11 @@ class Numerics:
 
     def __post_init__(self) -> None:
         if self.time_step != "auto":
-            self._keep("time_step", _time_step(self.time_step))
+            try:
+                self._keep("time_step", number(self.time_step, "s", "time_step", above=0))
+            except InputError as error:
+                expected = f"'auto', or {error.expected}"
+                raise InputError(key="time_step", found=self.time_step, expected=expected) from error
 
     def _keep(self, name: str, value: Any) -> None:
         """Replace a stated value by the value that the program uses."""
@@ -109,7 +113,13 @@ class Settings(Numerics):
                 raise InputError(key=name, found=found, expected=" or ".join(map(repr, words)))
         self._keep("tolerance", number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1))
         self._keep("times", _times(self.times))
-        self._keep("fields", _fields(self.fields))
+        try:
+            names = tuple(self.fields)
+        except TypeError:
+            names = (self.fields,)
+        if not set(names) <= set(FIELDS):
+            raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")
+        self._keep("fields", names)
         if self.grid_error != "auto":
             self._keep("grid_error", bool(self.grid_error))
 
@@ -125,13 +135,6 @@ class Settings(Numerics):
         return fewest <= cells <= most and (axis == "speed" or "pressure" in self.fields)
 
 
-def _time_step(value: float | str) -> float:
-    try:
-        return number(value, "s", "time_step", above=0)
-    except InputError as error:
-        raise InputError(key="time_step", found=value, expected=f"'auto', or {error.expected}") from error
-
-
 def _times(value: Any) -> int | tuple[float, ...] | None:
     """Return a number of times, or listed times in order, each once. [s]"""
     expected = f"a positive number of times up to {MOST_TIMES}, a list of times [s], or None"
@@ -145,16 +148,6 @@ def _times(value: Any) -> int | tuple[float, ...] | None:
         return tuple(np.unique(np.asarray(in_si(value, "s", "times"), dtype=float)).tolist())
     except (TypeError, ValueError) as error:  # an InputError is a ValueError
         raise InputError(key="times", found=value, expected=expected) from error
-
-
-def _fields(value: Any) -> tuple[str, ...]:
-    try:
-        names = tuple(value)
-    except TypeError:
-        names = (value,)
-    if not set(names) <= set(FIELDS):
-        raise InputError(key="fields", found=value, expected=f"some of {', '.join(FIELDS)}")
-    return names
 
 
 #: Message if ``auto`` cannot be resolved, for a study file; in Python ``=`` has no spaces.
