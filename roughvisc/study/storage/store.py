@@ -398,15 +398,7 @@ def require_hdf5(path: Path) -> None:
             return
     try:
         with NETCDF, h5py.File(path, "r") as file:  # under netCDF's lock: both may use one library
-
-            def outside(name: str, link: Any) -> str | None:
-                if not isinstance(link, h5py.HardLink):
-                    return f"a link to another place, /{name}"
-                member = file[name]
-                is_outside = isinstance(member, h5py.Dataset) and (member.is_virtual or member.external)
-                return f"data of another file, /{name}" if is_outside else None
-
-            found = file.visititems_links(outside)
+            found = _outside(file, set())
     except (OSError, RuntimeError, LookupError, ValueError) as error:
         raise _unreadable(path, error) from error
     if found:
@@ -414,6 +406,28 @@ def require_hdf5(path: Path) -> None:
         raise InputError(
             f"{path}: holds {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
         )
+
+
+def _outside(group: Any, seen: set[int]) -> str:
+    """Return what a group of an HDF5 file holds that is stored elsewhere; empty if nothing.
+
+    HDF5's own visit of all links ends in a SystemError of h5py if a group is damaged.
+    """
+    import h5py
+
+    for name in group:
+        link = group.get(name, getlink=True)
+        place = f"{group.name.rstrip('/')}/{name}"
+        if not isinstance(link, h5py.HardLink):
+            return f"a link to another place, {place}"
+        member = group[name]
+        if isinstance(member, h5py.Dataset) and (member.is_virtual or member.external):
+            return f"data of another file, {place}"
+        if isinstance(member, h5py.Group) and (address := h5py.h5o.get_info(member.id).addr) not in seen:
+            seen.add(address)
+            if found := _outside(member, seen):
+                return found
+    return ""
 
 
 def open_result(path: str | Path) -> xr.Dataset:
