@@ -32,16 +32,16 @@ FIGURES = {
         "area": lambda results: rv.plot.area_against_load(by_load(results)),
     },
     "two_parameters": {
-        "map": lambda results: rv.plot.sweep(results, "contact_area"),
-        "lines": lambda results: rv.plot.sweep(
-            results, "approach", times=[0.01, 0.05], kind="lines"
+        "map": lambda results: rv.plot.sweep(
+            results, along=["program.0.load", "material.kelvin_viscosity"]
         ),
+        "lines": lambda results: rv.plot.sweep(results, "approach", times=[0.01, 0.05]),
     },
     "thickness_sweep": {
         "approach": lambda results: rv.plot.sweep(results, "approach"),
         "area": rv.plot.sweep,
     },
-    "stop_and_go": {"friction": rv.plot.friction_against_distance},
+    "stop_and_go": {"friction": lambda ds: rv.plot.history(ds, over="sliding_distance")},
     "scan_to_area": {
         "area": lambda results: rv.plot.area_against_load(
             by_load(results), contact_modulus={"glassy": 4 * 3e6, "rubbery": 4 * 0.75e6}

@@ -30,6 +30,8 @@ from roughvisc.mechanics.materials.temperature import arrhenius as arrhenius
 from roughvisc.mechanics.materials.temperature import wlf as wlf
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
+from roughvisc.observables.deformed import deformed as deformed
+from roughvisc.reports.report import report as report
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
 from roughvisc.study.budget import budget as budget
@@ -42,6 +44,7 @@ from roughvisc.study.machine_history import read_program as read_program
 from roughvisc.study.observed import observe as observe
 from roughvisc.study.plan import plan as plan
 from roughvisc.study.realisations import over_realisations as over_realisations
+from roughvisc.study.storage.export import to_csv as to_csv
 from roughvisc.study.storage.results import open_results as open_results
 from roughvisc.study.storage.store import open_result as open_result
 from roughvisc.study.storage.table import to_table as to_table
@@ -72,8 +75,5 @@ from roughvisc.topography.synthesis import self_affine as self_affine
 from roughvisc.topography.synthesis import sphere as sphere
 from roughvisc.topography.synthesis import wavy as wavy
 from roughvisc.topography.writers import save_scan as save_scan
-from roughvisc.views.export import deformed as deformed
-from roughvisc.views.export import to_csv as to_csv
-from roughvisc.views.report.page import report as report
 
 __version__: str

@@ -15,8 +15,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.plot.case_text import study_text
 from roughvisc.study.case import read_cases
+from roughvisc.study.case_text import study_text
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

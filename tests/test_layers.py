@@ -16,7 +16,7 @@ LAYERS = (
     ("observables",),
     ("study",),
     ("plot",),
-    ("views",),
+    ("reports",),
     ("__init__ __main__ api cli",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}

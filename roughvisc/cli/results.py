@@ -30,9 +30,9 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.plot import trade
-    from roughvisc.plot.files import write_figure
-    from roughvisc.plot.sweep_files import results_of, save_case_figures, save_sweep_figures
+    from roughvisc.experiment.resources import cores
+    from roughvisc.plot import save_sweep_figures, trade
+    from roughvisc.plot.save import results_of_sweep, save_figures_of_files, write_figure
     from roughvisc.study.storage.store import results_at
     from roughvisc.study.trade import is_trade, open_trade
 
@@ -40,11 +40,11 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     trades = [path for path in paths if path.is_file() and is_trade(path)]
     drawn = [write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png") for path in trades]
     cases = [path for path in paths if path not in trades]
-    together = results_of(result) if len(cases) > 1 else None
+    together = results_of_sweep(result) if len(cases) > 1 else None
     if together is not None:
         drawn += save_sweep_figures(together, out or result)
     if together is None or every:
-        drawn += save_case_figures(cases, out, every=every, named=result.is_dir(), progress=True)
+        drawn += save_figures_of_files(cases, out, every=every, processes=cores())
     say_figures(Console(), drawn)
 
 
@@ -63,9 +63,10 @@ def report(results: Path, out: Path | None) -> None:
     """
     from rich.console import Console
 
-    from roughvisc.views.report.page import report as write
+    from roughvisc.experiment.resources import cores
+    from roughvisc.reports.report import report as write
 
-    say_path(Console(), "Report", write(results, out))
+    say_path(Console(), "Report", write(results, out, processes=cores()))
 
 
 @click.command()
@@ -83,10 +84,10 @@ def table(results: Path, out: Path | None) -> None:
     """
     from rich.console import Console
 
+    from roughvisc.study.storage.export import to_csv
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.study.storage.store import open_result
     from roughvisc.study.storage.table import to_table
-    from roughvisc.views.export import to_csv
 
     if results.is_dir():
         path = out or results / "table.csv"
@@ -135,10 +136,10 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
     """
     from rich.console import Console
 
+    from roughvisc.cli.accuracy_tables import audit_table
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.audit.given import AuditInputs, of_study
     from roughvisc.study.storage.store import open_result, results_at
-    from roughvisc.views.console.accuracy_tables import audit_table
 
     given = AuditInputs(**properties).over(of_study(study) if study is not None else {})
     for path in results_at(result):

@@ -111,15 +111,15 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     """
     from rich.console import Console
 
+    from roughvisc.cli.tables import scan_table
     from roughvisc.plot import surface
-    from roughvisc.plot.files import write_figure
+    from roughvisc.plot.save import write_figure
     from roughvisc.study.storage.files import atomic_write
     from roughvisc.topography.bandwidth import level
     from roughvisc.topography.inspection import inspect
     from roughvisc.topography.parameters import parameters
     from roughvisc.topography.readers import list_channels
     from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
-    from roughvisc.views.console.tables import scan_table
 
     height = _opened(file, options)
     channels = () if "card" in height.attrs else list_channels(file, format=options["format"])

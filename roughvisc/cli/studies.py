@@ -41,8 +41,8 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """
     from rich.console import Console
 
+    from roughvisc.cli.plan_tables import plan_tables
     from roughvisc.study.plan import plan as planned
-    from roughvisc.views.console.tables import plan_tables
 
     costs = planned(study, out, workers=workers)
     if not costs["refusal"].all():
@@ -139,13 +139,13 @@ def _choose(
 
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
     """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
+    from roughvisc.cli.tables import result_table
     from roughvisc.plot import save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
     from roughvisc.study.storage.files import is_writable, require_writable
     from roughvisc.study.storage.store import open_result, result_path
-    from roughvisc.views.console.result_tables import result_table
 
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
@@ -182,13 +182,13 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Client | None, **computing: Any) -> None:
     """Compute and summarise a sweep."""
+    from roughvisc.cli.tables import realisations_tables, sweep_table
     from roughvisc.study.execution.display import Display
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.index import index_of
     from roughvisc.study.storage.sweep_cases import sweep_cases
     from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
-    from roughvisc.views.console.tables import realisations_tables, sweep_table
 
     outcomes = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     with client.as_current() if client is not None else nullcontext():
@@ -257,15 +257,15 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     """
     from rich.console import Console
 
+    from roughvisc.cli.accuracy_tables import trade_table
     from roughvisc.plot import trade as figure
-    from roughvisc.plot.files import write_figure
+    from roughvisc.plot.save import write_figure
     from roughvisc.study.case import read_study
     from roughvisc.study.execution.run import result_folder
     from roughvisc.study.storage.store import write_dataset
     from roughvisc.study.trade import FOLDER
     from roughvisc.study.trade import trade as measured
     from roughvisc.units import number
-    from roughvisc.views.console.accuracy_tables import trade_table
 
     part = number(accuracy, "1", "accuracy", above=0, below=1)
     case, console = read_study(study), Console(quiet=quiet)
@@ -333,10 +333,10 @@ def budget(
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
     """Print the budget of a number, write it, and draw it."""
+    from roughvisc.cli.accuracy_tables import budget_table
     from roughvisc.plot import budget as figure
-    from roughvisc.plot.files import write_figure
+    from roughvisc.plot.save import write_figure
     from roughvisc.study.storage.store import write_dataset
-    from roughvisc.views.console.accuracy_tables import budget_table
 
     console.print(budget_table(found))
     say_path(console, "Budget", write_dataset(found, folder / f"budget-{name}.nc"))

@@ -63,7 +63,7 @@ def test_solution__lies_near_the_theories():
     theory = area_by_theory(ds, material=RUBBER)
     part = (ds["contact_area"] / theory["persson_contact_area"])[1:]
     assert ((part > 0.9) & (part < 2.0)).all()
-    figure = plot.history(ds.assign_attrs(case=CASE), persson=True)
+    figure = plot.history(ds.merge(theory))
     (line,) = (line for ax in figure.axes for line in ax.lines if line.get_label() == "Persson")
     np.testing.assert_allclose(line.get_ydata()[-1], 1e6 * theory["persson_contact_area"][-1], rtol=1e-6)
 

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.colors import to_rgba
+from PIL import Image
 from support import lines
 
 import roughvisc as rv
-from roughvisc import plot
 from roughvisc.labels import label
+from roughvisc.plot import style
+from roughvisc.plot.save import figures_of
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
 
@@ -87,8 +90,8 @@ def test_maps_of_friction__are_of_low_peak_and_high_speed_with_the_motion(direct
     figure = rv.plot.maps(sliding(direction))
     panels = [ax for ax in figure.axes if ax.images]
     assert [ax.get_title(loc="left").partition("  ")[2] for ax in panels] == [
-        f"{arrow} V = 0.02 mm/s\nµ = 0.01",
-        f"{arrow} V = 0.2 mm/s\nµ = 0.2",
+        f"{arrow} V = 20 µm/s\nµ = 0.01",
+        f"{arrow} V = 200 µm/s\nµ = 0.2",
         f"{arrow} V = 2 mm/s\nµ = 0.1",
     ]
     drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in panels]
@@ -99,12 +102,9 @@ def test_maps_of_friction__are_of_low_peak_and_high_speed_with_the_motion(direct
 def test_maps_of_friction__at_speeds_that_are_asked_for():
     figure = rv.plot.maps(sliding(), ["1.5 mm/s", 3e-5])
     titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure.axes if ax.images]
-    assert [title.partition("  ")[2] for title in titles] == ["→ V = 2 mm/s", "→ V = 0.02 mm/s"]
-    small = sliding()
-    small["friction_coefficient"][:] = [0.3, 3.2e-5, 0.2]
-    assert r"µ = 3.2$\times 10^{-5}$" in rv.plot.maps(small, 2e-5).axes[0].get_title(loc="left")
+    assert [title.partition("  ")[2] for title in titles] == ["→ V = 2 mm/s", "→ V = 20 µm/s"]
     for speeds in ([], [1.0] * 25):
-        with pytest.raises(rv.InputError, match="choose 1 to 24"):
+        with pytest.raises(rv.InputError, match="1 to 24"):
             rv.plot.maps(sliding(), speeds)
     with pytest.raises(rv.InputError, match="holds no 'pressure'"):
         rv.plot.maps(sliding().drop_vars("pressure"))
@@ -153,17 +153,20 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
 
 def test_figures_of_a_curve__have_no_history():
     """Force and pressure are the same at all speeds."""
-    drawn = [name for name, _ in plot.figures_of(sliding().assign(force=("speed", np.ones(3))))]
+    drawn = [name for name, *_ in figures_of(sliding().assign(force=("speed", np.ones(3))))]
     assert drawn == ["friction", "maps", "surface"]
 
 
-def test_animation__of_a_curve_goes_from_low_to_high_speed():
-    film, cells = rv.plot.animation(sliding(), frames=3), []
-    for frame in film.new_frame_seq():
-        film._func(frame)
-        cells.append(int((np.ma.getdata(film._fig.axes[0].images[0].get_array()) > 0).sum()))
-    assert cells == [12, 8, 4], "though the rows are not in this order"
-    film._draw_was_started = True
+def test_animate__goes_from_low_to_high_speed(tmp_path):
+    """The contact of 12, 8 and 4 cells shrinks, and with it the colour of cells without contact grows."""
+    free = []
+    with Image.open(rv.plot.animate(sliding(), tmp_path / "film.gif")) as film:
+        for frame in range(film.n_frames):
+            film.seek(frame)
+            pixels = np.asarray(film.convert("RGB")).reshape(-1, 3) / 255
+            free.append(np.count_nonzero(np.abs(pixels - to_rgba(style.NO_CONTACT)[:3]).max(axis=1) < 0.03))
+    assert len(free) == 3
+    assert free[0] < free[1] < free[2], "though the rows are not in this order"
 
 
 #: A stroke, a stop and a stroke back, in micrometres; what is pressed on before is not drawn.
@@ -171,16 +174,14 @@ DISTANCE = [0, 0, 10, 20, 30, 30, 30, 40, 50]
 FRICTION = [np.nan, 0.0, 0.2, 0.3, 0.3, 0.1, 0.05, -0.02, 0.28]
 
 
-def test_friction_against_distance__draws_strokes_as_lines_and_stops_as_dots():
+def test_history__over_the_distance_begins_with_the_first_slide():
     series = {"friction_coefficient": np.array(FRICTION), "sliding_distance": 1e-6 * np.array(DISTANCE)}
     series |= {"force": np.ones(9), "approach": np.ones(9)}
     coords = {"time": np.arange(9.0)}
     slid = label(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
-    (ax,) = rv.plot.friction_against_distance(slid).axes
-    drawn = [line.get_xydata().tolist() for line in ax.lines if len(line.get_xdata()) and line.get_color() != "0.3"]
-    assert drawn[0] == [[0, 0.0], [10, 0.2], [20, 0.3], [30, 0.3]]
-    assert drawn[1] == [[30, 0.3], [30, 0.1], [30, 0.05]]
-    assert drawn[2] == [[30, 0.05], [40, -0.02], [50, 0.28]]
+    (ax,) = rv.plot.history(slid, over="sliding_distance").axes
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), DISTANCE[1:])
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), FRICTION[1:])
     assert ax.get_xlabel() == "Sliding distance [µm]"
     with pytest.raises(rv.InputError, match="sliding_distance"):
-        rv.plot.friction_against_distance(slid.drop_vars("sliding_distance"))
+        rv.plot.history(slid.drop_vars("sliding_distance"), over="sliding_distance")

@@ -5,10 +5,9 @@ import pytest
 import scipy.stats
 import xarray as xr
 from matplotlib.collections import LineCollection, PolyCollection
-from support import lines
 
 from roughvisc import plot
-from roughvisc.plot.sweeps import curves_of
+from roughvisc.plot.sweep import swept_keys
 
 LOADS = np.array([0.01, 0.02, 0.04])
 TIMES = np.array([0.1, 1.0, 10.0])
@@ -76,7 +75,7 @@ def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter(
     told = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "mean of 5 realisations" in told
     assert "measured scan" not in told
-    assert [one.key for one in curves_of(ds).parameters] == ["program.0.load"]
+    assert [key.dotted for key in swept_keys(ds)] == ["program.0.load"]
 
 
 def test_sweep__the_band_of_a_point_alone_is_a_bar():
@@ -89,23 +88,23 @@ def test_sweep__the_band_of_a_point_alone_is_a_bar():
     assert sum(isinstance(one, PolyCollection) for one in ax.collections) == 1
 
 
-def test_cases_of__a_realisation_that_is_missing_does_not_count():
-    ds = patches()
+def test_sweep__a_realisation_that_is_missing_does_not_count():
+    ds = patches(1)
     hole = (ds["program_0_load"] == LOADS[1]) & (ds["realisation"] == 3)
     ds = ds.assign(contact_area=ds["contact_area"].where(~hole)).assign_coords(case_key=ds["case_key"].where(~hole, ""))
-    curves = curves_of(ds)
-    assert curves.counts == [4, 3, 4]
-    low, _ = interval(FACTORS[[1, 2, 4]])
-    assert curves.frames[1]["lower"].iloc[-1] == pytest.approx(3e-7 * LOADS[1] * low)
+    (ax,) = plot.history(ds).axes
+    band = ax.collections[1].get_paths()[0].vertices
+    low, _ = interval(FACTORS[[0, 1, 3, 4]])
+    unit = 1e12 if "µm²" in ax.get_ylabel() else 1e6
+    at_end = band[band[:, 0] == band[:, 0].max()]
+    assert at_end[:, 1].min() == pytest.approx(3e-7 * LOADS[1] * low * unit)
 
 
-def test_cases_of__realisations_of_other_times_are_compared_at_common_places():
+def test_history__of_realisations_with_other_times_is_interpolated_to_common_places():
     times = np.array([[0.0, 1.0, 2.0], [0.0, 0.5, 2.0]])
     area = xr.Variable(("case", "row"), 1e-8 * times * [[1], [2]], {"units": "m^2"})
-    status = xr.Variable(("case", "row"), np.array([[0] * 3, [1] * 3]), {"flag_values": np.arange(4, dtype="int8")})
     coords = {"time": (("case", "row"), times), "rows": ("case", [3, 3]), "realisation": ("case", [1, 2])}
-    results = xr.Dataset({"contact_area": area, "status": status}, coords)
-    (mean,) = curves_of(results).frames
-    np.testing.assert_allclose(mean.index, [0, 0.5, 1, 2])
-    np.testing.assert_allclose(mean["value"], 1.5e-8 * mean.index)
-    assert lines(plot.history(results).axes[0])
+    (ax,) = plot.history(xr.Dataset({"contact_area": area}, coords)).axes
+    (line,) = ax.lines
+    np.testing.assert_allclose(line.get_xdata(), [0, 0.5, 1, 2])
+    np.testing.assert_allclose(line.get_ydata() / line.get_ydata()[-1], np.array([0, 0.5, 1, 2]) / 2)

@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc import observables
-from roughvisc.plot.fields import plane_ratio, plane_unit
+from roughvisc.plot.maps import plane_ratio, plane_unit
 from roughvisc.topography.grid import labelled
 
 LENGTH, WIDTH, COUNT = 200e-6, 2e-6, 50

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from roughvisc.errors import InputError
-from roughvisc.plot.case_text import study_text
 from roughvisc.study.case import read_cases
+from roughvisc.study.case_text import study_text
 
 WORKFLOWS = sorted((Path(__file__).parents[3] / "workflows").glob("*.toml"))
 #: Workflows that the short run tries.

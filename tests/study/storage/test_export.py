@@ -21,7 +21,7 @@ from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 #: Units as UDUNITS, which CF refers to, writes them.
 UDUNITS = {"1", "s", "m", "m^2", "Pa", "N", "J"}
-CARD = Path(__file__).parents[2] / "surfaces" / "ground_steel.toml"
+CARD = Path(__file__).parents[3] / "surfaces" / "ground_steel.toml"
 SAMPLES = {"creep": made.hertz_creep, "rough": made.rough_creep, "open": made.open_contact, "one": made.one_frame}
 
 

@@ -2,7 +2,7 @@
 
 import re
 
-from roughvisc.plot.case_text import case_words, file_stems
+from roughvisc.study.case_text import case_words, file_stems
 
 
 def case(written=None, **varied):

@@ -8,12 +8,12 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.cli.tables import titled
 from roughvisc.study.audit.audit import Audit
 from roughvisc.study.audit.limits import BROKEN, DOUBTFUL, NOT_KNOWN
 from roughvisc.study.trade import cheapest, pareto_front
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
-from roughvisc.views.console.tables import titled
 
 #: The words tell the verdicts apart; weight and colour help to find them.
 _STYLES = {BROKEN: "bold red", DOUBTFUL: "bold", NOT_KNOWN: "dim"}

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from roughvisc.views.realisation_rows import realisation_rows
+from roughvisc.reports.realisations import realisation_rows
 
 ROW = {
     "case": 1,

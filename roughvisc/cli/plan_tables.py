@@ -1,10 +1,10 @@
-"""Tables on the command line: sweeps, plans, scans."""
+"""Table of a plan on the command line: what a study will model and what it will cost."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,76 +12,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from roughvisc.errors import printable
-from roughvisc.topography.grid import spacing
+from roughvisc.cli.tables import readable, two_columns
 from roughvisc.units import unit_for
-from roughvisc.views.realisation_rows import realisation_rows
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from roughvisc.study.execution.outcome import Outcome
-
-#: What is stated of accuracy, and its parts, each at its worst.
-_ERRORS = {
-    "stated_error": "worst stated error",
-    "time_error": "worst error of time steps",
-    "residual": "contact solver (estimate)",
-}
-
-
-def readable(value: float, unit: str) -> str:
-    """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
-    return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
-
-
-def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
-    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
-
-    Parameters
-    ----------
-    outcomes : sequence of Outcome
-        One a distinct case.
-    asked : int
-        Number of cases, those alike counted each.
-    title : str
-        Of the study.
-    """
-    kinds = [outcome.kind for outcome in outcomes]
-    entries = [outcome.entry for outcome in outcomes if outcome.entry]
-    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
-    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
-    alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
-    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
-    for kind, label in (
-        ("unconverged", "Not converged"),
-        ("failed", "Failed"),
-        ("hindered", "Interrupted"),
-        ("held", "Locked by another run"),
-    ):
-        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
-    rows += accuracy_rows([entry.histories for entry in entries])
-    if spent:
-        rows.append(("Cost: total wall time", readable(sum(spent), "s")))
-    return two_columns(rows, title)
-
-
-def realisations_tables(table: pd.DataFrame) -> Group:
-    """What a sweep's realisations scatter; nothing of one without.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Of :func:`roughvisc.study.storage.table.realisations_table`.
-    """
-    headings, rows, notes = realisation_rows(table)
-    shown = Table(box=None, pad_edge=False, collapse_padding=True)
-    for heading in headings:
-        shown.add_column(Text(heading), justify="left" if heading == "quantity" else "right", overflow="fold")
-    for row in rows:
-        shown.add_row(*(Text(printable(cell)) for cell in row))
-    return Group(*([Text(), shown] if rows else []), *(Text(note, style="italic") for note in notes))
 
 
 def plan_tables(costs: xr.Dataset) -> Group:
@@ -255,81 +187,3 @@ def size(count: float) -> str:
     """
     factor, unit = _bytes(count)
     return f"{count / factor:.3g} {unit}"
-
-
-def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
-    """What is in a scan: its channels, its size, what is missing, how rough it is.
-
-    Parameters
-    ----------
-    height : xarray.DataArray
-        Heights over (x, y). [m]
-    measures : xarray.Dataset
-        Of :func:`roughvisc.parameters`.
-    name : str
-        Of the file.
-    channels : sequence, optional
-        Of :func:`roughvisc.list_channels`; told where there are several.
-    """
-    sides = spacing(height)
-    counts = [height.sizes[axis] for axis in ("x", "y")]
-    missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
-    rows = [
-        ("Format", str(height.attrs.get("format", "surface card"))),
-        ("Instrument", str(height.attrs.get("instrument", ""))),
-        ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
-        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
-        *(_channel_row(i, one) for i, one in enumerate(channels if len(channels) > 1 else ())),
-        ("Orientation", str(height.attrs.get("orientation", ""))),
-        ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
-        ("Shape", f"{counts[0]} x {counts[1]} points"),
-        ("Spacing", " x ".join(readable(d, "m") for d in sides)),
-        ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
-        ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
-        ("Height range", readable(float(height.max() - height.min()), "m")),
-    ]
-    named = {**{parameter: parameter for parameter in ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdr")}, "Sdq": "rms slope"}
-    for parameter, label in named.items():
-        unit = str(measures[parameter].attrs["units"])
-        rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
-    return two_columns([row for row in rows if row[1]], name)
-
-
-def _channel_row(index: int, channel: Any) -> tuple[str, str]:
-    kind = f"height in {channel.unit}" if channel.unit else "height without a unit"
-    shape = " x ".join(map(str, channel.shape))
-    described = f"{channel.name}: {kind if channel.is_height else channel.kind}, {shape} points"
-    return f"Channel {index}", described
-
-
-def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
-    """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
-    rows = []
-    for name, label in _ERRORS.items():
-        values = [np.ravel(one[name]) for one in found if name in one]
-        if values:
-            asked = f", tolerance {tolerance:g}" if tolerance and not rows else ""
-            rows.append((f"Accuracy: {label}", number(np.concatenate(values)) + asked))
-    return rows
-
-
-def number(values: Any) -> str:
-    """The largest of some numbers that are known."""
-    found = np.asarray(values)
-    found = found[np.isfinite(found)]
-    return f"{found.max():.2g}" if found.size else "not known"
-
-
-def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
-    """A title and rows of a label and a value."""
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for label, value in rows:
-        table.add_row(Text(label), Text(printable(str(value))))  # names in files may look like markup
-    return titled(title, table)
-
-
-def titled(title: str | None, *parts: Any) -> Group:
-    """A title above what it is of."""
-    return Group(Text(printable(title or "untitled"), style="bold"), *parts)

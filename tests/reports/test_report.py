@@ -11,13 +11,13 @@ from click.testing import CliRunner
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
-from roughvisc.plot.case_text import study_text
+from roughvisc.reports.report import report
 from roughvisc.study.case import read_cases
+from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.store import write_result
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.table import to_table
-from roughvisc.views.report.page import report
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = f"""
@@ -96,7 +96,8 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
     text = report(ds, tmp_path / "one.html").read_text()
     assert not re.findall(r"<(b|i|u)\b", text)
     assert "&lt;b&gt;a.sur" in text
-    assert ('<td class="number warn">0.003</td>' in text) == (not within)
+    assert ("<td>0.003, above the tolerance of 0.001</td>" in text) == (not within)
+    assert ("<td>0.003</td>" in text) == within
     assert "do not record the whole study" in text
     with pytest.raises(InputError, match="out is None"):
         report([ds])
@@ -105,8 +106,10 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
 @pytest.mark.thorough
 def test_page__has_figures_of_every_case_and_of_the_sweep(page):
     titles = re.findall(r"<figcaption>(.*?)</figcaption>", page)
-    assert [titles.count(one) for one in ("Maps", "History", "Section")] == [3, 3, 3]
-    assert "Contact area against what was varied" in titles
+    captions = ("Pressure and gap between the bodies.", "Histories; dots mark the kept times.")
+    assert [titles.count(one) for one in captions] == [3, 3]
+    assert sum(one.startswith("Section through the contact") for one in titles) == 3
+    assert "Contact area against the swept settings." in titles
     assert page.count('src="data:image/png;base64,') == len(titles)
 
 

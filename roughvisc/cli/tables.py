@@ -1,0 +1,215 @@
+"""Tables on the command line: results, sweeps, scans."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from roughvisc.errors import printable
+from roughvisc.observables.leakage import closing_times
+from roughvisc.reports.realisations import realisation_rows
+from roughvisc.topography.grid import spacing
+from roughvisc.units import unit_for
+from roughvisc.variables import AXES, CONDUCTANCES, GRID_ERROR, VARIABLES, axis_of, variables_in_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from roughvisc.study.execution.outcome import Outcome
+
+#: What is stated of accuracy, and its parts, each at its worst.
+_ERRORS = {
+    "stated_error": "worst stated error",
+    "time_error": "worst error of time steps",
+    "residual": "contact solver (estimate)",
+}
+
+
+def readable(value: float, unit: str) -> str:
+    """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
+    return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
+
+
+def result_table(dataset: xr.Dataset) -> Group:
+    """Summary of a result: main results, accuracy, cost."""
+    axis = AXES[axis_of(dataset)]
+    row = dataset.isel({axis.name: axis.telling_row(dataset)})
+    where = f"at {axis.place(float(row[axis.name]), 3)}" if axis.telling else "at the end"
+    ends = dict.fromkeys(axis.place(float(end), 3) for end in (dataset[axis.name].min(), dataset[axis.name].max()))
+    along = f", along {dataset.attrs['direction']}" if "direction" in dataset.attrs else ""
+    rows = [
+        ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
+        (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, from {' to '.join(ends)}{along}"),
+    ]
+    for name in variables_in_table("last"):
+        if name not in row or name in (axis.name, "contact_fraction", "friction_force_across"):
+            continue
+        value = float(row[name])
+        text = "infinite: full contact" if math.isinf(value) else readable(value, VARIABLES[name].units)
+        rows.append((f"{VARIABLES[name].label} {where}", text + _remark(dataset, row, name, value)))
+    rows += accuracy_rows([dataset], dataset.attrs.get("tolerance"))
+    for name in dict.fromkeys(GRID_ERROR.values()):
+        if name in dataset and (dataset[name] != 0).any():
+            rows.append((f"Accuracy: worst {VARIABLES[name].long_name}", number(dataset[name])))
+    if "convolutions" in dataset:  # a file that another program has written may not state its cost
+        rows.append(("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"))
+    if "wall_time" in dataset:
+        rows.append(("Cost: wall time", readable(float(dataset["wall_time"].max()), "s")))
+    return two_columns(rows, dataset.attrs.get("title"))
+
+
+def _remark(dataset: xr.Dataset, row: xr.Dataset, name: str, value: float) -> str:
+    """Share, largest value or error that belongs to a value of a result."""
+    axis = AXES[axis_of(dataset)]
+    if name == axis.telling:
+        ordered = dataset[name].sortby(axis.name)
+        return f", the largest; {float(ordered[0]):.2g} and {float(ordered[-1]):.2g} at the ends"
+    if name == "nominal_pressure" and (most := float(dataset[name].max())) > value * (1 + 1e-6):
+        return f", at most {readable(most, 'Pa')}"
+    if name == "contact_area":
+        share = f", {100 * float(row['contact_fraction']):.3g} % of the surface" if "contact_fraction" in row else ""
+        counted = f"; {readable(float(row[f'{name}_counted']), 'm^2')} counted" if f"{name}_counted" in row else ""
+        return share + counted
+    if name == "friction_force" and f"{name}_error" in row:
+        return f", stated error {readable(float(row[f'{name}_error']), 'N')}"
+    if name == "leak_rate" and (closes := closing_times(dataset)):
+        return f", closed between {axis.place(closes[0])} and {axis.place(closes[1]).partition(' = ')[2]}"
+    if name == "leak_rate" and not dataset[name].values.any():
+        return f", closed at all {axis.rows}"
+    if name in CONDUCTANCES and 0 < value < math.inf:
+        return f", known to {100 * float(row[f'{name}_error']) / value:.2g} %"
+    return ""
+
+
+def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+        One a distinct case.
+    asked : int
+        Number of cases, those alike counted each.
+    title : str
+        Of the study.
+    """
+    kinds = [outcome.kind for outcome in outcomes]
+    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
+    spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
+    alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
+    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
+    for kind, label in (
+        ("unconverged", "Not converged"),
+        ("failed", "Failed"),
+        ("hindered", "Interrupted"),
+        ("held", "Locked by another run"),
+    ):
+        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
+    rows += accuracy_rows([entry.histories for entry in entries])
+    if spent:
+        rows.append(("Cost: total wall time", readable(sum(spent), "s")))
+    return two_columns(rows, title)
+
+
+def realisations_tables(table: pd.DataFrame) -> Group:
+    """What a sweep's realisations scatter; nothing of one without.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        Of :func:`roughvisc.study.storage.table.realisations_table`.
+    """
+    headings, rows, notes = realisation_rows(table)
+    shown = Table(box=None, pad_edge=False, collapse_padding=True)
+    for heading in headings:
+        shown.add_column(Text(heading), justify="left" if heading == "quantity" else "right", overflow="fold")
+    for row in rows:
+        shown.add_row(*(Text(printable(cell)) for cell in row))
+    return Group(*([Text(), shown] if rows else []), *(Text(note, style="italic") for note in notes))
+
+
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
+    """What is in a scan: its channels, its size, what is missing, how rough it is.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Heights over (x, y). [m]
+    measures : xarray.Dataset
+        Of :func:`roughvisc.parameters`.
+    name : str
+        Of the file.
+    channels : sequence, optional
+        Of :func:`roughvisc.list_channels`; told where there are several.
+    """
+    sides = spacing(height)
+    counts = [height.sizes[axis] for axis in ("x", "y")]
+    missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
+    rows = [
+        ("Format", str(height.attrs.get("format", "surface card"))),
+        ("Instrument", str(height.attrs.get("instrument", ""))),
+        ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
+        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
+        *(_channel_row(i, one) for i, one in enumerate(channels if len(channels) > 1 else ())),
+        ("Orientation", str(height.attrs.get("orientation", ""))),
+        ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
+        ("Shape", f"{counts[0]} x {counts[1]} points"),
+        ("Spacing", " x ".join(readable(d, "m") for d in sides)),
+        ("Missing points", f"{missing} ({100 * missing / height.size:.2g} %)" if missing else "none"),
+        ("Filled points", f"{filled} ({height.attrs.get('fill_method')})" if filled else ""),
+        ("Height range", readable(float(height.max() - height.min()), "m")),
+    ]
+    named = {**{parameter: parameter for parameter in ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdr")}, "Sdq": "rms slope"}
+    for parameter, label in named.items():
+        unit = str(measures[parameter].attrs["units"])
+        rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
+    return two_columns([row for row in rows if row[1]], name)
+
+
+def _channel_row(index: int, channel: Any) -> tuple[str, str]:
+    kind = f"height in {channel.unit}" if channel.unit else "height without a unit"
+    shape = " x ".join(map(str, channel.shape))
+    described = f"{channel.name}: {kind if channel.is_height else channel.kind}, {shape} points"
+    return f"Channel {index}", described
+
+
+def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
+    """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
+    rows = []
+    for name, label in _ERRORS.items():
+        values = [np.ravel(one[name]) for one in found if name in one]
+        if values:
+            asked = f", tolerance {tolerance:g}" if tolerance and not rows else ""
+            rows.append((f"Accuracy: {label}", number(np.concatenate(values)) + asked))
+    return rows
+
+
+def number(values: Any) -> str:
+    """The largest of some numbers that are known."""
+    found = np.asarray(values)
+    found = found[np.isfinite(found)]
+    return f"{found.max():.2g}" if found.size else "not known"
+
+
+def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
+    """A title and rows of a label and a value."""
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for label, value in rows:
+        table.add_row(Text(label), Text(printable(str(value))))  # names in files may look like markup
+    return titled(title, table)
+
+
+def titled(title: str | None, *parts: Any) -> Group:
+    """A title above what it is of."""
+    return Group(Text(printable(title or "untitled"), style="bold"), *parts)

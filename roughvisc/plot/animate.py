@@ -1,0 +1,104 @@
+"""Animation of a map of one case."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.artist import Artist
+
+from roughvisc.errors import InputError
+from roughvisc.plot import style
+from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, plane_ratio
+from roughvisc.plot.rows import expect_result, measured_part, rows_of
+from roughvisc.units import unit_for
+from roughvisc.variables import FIELDS, VARIABLES
+
+
+def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames: int = 100, rate: float = 12.0) -> Path:
+    """Write an animation of a map, whose title states the time or speed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result; of fields on Dask one frame is in memory at a time.
+    path : path-like
+        File to write: ``.gif`` or ``.webp``, or ``.mp4`` if ffmpeg is installed. It appears only when complete.
+    field : {"pressure", "gap", "displacement"}, optional
+        Field that the map shows. Default: pressure, or gap if the result holds no pressure.
+    frames : int
+        Largest number of kept times shown; of more, evenly spread ones.
+    rate : float
+        Frames per second. [1/s]
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        If the file name or the missing ffmpeg does not allow it, or the result holds no such field.
+    """
+    path = Path(path)
+    expect_result(dataset, "x", "y")
+    name = field or ("pressure" if "pressure" in dataset else "gap")
+    if name not in FIELDS:
+        raise InputError(key="field", found=name, expected=f"one of {', '.join(FIELDS)}")
+    expect_result(dataset, name)
+    if frames < 1 or rate <= 0:
+        raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
+    suffix = path.suffix.lower()
+    if suffix in (".gif", ".webp"):
+        writer: Any = PillowWriter(fps=rate)
+    elif suffix not in (".mp4", ".m4v", ".mov"):
+        raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or .mp4")
+    elif not FFMpegWriter.isAvailable():
+        raise InputError(f"{path.name}: ffmpeg was not found, which {suffix} needs: install it, or write a .gif")
+    else:  # even numbers of pixels and this pixel format play everywhere
+        writer = FFMpegWriter(fps=rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
+    unfinished = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    try:
+        with matplotlib.rc_context(style.STYLE):
+            _film(measured_part(dataset.sortby(str(rows_of(dataset).name))), name, frames).save(unfinished, writer)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path
+
+
+def _film(dataset: xr.Dataset, name: str, count: int) -> FuncAnimation:
+    """Animation of one map, with one colour scale for all frames."""
+    rows = rows_of(dataset).size
+    chosen = np.unique(np.linspace(0, rows - 1, min(rows, count)).round().astype(int)).tolist()
+    ends = [colour_limits(name, frame_of(dataset, name, frame).values) for frame in chosen]
+    low, high = min(one[0] for one in ends), max(one[1] for one in ends)
+    unit = unit_for([high], VARIABLES[name].units)
+    limits = {"vmin": float(unit(low)) if name == "displacement" else 1e-12 * float(unit(high))}
+    figure = style.new_figure(4.6, 1.2 + 3.3 * float(np.clip(plane_ratio(dataset), 0.3, 1.3)))
+    figure.set_dpi(100)
+    ax = figure.add_subplot()
+    first = frame_of(dataset, name, chosen[0])
+    image = draw_map(ax, first, unit, COLOUR_MAPS[name], vmax=float(unit(high)), **limits)
+    figure.colorbar(image, ax=ax, pad=0.02, aspect=22).set_label(unit.label(VARIABLES[name].label))
+    title, outline = ax.set_title(frame_title(dataset, chosen[0]), loc="left"), []
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the layout of the first picture holds for all
+
+    def draw(frame: int) -> list[Artist]:
+        title.set_text(frame_title(dataset, frame))
+        image.set_data(np.ma.masked_invalid(unit(frame_of(dataset, name, frame).transpose("y", "x"))))
+        while outline:
+            outline.pop().remove()
+        if name != "gap" and {"pressure", "gap"} & set(dataset):
+            outline.extend(draw_outline(ax, dataset, frame))
+        return [title]
+
+    return FuncAnimation(figure, draw, chosen, cache_frame_data=False)

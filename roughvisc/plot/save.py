@@ -1,0 +1,243 @@
+"""Files of figures: those of one result, of a sweep, and of a whole folder drawn in parallel."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import textwrap
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import matplotlib
+import xarray as xr
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.plot import style
+from roughvisc.plot.history import friction, history
+from roughvisc.plot.maps import maps
+from roughvisc.plot.rows import expect_result
+from roughvisc.plot.section import section
+from roughvisc.plot.surface import surface
+from roughvisc.plot.sweep import sweep_figures
+from roughvisc.study.case_text import case_words, file_stems
+from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.store import open_result
+
+_Result = TypeVar("_Result")
+
+#: Name -> function of a result, variables that it needs, and a caption.
+FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {
+    "friction": (
+        friction,
+        ("speed", "friction_coefficient", "contact_fraction"),
+        "Friction coefficient and contact fraction against speed.",
+    ),
+    "history": (history, ("time", "force", "approach"), "Histories; dots mark the kept times."),
+    "maps": (maps, ("x", "y", "pressure"), "Pressure and gap between the bodies."),
+    "leakage": (
+        lambda dataset: maps(dataset, fields="flux"),
+        ("leak_rate", "gap", "x", "y"),
+        "Flux of the leaking fluid, integrated over the gap.",
+    ),
+    "section": (
+        section,
+        ("time", "height", "gap"),
+        "Section through the contact at its largest area: pressure, profile and deformed surface.",
+    ),
+    "slide": (
+        lambda dataset: history(dataset, over="sliding_distance"),
+        ("time", "sliding_distance", "friction_coefficient"),
+        "Friction coefficient and contact area over the distance slid.",
+    ),
+    "surface": (surface, ("height",), "Surface after conditioning: heights, profile, distribution and spectrum."),
+}
+#: Figures that are drawn unless all are requested.
+DEFAULT = ("friction", "history", "maps", "leakage")
+
+
+def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Iterator[tuple[str, str, Figure]]:
+    """Name, caption and figure of everything that a result allows, one at a time; or only of those of some names."""
+    for name, (draw, needed, caption) in FIGURES.items():
+        if (names is None or name in names) and all(one in dataset for one in needed):
+            yield name, caption, draw(dataset)
+
+
+@matplotlib.rc_context(style.STYLE)
+def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
+    """Write a figure to a file of the kind that its suffix names, complete or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What to write.
+    path : Path
+        Where to.
+    dpi : float
+        Resolution of pictures made of pixels.
+    title : str
+        Text above the figure, such as the case that it shows.
+
+    Raises
+    ------
+    InputError
+        If the suffix names no kind of picture, or the folder cannot be written to.
+    """
+    kind = path.suffix.lstrip(".") or "png"
+    if kind not in figure.canvas.get_supported_filetypes():
+        raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
+    if title:
+        figure.suptitle(style.verbatim(textwrap.fill(title, int(13 * figure.get_figwidth()))))
+    with atomic_write(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=dpi)
+    return path
+
+
+def save_figures(
+    dataset: xr.Dataset,
+    folder: Any,
+    stem: str,
+    *,
+    suffix: str = ".png",
+    dpi: float = 200.0,
+    title: str = "",
+    every: bool = True,
+) -> list[Path]:
+    """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    folder : path-like
+        Where to write; made if absent.
+    stem : str
+        First part of every file name.
+    suffix : str
+        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+    dpi : float
+        Resolution of pictures made of pixels.
+    title : str
+        Text above each figure, such as the case that it shows.
+    every : bool
+        False: only history or friction curve, maps, and the flow of a leak.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result or allows no figure.
+    """
+    expect_result(dataset)
+    written = [
+        write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title)
+        for name, _, figure in figures_of(dataset, None if every else DEFAULT)
+    ]
+    if not written:
+        stored = ", ".join(str(known) for known in dataset.variables)
+        raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")
+    return written
+
+
+def save_figures_of_files(
+    paths: Sequence[Path], folder: Path | None, *, every: bool = True, processes: int = 1, label: str = "drawing"
+) -> list[Path]:
+    """Write the figures of result files, in parallel and with a progress bar.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Results. Of several, file names and titles state what was varied.
+    folder : Path, optional
+        Where to write. Default: beside each result.
+    every : bool
+        False: only the default figures of each.
+    processes : int
+        Number of processes. More than one need a main module that may be imported again.
+    label : str
+        Text of the progress bar.
+    """
+    cases: dict[str, Any] = {}
+    if len(paths) > 1:
+        for path in paths:
+            with suppress(InputError, ValueError), open_result(path) as dataset:
+                cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
+    stems = file_stems(cases)
+    jobs = [
+        (path, folder or path.parent, stems.get(path.stem, path.stem), case_words(cases.get(path.stem, {})), every)
+        for path in paths
+    ]
+    return [one for written in in_parallel(_save_file, jobs, processes, label) for one in written]
+
+
+def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
+    path, folder, stem, title, every = job
+    with open_result(path) as dataset:
+        return save_figures(dataset, folder, stem, title=title, every=every)
+
+
+def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: int, label: str) -> list[_Result]:
+    """Results of a function of some jobs, in their order, with a progress bar; computed by several processes."""
+    from rich.console import Console
+    from rich.progress import track
+
+    jobs = list(jobs)
+    look: dict[str, Any] = {"description": label, "total": len(jobs), "transient": True}
+    look["console"] = Console(stderr=True)
+    if min(processes, len(jobs)) < 2:
+        return [work(job) for job in track(jobs, **look)]
+    # a process that is forked while threads run may hang; a server is forked before any work
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    context = multiprocessing.get_context(method)
+    if method == "forkserver":
+        context.set_forkserver_preload([__name__])
+    with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
+        futures = [pool.submit(work, job) for job in jobs]
+        for done in track(as_completed(futures), **look):
+            done.result()
+        return [future.result() for future in futures]
+
+
+def results_of_sweep(folder: Path) -> xr.Dataset | None:
+    """Results of the sweep that ran last in a folder; None if there are fewer than two."""
+    try:
+        results = open_results(folder)
+    except InputError:
+        return None
+    return results if results["case_key"].size > 1 else None
+
+
+def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
+    """Write the figures of a sweep, as ``sweep-contact_area.png``, ``sweep-approach.png`` and so on.
+
+    Parameters
+    ----------
+    results : xarray.Dataset
+        Result of :func:`roughvisc.open_results`.
+    folder : path-like
+        Where to write; made if absent.
+    suffix : str
+        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+    dpi : float
+        Resolution of pictures made of pixels.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files written.
+
+    Raises
+    ------
+    InputError
+        If the Dataset does not hold several cases.
+    """
+    drawn = sweep_figures(results)
+    return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]

@@ -1,0 +1,170 @@
+"""Figures of a trade, time against error, and of a budget, the sources of an error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.plot import style
+from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
+from roughvisc.units import unit_for
+from roughvisc.variables import AXES, VARIABLES, axis_of
+
+#: sign of the coarsening less one -> label, marker and colour of the points
+_GRIDS = {
+    0: ("grid of the study", "o", style.BLUE),
+    1: ("coarser grid", "v", style.VERMILION),
+    -1: ("finer grid", "^", style.VERMILION),
+}
+
+
+@style.apply
+def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
+    """Draw wall time against error of every setting, with the Pareto front.
+
+    Errors smaller than the uncertainty of the reference lie in a grey band, and are not part of the front. An error of
+    zero is drawn at the bottom.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.trade`.
+    quantity : str or sequence of str, optional
+        One panel for each. Default: the first two of the trade.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is no trade, holds no such quantity, or no setting was measured.
+    """
+    if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
+        raise InputError("expected the Dataset of rv.trade")
+    known = dataset["quantity"].values.tolist()
+    wanted = known[:2] if quantity is None else [quantity] if isinstance(quantity, str) else list(quantity)
+    for name in wanted:
+        if name not in known:
+            raise InputError(key="quantity", found=name, expected=f"some of {', '.join(known)}")
+    shown = [name for name in wanted if np.isfinite(dataset["error"].sel(quantity=name)).any()]
+    if not shown:
+        raise InputError("the trade holds no measured setting: nothing to draw")
+    figure = style.new_figure(0.6 + 3.3 * len(shown), 3.7)
+    axes = figure.subplots(1, len(shown), squeeze=False)[0]
+    for ax, name in zip(axes, shown, strict=True):
+        _draw_trade(ax, dataset, name)
+    style.letter_panels(axes)
+    style.legend_above(figure, style.named_in(*axes))
+    return figure
+
+
+def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
+    """Draw the settings of one quantity."""
+    time, error = dataset["run_time"].values, 100 * dataset["error"].sel(quantity=quantity).values
+    unsure = float(np.nan_to_num(100 * uncertainty(dataset, quantity)))
+    known = np.isfinite(time) & np.isfinite(error)
+    positive = error[known & (error > 0)]
+    floor = 0.4 * (positive.min() if positive.size else 1e-3)
+    height = np.maximum(error, floor)
+    front = np.flatnonzero(pareto_front(dataset, quantity) & (error > unsure))
+    front = front[np.argsort(time[front], kind="stable")]
+    ax.plot(time[front], height[front], color="0.35", lw=1.0, zorder=1, label="Pareto front")
+    side = np.sign(dataset["coarsening"].values - 1)
+    for kind, (label, marker, colour) in _GRIDS.items():
+        chosen = known & (side == kind)
+        if chosen.any():
+            ax.plot(time[chosen], height[chosen], marker, color=colour, ms=5, mew=0, label=label, zorder=3)
+        for i in np.flatnonzero(chosen):
+            if i in front or kind:
+                cells = f", {int(dataset['cells_x'][i])} × {int(dataset['cells_y'][i])}" if kind else ""
+                text = format_tolerance(float(dataset["tolerance"][i])) + cells
+                offset = {"xytext": (6, (-7, 3)[i % 2]), "textcoords": "offset points"}
+                ax.annotate(text, (time[i], height[i]), fontsize=6, color=colour, **offset)
+    style.log_axis(ax.xaxis, time[known])
+    style.log_axis(ax.yaxis, height[known])
+    ax.set_xlim(time[known].min() / 1.6, time[known].max() * 3)
+    ax.set_ylim(floor / 1.6, height[known].max() * 2)
+    if unsure > floor:
+        ax.axhspan(floor / 1.6, unsure, color="0.93", zorder=0, label="uncertainty of the reference")
+    if (error[known] == 0).any():
+        ax.text(0.02, floor, "zero", transform=ax.get_yaxis_transform(), fontsize=6, style="italic", va="center")
+    ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
+    ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
+    ax.grid()
+
+
+@style.apply
+def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
+    """Draw the sources of error of a number as bars, and the number over its rows with its 95 % interval.
+
+    Errors are in percent, or as factors on a logarithmic axis if they exceed a factor of 1.6.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`roughvisc.budget`, of one quantity.
+    row : int
+        Number of the row whose sources are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is no budget, or of several quantities.
+    """
+    if not isinstance(dataset, xr.Dataset) or "half_width" not in dataset or "source" not in dataset.dims:
+        raise InputError("expected the Dataset of rv.budget")
+    if "quantity" in dataset.dims:
+        raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
+    axis = axis_of(dataset.variables)
+    several = dataset["value"].size > 1
+    figure = style.new_figure(6.8 if several else 4.4, 2.9)
+    axes = figure.subplots(1, 1 + several, squeeze=False, width_ratios=[1.25, 1.0][: 1 + several])[0]
+    at, names = dataset.isel({axis: row}), dataset["source"].values.tolist()
+    half, towards = at["half_width"].values, at["direction"].values
+    low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        whole = [float(np.log(at[end] / at["value"])) for end in ("lower", "upper")]
+    logs = np.array([*np.c_[low, high], whole])
+    wide = bool(np.nanmax(np.abs(logs), initial=0.0) > 0.5)
+    ends = np.exp(logs) if wide else 100 * np.expm1(logs)
+    ax, places = axes[0], np.arange(len(names) + 1)[::-1]
+    colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
+    ax.barh(places, np.nan_to_num(ends[:, 1] - ends[:, 0]), left=np.nan_to_num(ends[:, 0]), height=0.62, color=colours)
+    for place, state in zip(places, at["state"].values.astype(str), strict=False):
+        if state != "counted":
+            look = {"va": "center", "fontsize": 7.5, "color": "0.35", "textcoords": "offset points"}
+            ax.annotate(state, (1.0 if wide else 0.0, place), (5, 0), **look)
+    ax.axvline(1.0 if wide else 0.0, color="black", lw=0.7)
+    if wide:
+        style.log_axis(ax.xaxis, ends)
+    text = AXES[axis].place(float(dataset[axis].values[row]))
+    ax.set_xlabel(f"Factor of the value at {text} [-]" if wide else f"Error at {text} [%]")
+    ax.set_yticks(places, [*names, "all together"])
+    ax.tick_params(axis="y", length=0)
+    ax.margins(x=0.15)
+    if (towards != 0).any():
+        ax.set_title("orange: one direction only", loc="right", fontsize=8)
+    if several:
+        curve = axes[1]
+        unit, rows = unit_for(dataset["upper"].values, dataset["value"].attrs["units"]), dataset[axis]
+        over = style.row_unit(rows)(rows)
+        band = (unit(dataset["lower"].values), unit(dataset["upper"].values))
+        curve.fill_between(over, *band, color=style.BLUE, alpha=0.25, lw=0)
+        curve.plot(over, unit(dataset["value"].values), "o-", color=style.BLUE)
+        style.row_axis(curve, rows)
+        curve.set_ylabel(unit.label(dataset.attrs["quantity"].replace("_", " ").capitalize()))
+        if wide:
+            curve.set_yscale("log")
+        style.letter_panels(axes)
+    return figure

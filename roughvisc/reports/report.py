@@ -1,0 +1,267 @@
+"""Self-contained HTML page about one or many results, without scripts."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from jinja2 import Environment, PackageLoader
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.labels import warnings_of
+from roughvisc.plot import style
+from roughvisc.plot.rows import expect_result
+from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep
+from roughvisc.plot.sweep import sweep_figures
+from roughvisc.reports.realisations import realisation_rows
+from roughvisc.study.audit.audit import audit
+from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
+from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.index import index_of
+from roughvisc.study.storage.store import no_results, open_result, result_files
+from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
+from roughvisc.study.storage.table import realisations_table
+from roughvisc.topography.parameters import levelled_parameters
+from roughvisc.units import unit_for
+from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of
+
+#: Cases of which figures and the audit are shown, cases of which every figure is drawn, and cases whose studies are
+#: shown; of more, evenly spread ones.
+_PICTURED, _DRAWN, _STATED = 6, 3, 60
+#: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
+_DPI, _WIDE = 110, 5.5
+#: Attributes that state how a result was computed and where its surface came from.
+_SETTINGS = (
+    *("source", "direction", "boundary", "tolerance", "memory", "series_error", "case_key"),
+    *("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points"),
+)
+#: Surface parameters shown.
+_PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
+#: Heading -> variable whose value in the last row, or in that of the largest friction, stands in the table of cases.
+_AT_END = {"Approach": "approach", "Area": "contact_area", "Contact fraction": "contact_fraction"}
+#: Heading -> variable whose largest value stands in the table of cases.
+_LARGEST = {"Force": "force", "Nominal pressure": "nominal_pressure"}
+#: Heading -> relative error whose largest value stands in the table of cases.
+_ERRORS = {"Stated error": "stated_error", "Time steps": "time_error", "Contact solver": "residual"}
+
+
+def report(
+    results: str | Path | xr.Dataset | Sequence[xr.Dataset], out: str | Path | None = None, *, processes: int = 1
+) -> Path:
+    """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
+
+    Parameters
+    ----------
+    results : path, xarray.Dataset, or sequence of them
+        A result file, a folder of them, one case's result, or several.
+    out : path, optional
+        File to write. Default: ``report.html`` in the folder, or beside the file with its name and ``-report.html``.
+    processes : int
+        Number of processes that draw the figures. More than one need a main module that may be imported again.
+
+    Returns
+    -------
+    pathlib.Path
+        The file, which needs no other file. Its table has all cases. Figures are shown of up to 6 cases, evenly spread.
+
+    Raises
+    ------
+    InputError
+        If there is no result, or no `out` for Datasets.
+    """
+    page: dict[str, Any] = {"failures": [], "figures": [], "realisations": ([], [], [])}
+    numbers: dict[str, int] = {}
+    if isinstance(results, str | Path):
+        source = Path(results)
+        sources: list[Any] = result_files(source) if source.is_dir() else [source]
+        if source.is_dir():
+            page["failures"] = _failures(source)
+            if not sources and not page["failures"]:
+                raise no_results(source)
+            cases = read_sweep(source)
+            numbers = number_by_key(cases)
+            sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
+            page["realisations"] = realisation_rows(realisations_table(index_of(source), cases))
+            swept = results_of_sweep(source) if len(sources) > 1 else None
+            if swept is not None:
+                page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
+        out = out or (source / "report.html" if source.is_dir() else source.with_name(f"{source.stem}-report.html"))
+    else:
+        sources = [results] if isinstance(results, xr.Dataset) else list(results)
+        processes = 1
+    if out is None:
+        raise InputError("out is None: expected the name of the page, if Datasets are given")
+    if not sources and not page["failures"]:
+        raise InputError("found no results: expected at least one")
+    pictured, stated = _evenly(len(sources), _PICTURED), _evenly(len(sources), _STATED)
+    drawn = set(FIGURES if len(sources) <= _DRAWN else DEFAULT) - {"surface"}
+    surfaces: dict[str, int] = {}
+    for number in pictured:
+        surfaces.setdefault(_surface_of(sources[number]), number)
+    jobs = [
+        (one, i, (drawn if i in pictured else set()) | ({"surface"} if i in surfaces.values() else set()), i in stated)
+        for i, one in enumerate(sources)
+    ]
+    page["cases"] = in_parallel(_case, jobs, processes, "report")
+    for number, case in enumerate(page["cases"]):
+        case["number"] = numbers.get(case["key"], "") if numbers else number
+    page["title"], page["headings"], page["rows"] = _table(page["cases"])
+    environment = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
+    environment.lstrip_blocks = True
+    written = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    text = environment.get_template("report.html.jinja").render(
+        page, version=metadata.version("roughvisc"), written=written
+    )
+    with atomic_write(Path(out)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return Path(out)
+
+
+def _evenly(count: int, most: int) -> set[int]:
+    """Numbers of at most so many cases, evenly spread."""
+    return set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist())
+
+
+def _failures(folder: Path) -> list[dict[str, str]]:
+    """Cases that failed, from their records."""
+    found = []
+    for path in sorted(folder.glob("*.failed.json")):
+        one = {"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"}
+        try:
+            record = json.loads(path.read_text())
+            case = record.get("case", {})
+            title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
+            one |= {"title": title, "message": record["message"]}
+        except (OSError, ValueError, KeyError, AttributeError):
+            pass
+        found.append(one)
+    return found
+
+
+@matplotlib.rc_context(style.STYLE)
+def _picture(caption: str, figure: Figure) -> dict[str, Any]:
+    """A figure as a PNG in an address, with its caption."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=_DPI)
+    src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    return {"caption": caption, "src": src, "wide": figure.get_figwidth() > _WIDE}
+
+
+def _surface_of(source: Path | xr.Dataset) -> str:
+    """Text that two results of the same surface have in common."""
+    if isinstance(source, Path):
+        with open_result(source) as dataset:
+            return _surface_of(dataset)
+    case = json.loads(source.attrs.get("case", "{}"))
+    return json.dumps(case.get("surface", {})) + str(source.attrs.get("surface_sha256", ""))
+
+
+def _case(job: tuple[Path | xr.Dataset, int, set[str], bool]) -> dict[str, Any]:
+    """One case of the page: its row in the table, its figures, assumptions, surface and study."""
+    source, number, names, is_stated = job
+    if isinstance(source, Path):
+        with open_result(source) as dataset:
+            return _case((dataset, number, names, is_stated))
+    expect_result(source, "x", "y")
+    case = json.loads(source.attrs.get("case", "{}"))
+    title = str(case.get("title") or source.attrs.get("title") or f"case {number}")
+    history = str(source.attrs.get("history", "")).splitlines()
+    found: dict[str, Any] = {
+        "title": title,
+        "name": case_words(case) or title,
+        "key": str(source.attrs.get("case_key", "")),
+        "varied": varied_texts(case),
+        "cells": _cells(source),
+    }
+    if is_stated:
+        attributes = {**(source["height"].attrs if "height" in source else {}), **source.attrs}
+        found["stated"] = {
+            "settings": [[name.replace("_", " "), str(attributes[name])] for name in _SETTINGS if name in attributes],
+            "warnings": list(warnings_of(source.attrs).values()),
+            "history": history,
+            "text": study_text(case) if case else "",
+        }
+    for name, caption, figure in figures_of(source, names):
+        picture = _picture(caption, figure)
+        if name != "surface":
+            found.setdefault("figures", []).append(picture)
+            continue
+        parameters = levelled_parameters(source["height"].load())
+        found["surface"] = {
+            "name": str(source["height"].attrs.get("source_file") or title),
+            "picture": picture,
+            "steps": [line for line in history if line and ": run of " not in line],
+            "parameters": [
+                (name.replace("_", " "), parameters[name].attrs["long_name"], _text(parameters[name]))
+                for name in _PARAMETERS
+            ],
+        }
+    if "figures" in found:
+        try:
+            found["audit"] = list(audit(source))
+        except InputError:  # a Dataset that lacks what an audit starts from
+            found["audit"] = []
+    return found
+
+
+def _text(value: xr.DataArray) -> str:
+    """A number with a suitable unit; fractions in percent."""
+    if str(value.name).endswith("fraction"):
+        return f"{100 * float(value):.3g} %"
+    unit = str(value.attrs.get("units", getattr(VARIABLES.get(str(value.name)), "units", "")))
+    return unit_for([float(value)], unit).text(float(value))
+
+
+def _cells(dataset: xr.Dataset) -> dict[str, str]:
+    """Heading -> cell of one case in the table of cases."""
+    axis = AXES[axis_of(dataset)]
+    last = dataset.isel({axis.name: axis.telling_row(dataset)})
+    cells = {
+        "Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
+        axis.rows.capitalize(): str(dataset[axis.name].size),
+    }
+    if axis.telling in dataset:
+        at = axis.place(float(last[axis.name]), 3).partition(" = ")[2]
+        cells[f"Largest {VARIABLES[axis.telling].label.lower()}"] = f"{_text(last[axis.telling])} at {at}"
+    cells |= {heading: _text(dataset[name].max().rename(name)) for heading, name in _LARGEST.items() if name in dataset}
+    cells |= {heading: _text(last[name]) for heading, name in _AT_END.items() if name in last}
+    for heading, name in _ERRORS.items():
+        if name in dataset and np.isfinite(dataset[name]).any():
+            cells[heading] = f"{float(dataset[name].max()):.2g}"
+    tolerance = dataset.attrs.get("tolerance")
+    if tolerance is not None and float(cells.get("Stated error", 0)) > tolerance:
+        cells["Stated error"] += f", above the tolerance of {tolerance:g}"
+    if "status" in dataset:
+        bad = int((dataset["status"].values == NOT_CONVERGED).sum())
+        cells["Status"] = f"{bad} of {dataset['status'].size} {axis.rows} not converged" if bad else "converged"
+    if "convolutions" in dataset:
+        cells["Convolutions"] = str(int(dataset["convolutions"].sum()))
+    if "wall_time" in dataset:
+        cells["Wall time"] = _text(dataset["wall_time"].max().rename("wall_time"))
+    return cells
+
+
+def _table(cases: list[dict[str, Any]]) -> tuple[str, list[str], list[list[Any]]]:
+    """Title of the page, headings of the table of cases, and its rows."""
+    titles = dict.fromkeys(case["title"] for case in cases)
+    keys = names_of(list(dict.fromkeys(key for case in cases for key in case["varied"])))
+    headings = list(dict.fromkeys(heading for case in cases for heading in case["cells"]))
+    has_titles = not keys and len(titles) > 1
+    rows = [
+        [case["number"], *([case["title"]] if has_titles else [])]
+        + [case["varied"].get(key, "") for key in keys]
+        + [case["cells"].get(heading, "") for heading in headings]
+        for case in cases
+    ]
+    title = f"{len(cases)} results" if len(titles) > 1 else next(iter(titles), "No result")
+    return title, ["Case", *(["Title"] if has_titles else []), *keys.values(), *headings], rows

@@ -1,0 +1,144 @@
+"""A case as text: the study file that states it, and its name in titles and files."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+from roughvisc.study.si_tables import unit_of
+from roughvisc.units import unit_for
+
+#: Longest name of a file without its beginning and end, and number of letters of a key that tells cases apart.
+_LONGEST, _KEY = 80, 8
+
+
+def study_text(case: Mapping[str, Any]) -> str:
+    """Study file (TOML, SI units) that states a case.
+
+    Parameters
+    ----------
+    case : mapping
+        The case, as the attribute ``case`` of a result has it in JSON.
+
+    Examples
+    --------
+    >>> print(study_text({"title": "Ball", "material": {"model": "elastic", "shear_modulus": 1e6}}))
+    title = "Ball"
+    <BLANKLINE>
+    [material]
+    model = "elastic"
+    shear_modulus = 1000000.0
+    <BLANKLINE>
+    """
+    text, tables = "", ""
+    for name, value in case.items():
+        if name in ("origin", "varied", "written"):
+            continue
+        several = isinstance(value, list) and any(isinstance(one, dict) for one in value)
+        if not (several or isinstance(value, dict)):
+            text += f"{name} = {_toml(value)}\n"
+            continue
+        for entry in value if several else [value]:
+            lines = [f"{key} = {_toml(inner)}" for key, inner in entry.items() if inner is not False]  # steps left out
+            tables += "\n".join(["", f"[[{name}]]" if several else f"[{name}]", *lines, ""])
+    return text + tables
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return str(value).lower()  # true and false, inf and nan
+
+
+def names_of(keys: Sequence[str]) -> dict[str, str]:
+    """Names of dotted keys: the last word, and what stands before it if two would have the same name.
+
+    Examples
+    --------
+    >>> names_of(["program.0.load", "material.kelvin_viscosity"])["material.kelvin_viscosity"]
+    'Kelvin viscosity'
+    >>> names_of(["program.0.load", "program.2.load"])["program.2.load"]
+    'Load (program.2)'
+    """
+    last = {key: _last_word(key) for key in keys}
+    counts = Counter(last.values())
+    names = {key: f"{name} ({key.rpartition('.')[0]})" if counts[name] > 1 else name for key, name in last.items()}
+    return {key: (name[:1].upper() + name[1:]).replace("_", " ") for key, name in names.items()}
+
+
+def _last_word(key: str) -> str:
+    """Last part of a dotted key; a number with what it counts."""
+    parts = key.split(".")
+    return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
+
+
+def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
+    """Dotted key -> varied value of a case in JSON, as the study writes it, or in a suitable unit."""
+    texts = {}
+    for key, value in case.get("varied", {}).items():
+        if written := case.get("written", {}).get(key):
+            texts[key] = written
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            texts[key] = value if isinstance(value, str) else json.dumps(value)
+            texts[key] = PurePath(texts[key]).name if key.rpartition(".")[2] == "file" else texts[key]
+        else:  # only the thickness may be infinite
+            texts[key] = "half-space" if value == math.inf else unit_for([value], unit_of(key)).text(value, 4)
+    return texts
+
+
+def case_words(case: Mapping[str, Any]) -> str:
+    """What was varied in a case in JSON, in words; empty if nothing.
+
+    Examples
+    --------
+    >>> case_words({"varied": {"program.0.load": 2.0, "program.1.hold": 5.0}, "written": {"program.0.load": "2000 mN"}})
+    'Load 2000 mN, hold 5 s'
+    """
+    texts = varied_texts(case)
+    words = ", ".join(f"{name[:1].lower()}{name[1:]} {texts[key]}" for key, name in names_of(list(texts)).items())
+    return words[:1].upper() + words[1:]
+
+
+def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Names for the files of some cases: what was varied, in letters that every system takes; else their keys.
+
+    A name depends on its case alone; if two are equal apart from capitals, both carry their keys.
+
+    Parameters
+    ----------
+    cases : mapping
+        Key -> case in JSON.
+
+    Examples
+    --------
+    >>> file_stems({"0123456789abcdef": {"varied": {"program.0.load": 2.0, "program.1.hold": 5.0}}})
+    {'0123456789abcdef': 'load_2N-hold_5s'}
+    """
+    stems = {}
+    for key, case in cases.items():
+        texts = varied_texts(case)
+        counts = Counter(map(_last_word, texts))
+        parts = []
+        for dotted, text in texts.items():
+            name = _last_word(dotted) if counts[_last_word(dotted)] == 1 else dotted
+            value = PurePath(text).stem if dotted.rpartition(".")[2] == "file" else text
+            parts.append(f"{_safe(name)}_{_safe(value)}")
+        stem = "-".join(parts)
+        stems[key] = (stem if len(stem) <= _LONGEST else f"{stem[: _LONGEST - _KEY - 1]}-{key[:_KEY]}") or key
+    counts = Counter(stem.casefold() for stem in stems.values())
+    return {key: stem if counts[stem.casefold()] == 1 else f"{stem}-{key[:_KEY]}" for key, stem in stems.items()}
+
+
+def _safe(text: str) -> str:
+    """Letters, digits, points and dashes alone; a number stands next to its unit."""
+    text = text.replace("µ", "u").replace("μ", "u").replace("%", "percent").replace("/", "_per_", 1) if text else ""
+    return re.sub(r"_?[^A-Za-z0-9.+-]+", "_", re.sub(r"(?<=\d) (?=[^\W\d])", "", text)).strip("_.") or "none"
