@@ -206,18 +206,17 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
         return np.where(np.isclose(values, no_data, rtol=1e-6, atol=0.0), np.nan, values)
     if values.size < _FEWEST:
         return values
-    for extreme in (np.fmin, np.fmax):
-        number = extreme.reduce(values, axis=None)
-        if not abs(number) >= _NO_DATA:
-            continue
-        marked = values == number
-        count, rest = int(marked.sum()), values[np.isfinite(values) & ~marked]
-        spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-        if count >= _REPEATED and spread > 0 and np.abs(rest - number).min() > _FAR * spread:
-            values = np.where(marked, np.nan, values)
+    extremes = {float(np.fmin.reduce(values, axis=None)), float(np.fmax.reduce(values, axis=None))}
+    repeated = {one: int((values == one).sum()) for one in extremes if abs(one) >= _NO_DATA}
+    repeated = {one: count for one, count in sorted(repeated.items()) if count >= _REPEATED}
+    rest = values[np.isfinite(values) & ~np.isin(values, list(repeated))] if repeated else values[:0]
+    spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
+    for one, count in repeated.items():
+        if spread > 0 and np.abs(rest - one).min() > _FAR * spread:
+            values = np.where(values == one, np.nan, values)
             complaints.append(
-                f"{count} points have the height {number:g} and all others lie within {rest.min():g} to "
-                f"{rest.max():g}: taken as missing; no_data = {number:g} states so, and any other number keeps them"
+                f"{count} points have the height {one:g} and all others lie within {rest.min():g} to {rest.max():g}: "
+                f"taken as missing; no_data = {one:g} states so, and any other number keeps them"
             )
     return values
 

@@ -1,5 +1,6 @@
 """``rv.friction``: labels, directions, bodies, and what is refused."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -215,3 +216,18 @@ def test_unsolved_speed__is_missing_and_the_others_stand(curve, monkeypatch):
     assert "speeds: " in found.attrs["warnings"]
     assert rv.audit(found) is not None
     assert rv.plot.friction(found) is not None
+
+
+@pytest.mark.parametrize("exponent", [0.2, 0.5, 0.8])
+def test_power_law__in_full_contact_has_the_closed_loss_modulus(exponent):
+    """A wave ``a cos(qx)`` in full contact has ``mu = q^2 a^2 Im E*(q V) / (4 sigma)``."""
+    glassy, coefficient, amplitude, length, pressure = 1e-7, 1e-6, 1e-6, 1e-3, 1e6
+    wave = rv.wavy(amplitude, length, (length, length / 8), (32, 4), waves=1)
+    material = rv.power_law(glassy, coefficient, exponent, time_scale=0.1, poisson=0.4)
+    speeds, q = np.array([1e-4, 1e-1, 10.0]), 2 * np.pi / length
+    curve = rv.friction(wave, material, pressure=pressure, speeds=speeds, progress=False)
+    assert (curve.contact_fraction == 1).all()
+    creep = glassy + coefficient * math.gamma(1 + exponent) * (1j * q * speeds * 0.1) ** -exponent
+    modulus = 2 / (0.6 * creep)
+    exact = (q * amplitude) ** 2 * modulus.imag / (4 * pressure)
+    assert curve.friction_coefficient.values == pytest.approx(exact, rel=1e-3, abs=0)

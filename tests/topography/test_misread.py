@@ -203,6 +203,16 @@ def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
         np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
 
 
+def test_no_data__of_two_kinds_is_missing(tmp_path):
+    z = ROUGH.copy()
+    z[3:5, 4:9], z[10, :6] = -9999, 9999
+    np.save(tmp_path / "m.npy", z)
+    with pytest.warns(UserWarning, match="have the height") as said:
+        h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
+    assert len(said) == 2
+    np.testing.assert_allclose(h, 1e-6 * np.where(np.abs(z) > 9, np.nan, z).T, rtol=1e-12)
+
+
 def test_no_data__is_said_by_the_command_in_one_line(tmp_path, monkeypatch):
     z = ROUGH.copy()
     z[3:5, 4:9] = -9999

@@ -7,7 +7,7 @@ import math
 from roughvisc.mechanics.sheet import BASE, Sheet
 from roughvisc.study.audit.evidence import Evidence
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.audit.limits import LIMITS, Finding, as_text, percent, unknown
+from roughvisc.study.audit.limits import Finding, as_text, percent, unknown
 from roughvisc.study.audit.validity import (
     dundurs_coupling,
     flash_temperature,
@@ -25,8 +25,6 @@ _WITHOUT_LOAD = (
 #: Exponent of the force over the approach up to which a contact is taken for a flat one, whose force is proportional to
 #: the approach; it is 3/2 of a sphere and 2 of a cone.
 _FLAT = 1.25
-#: Density of osmium, the densest solid. [kg/m3]
-_DENSEST = 22_600.0
 
 
 def yielding(evidence: Evidence, given: AuditInputs) -> Finding:
@@ -43,8 +41,13 @@ def yielding(evidence: Evidence, given: AuditInputs) -> Finding:
 
 def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
     """By how much approach or force are off on a half-space, in place of the sheet that there is."""
-    if evidence.sheet is not None:
-        return _modelled(evidence.sheet, given)
+    modelled = evidence.sheet
+    if modelled is not None:
+        shown = as_text(modelled.thickness, "m", 3)
+        if given.thickness is None or math.isclose(given.thickness, modelled.thickness, rel_tol=1e-9):
+            return Finding("thickness", 0.0, f"Modelled: a sheet of {shown}, {modelled.base}.")
+        other = f"{shown}, and {as_text(given.thickness, 'm', 3)} is stated"
+        return unknown("thickness", f"The result is for a sheet of {other}: run the study with that thickness.")
     if evidence.kernel:
         return Finding("thickness", 0.0, f"Modelled: {evidence.kernel}.")
     if len(evidence.bodies) != 1:
@@ -54,10 +57,20 @@ def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
         return unknown("thickness", "Poisson's ratio is negative: there is no sheet to compare with.")
     if given.thickness is None:
         return unknown("thickness", "Give thickness.")
-    sheet = Sheet(given.thickness, poisson, given.base or BASE)
-    excess, shortfall = _excess(evidence, sheet), _shortfall(evidence, sheet)
-    if math.isnan(excess):
+    force, approach, late, contact = evidence.force, evidence.approach, evidence.late, evidence.contact
+    is_free = evidence.boundary == "free"
+    if not (force > 0 and approach > 0) or math.isnan(late) or (contact is None and not is_free):
         return unknown("thickness", _WITHOUT_LOAD)
+    sheet, shortfall = Sheet(given.thickness, poisson, given.base or BASE), 0.0
+    if is_free:
+        excess = half_space_excess(sheet, late, force, approach)
+        # the stiffness of a round contact is that of a flat punch of its radius, 2 a / C
+        if late > 0 and 2 * evidence.half_width * approach / (late * force) > _FLAT:
+            shortfall = half_space_shortfall(sheet, late, force, approach)
+    else:
+        assert contact is not None
+        first = late * contact.relief(sheet) / approach
+        excess = first / (1 + first)
     sentence = f"On a {sheet.base} sheet of {as_text(sheet.thickness, 'm', 3)} the approach would be {percent(excess)}"
     sentence += " smaller at the same load"
     if shortfall > excess:
@@ -65,79 +78,31 @@ def thickness(evidence: Evidence, given: AuditInputs) -> Finding:
     return Finding("thickness", max(excess, shortfall), f"{sentence}.")
 
 
-def _modelled(sheet: Sheet, given: AuditInputs) -> Finding:
-    if given.thickness is not None and not math.isclose(given.thickness, sheet.thickness, rel_tol=1e-9):
-        other = f"{as_text(sheet.thickness, 'm', 3)}, and {as_text(given.thickness, 'm', 3)} is stated"
-        return unknown("thickness", f"The result is for a sheet of {other}: run the study with that thickness.")
-    return Finding("thickness", 0.0, f"Modelled: a sheet of {as_text(sheet.thickness, 'm', 3)}, {sheet.base}.")
-
-
-def _excess(evidence: Evidence, sheet: Sheet) -> float:
-    """Of the approach; NaN where load, approach, modulus, or with periodic boundaries the pressure, are not known."""
-    force, approach, late = evidence.force, evidence.approach, evidence.late
-    if not (force > 0 and approach > 0) or math.isnan(late):
-        return math.nan
-    if evidence.boundary == "free":
-        return half_space_excess(sheet, late, force, approach)
-    if evidence.contact is None:
-        return math.nan
-    first = late * evidence.contact.relief(sheet) / approach
-    return first / (1 + first)
-
-
-def _shortfall(evidence: Evidence, sheet: Sheet) -> float:
-    """Of the force; 0 where the force is proportional to the approach, and with periodic boundaries."""
-    force, approach, late = evidence.force, evidence.approach, evidence.late
-    if evidence.boundary != "free" or not (force > 0 and approach > 0 and late > 0):
-        return 0.0
-    # the stiffness of a round contact is that of a flat punch of its radius, 2 a / C
-    if not 2 * evidence.half_width * approach / (late * force) > _FLAT:
-        return 0.0
-    return half_space_shortfall(sheet, late, force, approach)
-
-
 def inertia(evidence: Evidence, given: AuditInputs) -> Finding:
     """What waves change: by their lag over the time scale of the program, and by the speed of slides against theirs."""
-    width, scale = evidence.half_width, evidence.time_scale
+    width, scale, speed, density = evidence.half_width, evidence.time_scale, evidence.speed, given.density
     if math.isnan(evidence.late) or math.isnan(scale):
         return unknown("inertia", "The result does not state its material and program.")
     if not width > 0 or not evidence.late > 0:
         return unknown("inertia", "The width of the contact is not known, or there is no creep.")
-    if math.isnan(evidence.speed):
+    if math.isnan(speed):
         return unknown("inertia", "The speed of the slides is not known: audit the result with all of its steps.")
+    if density is None:
+        return unknown("inertia", "Give density.")
     bodies = [(one.late, one.poisson) for one in evidence.bodies] or [(evidence.late, _SOFTEST)]
     solids = [((1 - poisson) / (2 * late), poisson) for late, poisson in bodies if late > 0]
     shear = min(modulus for modulus, _ in solids)
-
-    def lag_and_excess(density: float) -> tuple[float, float]:
-        lag = radiation_lag(width, shear, density) / scale
-        if not evidence.speed:
-            return lag, 0.0
-        return lag, max(moving_load_excess(evidence.speed, modulus, density, poisson) for modulus, poisson in solids)
-
-    any_solid, density = "", given.density
-    if density is None:
-        if max(lag_and_excess(_DENSEST)) >= LIMITS["inertia"].doubtful:
-            return unknown("inertia", "Give density.")
-        density, any_solid = _DENSEST, f" in any solid (up to {_DENSEST:g} kg/m^3)"
-    lag, excess = lag_and_excess(density)
-    number = max(lag, excess)
-    if excess > lag:
-        waves = f"Shear waves{any_solid} travel at {as_text(math.sqrt(shear / density), 'm/s')}"
+    lag = radiation_lag(width, shear, density)
+    excess = max(moving_load_excess(speed, modulus, density, poisson) for modulus, poisson in solids) if speed else 0.0
+    if excess > lag / scale:
         more = "faster than waves along the surface"
         if math.isfinite(excess):
             more = f"which increases the displacement by {percent(excess)}"
-        return Finding(
-            "inertia",
-            number,
-            f"{waves}, and the profile slides at {as_text(evidence.speed, 'm/s')}, {more}.",
-        )
+        waves = f"Shear waves travel at {as_text(math.sqrt(shear / density), 'm/s')}"
+        return Finding("inertia", excess, f"{waves}, and the profile slides at {as_text(speed, 'm/s')}, {more}.")
     takes = f"the program changes within {as_text(scale, 's')}" if math.isfinite(scale) else "nothing changes"
-    return Finding(
-        "inertia",
-        number,
-        f"Waves{any_solid} lag by {as_text(lag * scale, 's')} over {as_text(2 * width, 'm')}; {takes}.",
-    )
+    waves = f"Waves lag by {as_text(lag, 's')} over {as_text(2 * width, 'm')}"
+    return Finding("inertia", lag / scale, f"{waves}; {takes}.")
 
 
 def heating(evidence: Evidence, given: AuditInputs) -> Finding | None:

@@ -12,9 +12,7 @@ import logging
 import math
 import os
 import shutil
-import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +37,10 @@ log = logging.getLogger("roughvisc")
 _NEEDED_ATTRIBUTES = {"Conventions": "CF-1.11", "result_format": RESULT_FORMAT}
 #: Free space below which a write that failed is put down to a full disk. [bytes]
 _NEARLY_FULL = 1 << 20
-#: A field is compressed if it then takes less than this part: exact, and rounded to a precision. At 512 squared a step
-#: takes 90 to 160 ms, and its frame 1.2 ms as it is. Compressed, a pressure on 2, 9 and 18 % of the cells comes down
-#: to 0.03, 0.10 and 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer); a gap
-#: rounded to 1e-4 to 0.23 in 15 ms; an exact gap to 0.66 in 34 ms, which would slow a run by more than a tenth.
-_WORTHWHILE, _WORTHWHILE_ROUNDED = 0.25, 0.5
-_SMALL = 1 << 16  # compressed in any case [bytes]
+#: Fields whose numbers all differ: exact, they are not compressed. At 512 squared an exact gap comes down to 0.66 in
+#: 34 ms a frame; a gap rounded to 1e-4 to 0.23 in 15 ms; a pressure on 2, 9 and 18 % of the cells to 0.03, 0.10 and
+#: 0.19 in 3.6, 6.2 and 9.7 ms (shuffling its bytes first makes it larger and takes longer).
+_DENSE = ("gap", "height")
 _TINY = 1 << 12  # not compressed [bytes]
 #: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
 #: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
@@ -173,31 +169,17 @@ def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
     """Return the arguments of netCDF4 for a variable; coordinates have no fill value."""
     encoding: dict[str, Any] = {"fill_value": False}
-    if variable.ndim:
-        encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
     if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
         encoding["fill_value"] = variable.dtype.type(np.nan)
+    if not variable.ndim:
+        return encoding
+    encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
     bits = bits_kept(variable, precision)
     if bits is not None:
         encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
-    if variable.nbytes > _TINY:
-        encoding |= _filters(variable, bits)
+    if variable.nbytes > _TINY and (bits is not None or name not in _DENSE):
+        encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
     return encoding
-
-
-def _filters(variable: xr.Variable, bits: int | None) -> dict[str, Any]:
-    """The filters that suit a variable, tried on some rows of the middle frame; none where they save too little."""
-    middle = variable[tuple(n // 2 for n in variable.shape[:-2])]
-    sample = np.ascontiguousarray(middle[:: max(1, middle.shape[0] // 16)].values)
-    if bits is not None:
-        sample = (sample.view(np.int64) & -(1 << (52 - bits))).view(float)  # cut off compresses as rounded
-    shuffled = sample.view(np.uint8).reshape(-1, sample.itemsize).T
-    size, shuffle = min(
-        (len(zlib.compress(text.tobytes(), 1)), shuffle) for shuffle, text in enumerate((sample, shuffled))
-    )
-    if variable.nbytes > _SMALL and size > sample.nbytes * (_WORTHWHILE if bits is None else _WORTHWHILE_ROUNDED):
-        return {}
-    return {"zlib": True, "complevel": 1, "shuffle": bool(shuffle)}
 
 
 def result_path(folder: Path, name: str) -> Path:
@@ -270,25 +252,27 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 
     Notes
     -----
-    zlib level 1, the one filter that every reader has, where it saves much, by a sample.
-    netCDF4 is used as it is: on a Dask worker xarray
-    would ask the scheduler for a lock at every variable, though nobody else knows the temporary file.
+    zlib level 1 is the one filter that every reader has. netCDF4 is called directly: on a Dask worker xarray would ask
+    the scheduler for a lock at every variable, though no other process knows the temporary file.
     """
     steps = steps_of(dataset)
     parts = {"": _with_bounds(label(dataset).assign_attrs(_NEEDED_ATTRIBUTES))}
     parts |= {} if steps is None else {STEPS: steps}
-    parts = {group: _in_characters(_with_labels_named(part)) for group, part in parts.items()}
     with atomic_write(path) as temporary:
         try:
-            with _new_file(temporary) as file:
-                # all are declared before any is written: each change of mode would write the file's metadata anew
-                declared = [_declare_part(file, group, part, precision) for group, part in parts.items()]
-                for written, variable in [pair for pairs in declared for pair in pairs]:
+            with NETCDF:
+                file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+            try:
+                # all are declared before any is written: each change of mode would write the file's metadata again
+                declared = []
+                for group, part in parts.items():
+                    declared += _declare(file, group, _in_characters(_with_labels_named(part)), precision)
+                for written, variable in declared:
                     _write(written, variable)
-        except (
-            RuntimeError,
-            PermissionError,
-        ) as error:  # "NetCDF: HDF error", "Permission denied": whatever the reason
+            finally:
+                with NETCDF:
+                    file.close()
+        except (RuntimeError, PermissionError) as error:  # the library's error of any failed write
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             if not full and isinstance(error, PermissionError):
                 raise
@@ -297,17 +281,30 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     return Path(path)
 
 
-def _declare_part(
+def _declare(
     file: netCDF4.Dataset, group: str, part: xr.Dataset, precision: float | None
 ) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of the root or of a group; return them with the values to write."""
+    declared = []
     with NETCDF:
         place = file.createGroup(group) if group else file
         place.setncatts(plain_attributes(part.attrs))
         for dimension, size in part.sizes.items():
             if dimension not in file.dimensions:  # the root's are the groups' too
                 place.createDimension(str(dimension), size)
-    return [(_declare(place, str(name), variable, precision), variable) for name, variable in part.variables.items()]
+        for name, variable in part.variables.items():
+            encoding = encoding_of(str(name), variable, precision)
+            stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
+            stored.set_auto_maskandscale(False)
+            if "chunksizes" in encoding:  # a chunk is written at once: the library would hold 64 MB of each variable
+                stored.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
+            attributes = plain_attributes(variable.attrs)
+            if (bits := bits_kept(variable, precision)) is not None:
+                attributes["relative_precision"] = precision
+                attributes["quantization"] = f"rounded to nearest in binary, {bits} bits of the fraction kept"
+            stored.setncatts(attributes)
+            declared.append((stored, variable))
+    return declared
 
 
 def _with_labels_named(dataset: xr.Dataset) -> xr.Dataset:
@@ -351,32 +348,6 @@ def _in_characters(dataset: xr.Dataset) -> xr.Dataset:
                 {name: ((*one.dims, f"string{texts.itemsize}"), characters, attributes)}
             )
     return dataset
-
-
-@contextmanager
-def _new_file(path: Path) -> Iterator[netCDF4.Dataset]:
-    with NETCDF:
-        file = netCDF4.Dataset(path, "w", format="NETCDF4")
-    try:
-        yield file
-    finally:
-        with NETCDF:
-            file.close()
-
-
-def _declare(file: netCDF4.Dataset, name: str, variable: xr.Variable, precision: float | None) -> netCDF4.Variable:
-    """Make room for a variable, with its attributes."""
-    encoding = encoding_of(name, variable, precision)  # outside the lock, which reading a sample may need
-    with NETCDF:
-        declared = file.createVariable(name, variable.dtype, variable.dims, **encoding)
-        declared.set_auto_maskandscale(False)
-        if "chunksizes" in encoding:  # all of a chunk comes at once: the library would hold 64 MB of each variable
-            declared.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
-        declared.setncatts(plain_attributes(variable.attrs))
-        if (bits := bits_kept(variable, precision)) is not None:
-            declared.relative_precision = precision
-            declared.quantization = f"rounded to nearest in binary, {bits} bits of the fraction kept"
-    return declared
 
 
 def _write(written: netCDF4.Variable, variable: xr.Variable) -> None:
@@ -433,16 +404,15 @@ def require_hdf5(path: Path) -> None:
     if found:
         expected = "a result with all of its data in the file"
         raise InputError(
-            f"{path}: holds {found}: expected {expected}",
-            key=str(path),
-            found=found,
-            expected=expected,
-            transient=True,
+            f"{path}: holds {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
         )
 
 
 def _outside(group: Any, seen: set[int]) -> str:
-    """Return what a group of an HDF5 file holds that is stored elsewhere; empty if nothing."""
+    """Return what a group of an HDF5 file holds that is stored elsewhere; empty if nothing.
+
+    HDF5's own visit of all links ends in a SystemError of h5py if a group is damaged.
+    """
     import h5py
 
     for name in group:
@@ -492,7 +462,7 @@ def open_result(path: str | Path) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except (OSError, ValueError, RuntimeError, LookupError) as error:
         raise _unreadable(path, error) from error
-    if found := _later_format(dataset.attrs) or _foreign(dataset):
+    if found := _foreign(dataset):
         dataset.close()
         expected = f"a result of roughvisc of format {RESULT_FORMAT}"
         raise InputError(
@@ -501,14 +471,10 @@ def open_result(path: str | Path) -> xr.Dataset:
     return dataset
 
 
-def _later_format(attributes: Mapping[Any, Any]) -> str:
-    """Return the format of a file if this version does not read it; empty if it does."""
-    found = attributes.get("result_format", RESULT_FORMAT)
-    return "" if found == RESULT_FORMAT else f"is of format {found}"
-
-
 def _foreign(dataset: xr.Dataset) -> str:
-    """What shows that a file is no result, whoever wrote it; empty if nothing."""
+    """What shows that a file is no result of this format, whoever wrote it; empty if nothing."""
+    if (stated := dataset.attrs.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
+        return f"is of format {stated}"
     rows = axis_of(dataset)
     if absent := [name for name in AXES[rows].needed if name not in dataset.variables]:
         return f"holds no {', '.join(absent)}"

@@ -198,7 +198,6 @@ def test_inertia__is_by_waves_over_the_program(ball):
     a = cf.hertz(RADIUS, MODULUS, LOAD).radius
     found = rv.audit(ball, density="1000 kg/m^3")["inertia"]
     assert found.number == pytest.approx(0.85 * a * math.sqrt(1000 / 1e6) / 1.0, rel=0.1)  # by cells
-    assert rv.audit(ball)["inertia"].verdict == "holds", "no solid is dense enough"
     fast = rv.simulate(rv.sphere(RADIUS, 8e-4, 24), RUBBER, rv.Program().load(LOAD, over=2e-6), **QUICK)
     assert rv.audit(fast)["inertia"].verdict == "not known"
     assert rv.audit(fast, density=1000)["inertia"].verdict == "broken"

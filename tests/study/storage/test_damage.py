@@ -108,6 +108,15 @@ def test_damage__of_random_bits_and_lengths_changes_no_value(sample, tmp_path):
             rv.open_result(path)
 
 
+@pytest.mark.parametrize("page", range(3))
+def test_damage__of_a_page_is_noticed_whatever_it_holds(sample, tmp_path, page):
+    """Groups, attributes and headers too, each of which HDF5 reports in its own way."""
+    path, content = tmp_path / "result.nc", sample[1].read_bytes()
+    for first in range(4096 * page, len(content), 3 * 4096):
+        path.write_bytes(content[:first] + bytes(4096) + content[first + 4096 :])
+        assert is_noticed(path), first
+
+
 def test_opening__reads_no_field(copied):
     """A damaged field is noticed when it is read, by any program."""
     _, _, path = copied
