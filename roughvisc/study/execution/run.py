@@ -39,11 +39,6 @@ Progress = Callable[[float, float], None]
 _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale")
 
 
-def study_folder(study: Path, out: str | Path | None = None) -> Path:
-    """Folder that the results of a study file go to."""
-    return Path(out).expanduser() if out is not None else study.parent / "results" / study.stem
-
-
 def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool = True) -> Path:
     """Folder that the results of a study go to.
 
@@ -64,7 +59,7 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
     if out is not None:
         folder = Path(out).expanduser()
     elif case.origin is not None:
-        folder = study_folder(case.origin)
+        folder = case.origin.parent / "results" / case.origin.stem
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     if not (there := existing_part(folder)).is_dir():
@@ -193,10 +188,22 @@ def run_case(
             )
             with closing(keeper):
                 if not is_result_of(case, path):
-                    if told := _set_aside_if_damaged(path):
-                        log.warning("%s", told)
+                    try:
+                        open_result(path).close()
+                    except DamagedError as error:
+                        log.warning("%s", set_aside(path, error))
+                    except InputError:  # there is none
+                        pass
                     keeper.resume()
-                    _finish(case, folder, progress, keeper, threads)
+                    try:
+                        keep(compute(case, progress=progress, keeper=keeper, threads=threads), case, folder)
+                    except RoughviscError as error:
+                        if not error.transient:  # it would fail again in the same way
+                            keeper.remove()
+                        raise
+                    except KeyboardInterrupt:
+                        keeper.save()
+                        raise
                 keeper.remove()
     except BlockingIOError:
         if is_result_of(case, path):  # the other run has just finished
@@ -212,30 +219,6 @@ def run_case(
             with suppress(OSError):
                 place.rmdir()
     return path
-
-
-def _set_aside_if_damaged(path: Path) -> str:
-    try:
-        open_result(path).close()
-    except DamagedError as error:
-        return set_aside(path, error)
-    except InputError:  # there is none
-        pass
-    return ""
-
-
-def _finish(case: Case, folder: Path, progress: bool | Progress, keeper: CheckpointWriter, threads: int | None) -> None:
-    """Compute what is missing of a case and write its file."""
-    try:
-        dataset = compute(case, progress=progress, keeper=keeper, threads=threads)
-        keep(dataset, case, folder)
-    except RoughviscError as error:
-        if not error.transient:  # it would fail again in the same way
-            keeper.remove()
-        raise
-    except KeyboardInterrupt:
-        keeper.save()
-        raise
 
 
 def run_stated(
