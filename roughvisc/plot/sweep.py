@@ -316,7 +316,9 @@ def _draw_lines(
 ) -> None:
     """Lines of one panel: one for each value of the second key, and of keys that have no panels."""
     grouping = ([second.column] if second else []) + others
-    for found, line in panel.groupby(grouping) if grouping else [((None,), panel)]:
+    for found, line in (
+        panel.groupby(grouping, sort=second is None or second.is_numeric) if grouping else [((None,), panel)]
+    ):
         look: dict[str, Any] = {"color": _colour(second, found[0])}
         numbers = line[REALISATION] if REALISATION in line else pd.Series(np.nan, line.index)
         if across is None:
