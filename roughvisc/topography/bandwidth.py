@@ -39,7 +39,8 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     InputError
         If the order is none of these, or the points present do not determine the polynomial.
     """
-    one_of("order", order, (0, 1, 2, 3))
+    if not isinstance(order, int | np.integer) or not 0 <= order <= 3:
+        raise InputError(key="order", found=order, expected="0, 1, 2 or 3")
     h = checked(h, "level")
     require_heights(h, "level")
     kept = {} if order == 0 else {"period": None}  # a polynomial does not repeat
