@@ -122,8 +122,9 @@ _NEARLY_FULL = 0.9
 _PASSES, _MORE_PASSES, _PASS = 40, 8, 1.2e-9
 #: Bytes of the variables of a result without their values, of a friction curve, a loading and one with slides.
 _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
-#: Bytes of a row without its fields, and part of a rounded field that compression leaves.
-_ROW, _ROUNDED = 300.0, 0.5
+#: Bytes of a row without its fields, and bits that compression leaves of a rounded pressure and of another rounded
+#: field, more than those of the precision. Measured at precisions of 1e-2 and 1e-4.
+_ROW, _PRESSURE_BITS, _FIELD_BITS = 300.0, 9.0, 3.0
 #: Contact fraction of the middle row below which pressures are compressed, and frames of a chunk of the file.
 _COMPRESSED, _CHUNK = 0.24, 8
 
@@ -360,7 +361,7 @@ class CoarseRun(NamedTuple):
     rows : float
         Rows kept, over the steps.
     contact : tuple of float
-        Part of the cells in contact, of each kept row.
+        Part of the cells in contact, of each kept row and each row in a slide.
     fraction : float
         Largest contact fraction, corrected for the staircase of the cells. [-]
     force : float
@@ -466,7 +467,7 @@ class _Course(NamedTuple):
     kept : int
         Number of kept rows.
     contact : list of float
-        Part of the cells in contact, of each kept row.
+        Part of the cells in contact, of each kept row and each row in a slide.
     fraction, force : float
         Largest contact fraction and force. [-, N]
     seconds : float
@@ -516,6 +517,7 @@ def _course(problem: Problem, experiment: Experiment) -> _Course:
                 force = float(np.fmax(force, row.values["force"]))
             if row.values and row.kept:
                 kept += 1
+            if row.values and (row.kept or slides[-1]):  # the corners of a slide are no sample of its kept times
                 contact.append(float(np.nan_to_num(row.values["contact_area_counted"])) / area)
             if program is not None and (total > _MOST_CONVOLUTIONS or len(times) > _MOST_STEPS):
                 is_whole = row.at >= program.duration
@@ -683,12 +685,16 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: Any) -> flo
     contact : ndarray
         Part of the cells in contact at kept times.
     """
-    dense, frames = 1.0 if case.precision is None else _ROUNDED, rows
-    if rows and dense == 1:  # chunks of a few frames, all of one length, are written whole
-        frames = math.ceil(rows / math.ceil(rows / _CHUNK)) * math.ceil(rows / _CHUNK)
-    few = contact[len(contact) // 2] < _COMPRESSED  # the writer looks at the middle frame
-    pressure = rows * (float(contact.mean()) + 0.01) if few else frames * dense
-    fields = sum(pressure if name == "pressure" else frames * dense for name in case.settings.fields)
+    touching = rows * (float(contact.mean()) + 0.01)
+    if case.precision is not None:
+        bits = -math.log2(case.precision)
+        pressure, other = touching * (bits + _PRESSURE_BITS) / 64, rows * (bits + _FIELD_BITS) / 64
+    else:  # chunks of a few frames, all of one length, are written whole
+        chunks = max(math.ceil(rows / _CHUNK), 1)
+        other = math.ceil(rows / chunks) * chunks
+        # the writer looks at the middle frame
+        pressure = touching if contact[len(contact) // 2] < _COMPRESSED else other
+    fields = sum(pressure if name == "pressure" else other for name in case.settings.fields)
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
 
 

@@ -74,6 +74,7 @@ SLIDE = {"program": [RAMP, {"slide": 2e-4, "over": 0.1, "direction": "x"}], "kee
 CASES = {
     "load": (ROUGH, {}),
     "slide": (ROUGH, SLIDE),
+    "rounded": (ROUGH, SLIDE | {"keep.precision": 1e-3, "keep.times": 20, "keep.fields": ["pressure", "gap"]}),
     "curve": (CURVE, {}),
     "growing": (SPHERE, {}),
     "part": (SPHERE, {"surface.size": 2e-3, "surface.shape": [201, 187], "program.0.load": 5e-3}),
@@ -82,7 +83,7 @@ CASES = {
     "unloaded": (ROUGH, {"program": [RAMP, {"hold": 0.5}, {"load": 0.004, "over": 0.1}]}),
     "elastic": (ROUGH, {"material": {"model": "elastic", "shear_modulus": 1e6}}),
 }
-QUICK = ("load", "slide", "curve", "growing", "part")
+QUICK = ("load", "slide", "rounded", "curve", "growing", "part")
 
 
 @pytest.fixture
