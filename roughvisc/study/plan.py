@@ -125,8 +125,6 @@ _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
 #: Bytes of a row without its fields, and bits that compression leaves of a rounded pressure and of another rounded
 #: field, more than those of the precision. Measured at precisions of 1e-2 and 1e-4.
 _ROW, _PRESSURE_BITS, _FIELD_BITS = 300.0, 9.0, 3.0
-#: Contact fraction of the middle row below which pressures are compressed, and frames of a chunk of the file.
-_COMPRESSED, _CHUNK = 0.24, 8
 
 
 def plan(
@@ -686,14 +684,10 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: Any) -> flo
         Part of the cells in contact at kept times.
     """
     touching = rows * (float(contact.mean()) + 0.01)
+    pressure, other = touching, rows
     if case.precision is not None:
         bits = -math.log2(case.precision)
         pressure, other = touching * (bits + _PRESSURE_BITS) / 64, rows * (bits + _FIELD_BITS) / 64
-    else:  # chunks of a few frames, all of one length, are written whole
-        chunks = max(math.ceil(rows / _CHUNK), 1)
-        other = math.ceil(rows / chunks) * chunks
-        # the writer looks at the middle frame
-        pressure = touching if contact[len(contact) // 2] < _COMPRESSED else other
     fields = sum(pressure if name == "pressure" else other for name in case.settings.fields)
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
 
