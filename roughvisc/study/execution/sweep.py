@@ -8,7 +8,7 @@ import json
 import logging
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,11 +26,13 @@ from roughvisc.study.execution.cluster import (
 )
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attempt, outcome_of
-from roughvisc.study.execution.run import result_folder
+from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
 from roughvisc.study.storage.files import is_writable, require_writable
 from roughvisc.study.storage.index import Entry, Index, index_of, save_index
+from roughvisc.study.storage.lock import lock_case, lock_path
 from roughvisc.study.storage.results import open_results
+from roughvisc.study.storage.store import DamagedError, open_result, result_path, set_aside
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.table import write_table
 from roughvisc.study.storage.upkeep import clean_folder
@@ -184,6 +186,8 @@ def run_cases(
         if not writable:
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
+            for key in index.problems.keys() & todo.keys():
+                _require_own(todo[key], folder, record)
             _compute(todo, record, client, processes, threads)
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
@@ -195,6 +199,23 @@ def run_cases(
             record.save()
             display.close()
     return {key: outcomes[key] for key in distinct}
+
+
+def _require_own(case: Case, folder: Path, record: Record) -> None:
+    """Rename the file of a case if it is damaged, unless a run is at work on it.
+
+    Raises
+    ------
+    InputError
+        If a file of that name cannot be read or is something else; nothing has been computed then.
+    """
+    path = result_path(folder, case.key)
+    if not is_result_of(case, path) and path.exists():
+        with suppress(OSError), lock_case(lock_path(folder, case.key), patience=0.0):
+            try:
+                open_result(path).close()
+            except DamagedError as error:
+                record.warn(set_aside(path, error))
 
 
 def _compute(todo: dict[str, Case], record: Record, client: Client | None, processes: int, threads: int | None) -> None:
