@@ -8,6 +8,7 @@ import threading
 import time
 from contextlib import contextmanager
 
+import dask
 import pytest
 import xarray as xr
 from distributed import Client, LocalCluster
@@ -292,3 +293,40 @@ def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
     assert ear.heard[second + 1][1] > left_at, "it did not begin anew"
     run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
     assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
+
+
+@pytest.mark.thorough
+@pytest.mark.timeout(300)
+def test_worker_stopped_for_good__does_not_hold_the_sweep(study, tmp_path):
+    """A worker and its nanny do not answer any more, and the lock of the case is still theirs."""
+    (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
+    ear, outcomes = Ear(), {}
+    with dask.config.set({"distributed.scheduler.worker-ttl": "10s"}), bare_cluster() as client:
+
+        def work():
+            outcomes.update(run_cases([case], tmp_path / "out", display=ear, client=client))
+
+        thread = threading.Thread(target=work)
+        with worker_process(client) as first:
+            thread.start()
+            ear.wait_until(lambda heard: any(now > 0 for _, now, _ in heard))
+            os.killpg(first.pid, signal.SIGSTOP)
+            with worker_process(client):
+                thread.join(200)
+            os.killpg(first.pid, signal.SIGKILL)
+    assert [o.kind for o in outcomes.values()] == ["done"]
+    assert any("has gone; the case resumes on" in line for line in ear.lines)
+    run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
+    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
+
+
+def test_results_folder_that_a_worker_does_not_see__fails_no_case(study, tmp_path):
+    """Workers of another machine would write where nobody reads."""
+    (case,) = study()[:1]
+    with thread_workers(1) as client:
+        settings = {"name": "test", "threads": 1, "own": False, "takes_over": False}
+        outcome = client.submit(
+            dispatch.on_worker, case.to_json(), case.key, folder=str(tmp_path / "elsewhere"), **settings
+        ).result()
+    assert outcome.kind == "hindered"
+    assert str(tmp_path / "elsewhere") in outcome.message
