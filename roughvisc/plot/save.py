@@ -46,7 +46,7 @@ FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] 
     ),
     "section": (
         section,
-        ("time", "height", "gap"),
+        ("x", "y", "height", "gap"),
         "Section through the contact at its largest area: pressure, profile and deformed surface.",
     ),
     "slide": (
@@ -186,24 +186,27 @@ def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
 
 def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: int, label: str) -> list[_Result]:
     """Results of a function of some jobs, in their order, with a progress bar; computed by several processes."""
-    from rich.console import Console
-    from rich.progress import track
+    from roughvisc.progress import reporting  # slow to import
 
     jobs = list(jobs)
-    look: dict[str, Any] = {"description": label, "total": len(jobs), "transient": True}
-    look["console"] = Console(stderr=True)
-    if min(processes, len(jobs)) < 2:
-        return [work(job) for job in track(jobs, **look)]
-    # a process that is forked while threads run may hang; a server is forked before any work
-    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    context = multiprocessing.get_context(method)
-    if method == "forkserver":
-        context.set_forkserver_preload([__name__])
-    with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
-        futures = [pool.submit(work, job) for job in jobs]
-        for done in track(as_completed(futures), **look):
-            done.result()
-        return [future.result() for future in futures]
+    with reporting(True, label, at=lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
+        if min(processes, len(jobs)) < 2:
+            results = []
+            for job in jobs:
+                results.append(work(job))
+                report(len(results), len(jobs))
+            return results
+        # a process that is forked while threads run may hang; a server is forked before any work
+        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+        context = multiprocessing.get_context(method)
+        if method == "forkserver":
+            context.set_forkserver_preload([__name__])
+        with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
+            futures = [pool.submit(work, job) for job in jobs]
+            for count, done in enumerate(as_completed(futures), 1):
+                done.result()
+                report(count, len(jobs))
+            return [future.result() for future in futures]
 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:

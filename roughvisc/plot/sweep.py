@@ -440,10 +440,11 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     loading = "nominal_pressure" if area == "contact_fraction" else "force"
     keys = swept_keys(results)
     for name in (area, "approach", loading, "leak_rate", *CONDUCTANCES):
-        if name not in results or not keys or _is_known(results, name, keys, axis):
+        if name not in results:
             continue
-        file = "area" if name == area else name
-        yield file, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
+        if keys and not _is_known(results, name, keys, axis):
+            file = "area" if name == area else name
+            yield file, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
         if name in (area, "leak_rate", *CONDUCTANCES):
             caption = f"{VARIABLES[name].label} over {axis}, for each case."
             yield "histories" if name == area else f"{name}-histories", caption, sweep(results, name, along=axis)
