@@ -294,6 +294,7 @@ def triangle():
 
 
 @pytest.mark.thorough
+@pytest.mark.thorough
 def test_ting__triangle_on_zener_has_the_known_values(triangle):
     # from an independent program with tabulated memory integrals
     assert triangle.time_of_maximum == pytest.approx(1.084415017, abs=1e-9)
@@ -301,6 +302,7 @@ def test_ting__triangle_on_zener_has_the_known_values(triangle):
     np.testing.assert_allclose(triangle.approach([1.5, 1.8]), [0.4325156393, 0.3484303181], atol=1e-10)
 
 
+@pytest.mark.thorough
 def test_ting__half_sine_on_maxwell_has_the_known_values():
     contact = references.ting(SPHERE, materials.maxwell(1.0, 1.0), lambda t: np.sin(np.pi * t / 2), end=2.0)
     assert contact.time_of_maximum == pytest.approx(1.360907073, abs=1e-9)
@@ -308,6 +310,7 @@ def test_ting__half_sine_on_maxwell_has_the_known_values():
     assert float(contact.approach(1.9)) == pytest.approx(0.4100906593, abs=1e-10)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("t", [0.4, 1.0, 1.05, 1.5, 1.95])
 def test_ting__pressure_carries_the_load(triangle, t):
     load = 1 - abs(t - 1)
@@ -316,6 +319,7 @@ def test_ting__pressure_carries_the_load(triangle, t):
     assert force_of(lambda r: triangle.pressure(r, t), *radii, levels=16) == pytest.approx(load, rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_ting__growth_is_lee_radok(triangle):
     growth = growing_contact.lee_radok(SPHERE, ZENER, Program().load(1.0, over=1.0))
     times = np.linspace(0.01, 1.0, 7)
@@ -323,6 +327,7 @@ def test_ting__growth_is_lee_radok(triangle):
     np.testing.assert_allclose(triangle.approach(times[:-1]), growth.approach(times[:-1]), rtol=1e-11)
 
 
+@pytest.mark.thorough
 def test_ting__step_is_lee_radok():
     material = STEP["two modes and flow"]
     contact = references.ting(SPHERE, material, Program().load(0.7, over=0.0).hold(2.0))
@@ -331,6 +336,7 @@ def test_ting__step_is_lee_radok():
     np.testing.assert_allclose(contact.pressure(r, 1.3), press.pressure(r, 1.3), rtol=1e-9)
 
 
+@pytest.mark.thorough
 def test_ting__pressure_under_the_apex_of_a_cone_is_infinite():
     program = Program().load(1.0, over=1.0).load(0.0, over=1.0)
     contact = references.ting(Cone(0.2), ZENER, program)
@@ -348,6 +354,7 @@ REDUCED = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", REDUCED)
 @pytest.mark.parametrize(
     "indenter", [SPHERE, pytest.param(Cone(0.3), marks=pytest.mark.thorough)], ids=["sphere", "cone"]
@@ -364,6 +371,7 @@ def test_reduced_contact__growth_is_lee_radok(name, indenter):
         np.testing.assert_allclose(found.approach, exact.approach(times), rtol=tolerance)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     [
@@ -383,6 +391,7 @@ def test_reduced_contact__single_maximum_is_ting(name, indenter):
 
 
 @pytest.mark.thorough
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "t"), [("zener", 1.7), ("zener stiff", 1.2)])
 def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
     exact = float(references.ting(SPHERE, REDUCED[name], TRIANGLE).approach(t))
@@ -395,6 +404,7 @@ def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
 
 
 @pytest.mark.thorough
+@pytest.mark.thorough
 def test_reduced_contact__dent_recovers_as_ting_says():
     program = TRIANGLE.hold(2.0)
     exact = references.ting(SPHERE, ZENER, program)
@@ -404,6 +414,7 @@ def test_reduced_contact__dent_recovers_as_ting_says():
     np.testing.assert_array_equal(found.radius, 0)
 
 
+@pytest.mark.thorough
 def test_reduced_contact__held_approach_relaxes_with_the_modulus():
     material = STEP["two modes and flow"]
     program = Program().load(0.7, over=0.0).hold(3.0, control="approach")
@@ -415,6 +426,7 @@ def test_reduced_contact__held_approach_relaxes_with_the_modulus():
     np.testing.assert_allclose(found.work, work, rtol=1e-5)
 
 
+@pytest.mark.thorough
 def test_reduced_contact__approach_at_constant_speed_on_a_cone():
     # a ~ t and an elastic force ~ a^2, so that W = int E(t - s) d(k s^2)
     cone, speed = Cone(0.3), 0.2
@@ -425,6 +437,7 @@ def test_reduced_contact__approach_at_constant_speed_on_a_cone():
     np.testing.assert_allclose(found.force, force, rtol=1e-6)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("period", "loss", "digits"), [(3.0, 0.30881, 4e-4), (30.0, 0.16094, 1e-4)])
 def test_reduced_contact__settled_cycle_loses_the_known_work(period, loss, digits):
     cycles = 6
@@ -435,6 +448,7 @@ def test_reduced_contact__settled_cycle_loses_the_known_work(period, loss, digit
     assert work[-1] == pytest.approx(work[-2], rel=2e-5)
 
 
+@pytest.mark.thorough
 def test_reduced_contact__kelvin_voigt_under_approach():
     # elements carry E w + eta w': while the sphere sinks g(a) = approach, while it rises g(a) = approach - eta v / E
     material, speed = materials.kelvin_voigt(1.0, 0.5), 0.1
@@ -448,6 +462,7 @@ def test_reduced_contact__kelvin_voigt_under_approach():
     np.testing.assert_allclose(found.force, modulus * SPHERE.scaled_force(radius) + dashpots, rtol=1e-5)
 
 
+@pytest.mark.thorough
 def test_reduced_contact__units_are_neutral():
     length, pressure = 1e-6, 3e7
     program = Program().load(pressure * length**2, over=1.0).load(0.0, over=1.0).hold(0.1)
@@ -459,6 +474,7 @@ def test_reduced_contact__units_are_neutral():
     np.testing.assert_allclose(small.work / (pressure * length**3), plain.work, rtol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.thorough
 def test_reduced_contact__reload_after_long_rest_is_the_first_loading():
     program = TRIANGLE.hold(200.0) + TRIANGLE

@@ -104,6 +104,7 @@ def test_displacement__is_that_of_the_pressure(sheet):
     assert float(contact.displacement(a * (1 + 1e-9), a)) == pytest.approx(float(contact.displacement(a, a)), rel=1e-7)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("indenter", INDENTERS)
 def test_inverses(indenter):
     contact = OnSheet(indenter, Sheet(0.6))

@@ -132,6 +132,7 @@ def test_grid_that_grows__gives_the_same_contact():
     np.testing.assert_allclose(grown.force, one.force, rtol=2e-3)
 
 
+@pytest.mark.thorough
 def test_unloading__is_that_of_ting_on_a_sheet():
     """His solution asks of the body only that space and time separate; tables stand for the integral equation."""
     exact, rubber = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), rv.zener(1e6, 3e5, 1e5)

@@ -66,7 +66,7 @@ def test_equal_materials__have_the_memory_of_a_half_space(boundary, material, ru
         np.testing.assert_allclose(one, other, rtol=0, atol=2e-7 * abs(other).max())
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+@pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic", "mirror"])
 @pytest.mark.parametrize("pair", PAIRS)
 def test_steps__of_linear_pressure_are_the_hereditary_integral(boundary, pair):
     """The sum over all past steps of the mean compliance since, with the operator of the elastic body of that age."""

@@ -60,7 +60,7 @@ def test_layer_series__of_one_material_has_its_times_alone():
     assert found.error < 1e-8
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
+@pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic"])
 def test_layer_series__its_kernels_add_up_to_those_of_the_elastic_body_after_some_time(boundary):
     """In free space the kernel of each exponential has images of its own."""
     materials, t = (RUBBER, POLYMER), 0.03
