@@ -12,7 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import (
     PART,
@@ -41,6 +41,8 @@ def local_client(processes: int) -> Iterator[Client]:
     ------
     InputError
         If this process runs a script that its child processes would run again.
+    RoughviscError
+        If a process is lost while it starts.
     """
     import dask
     from distributed import Client, LocalCluster
@@ -54,20 +56,22 @@ def local_client(processes: int) -> Iterator[Client]:
         "distributed.deploy.lost-worker-timeout": "300s",
         "distributed.worker.profile.enabled": False,  # samples would take time from a case
     }
-    with (
-        dask.config.set(settings),
-        LocalCluster(
-            n_workers=processes,
-            threads_per_worker=1,
-            memory_limit=MEMORY_LIMIT // processes,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
+    with dask.config.set(settings):
+        try:
+            own = LocalCluster(
+                n_workers=processes,
+                threads_per_worker=1,
+                memory_limit=MEMORY_LIMIT // processes,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
+            )
+        except RuntimeError as error:
+            lost = "a process of this machine was lost while it started: repeat the command, or use --workers 0"
+            raise RoughviscError(lost) from error
+        with own as cluster, Client(cluster, set_as_default=False) as client:
+            yield client
 
 
 def refuse_unguarded_script() -> None:
