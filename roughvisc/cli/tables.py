@@ -66,7 +66,7 @@ def result_table(dataset: xr.Dataset) -> Group:
 
 
 def _remark(dataset: xr.Dataset, row: xr.Dataset, name: str, value: float) -> str:
-    """Share, largest value or error that belongs to a value of a result."""
+    """Return what is printed after a value of a result: its share of the area, the largest value, or its error."""
     axis = AXES[axis_of(dataset)]
     if name == axis.telling:
         ordered = dataset[name].sortby(axis.name)

@@ -247,7 +247,7 @@ def _least_errors(
     contact, present = pressure > 0, np.isfinite(height)
     if not contact.any():
         return least
-    # Small openings that full contact may hide.
+    # Full contact on this grid may hide small openings.
     hidden, gap = hidden_opening(pressure, height, dataset.attrs["boundary"] == "periodic")
     least["contact_area"] = max(least["contact_area"], hidden * area)
     least["mean_gap"] = max(least["mean_gap"], gap / max(gap, wide) if gap > 0 else 0.0)

@@ -190,7 +190,7 @@ class Memory:
             total += self.response(mode[:1], i, own[i])
         return self.on_cells(total)[0]
 
-    # What depends on the fields that are kept: of a body whose waves creep differently these are transforms.
+    # The methods below depend on the fields that are kept: transforms if the waves of a body creep differently.
 
     def kept(self, unit: Array, pressure: Array) -> Array:
         """Return the fields of a history. [m Pa], [Pa]"""

@@ -121,3 +121,14 @@ def test_creep_table__warns_if_rows_are_more_than_a_decade_apart(rows, sparse):
     assert ("material: " in found.attrs.get("warnings", "")) == sparse
     expected = rv.simulate(BALL, exact, program, **settings).approach
     assert (abs(float(found.approach[0] / expected[0]) - 1) > 0.1) == sparse
+
+
+def test_every_step__of_a_body_without_instantaneous_compliance_states_the_tolerance_or_less():
+    """If each step is asked for, those that state more are no rows; the corners of the program always are."""
+    ball, rubber = rv.sphere(1e-2, 1e-3, (21, 18)), rv.kelvin_voigt(1e6, 1e6, 0.3)
+    press = rv.Program().load(5e-3, over=0.5).approach(4e-6, over=0.5)
+    ds = rv.simulate(ball, rubber, press, tolerance=1e-3, fields=(), progress=False)
+    inner = ~np.isin(ds.time, [0.0, 0.5, 1.0])
+    assert inner.sum() > 5
+    assert (ds.stated_error[inner] <= 1e-3).all()
+    assert ds.roughvisc.steps.sizes["step"] >= ds.sizes["time"]

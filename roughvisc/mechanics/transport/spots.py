@@ -167,10 +167,10 @@ def _bounds(contact: Mask) -> tuple[slice, slice]:
 def _edge_energies(
     contact: Mask, rim: Mask, pressure: Array, spacing: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Return the change of stiffness per cell of displacement of an edge of the material, and of an opening gap. [m]
+    """Return by how much the stiffness changes if the edge of the contact moves by one cell. [m]
 
-    The third number is the change by independent displacements of the faces of an opening gap, the root of the sum of
-    squares.
+    The first number is for edges where the material ends, the second for edges where the gap opens. The third is for
+    faces of an opening gap that move independently: the root of the sum of squares.
 
     A punch gains ``K^2 ds / 2`` of stiffness for an edge that moves out by ``ds``, where ``K`` is the strength of the
     singularity there; the edge cell's pressure squared times the cell's side is in proportion to ``K^2``. [m]
