@@ -152,7 +152,8 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     ax.set_xlabel(f"Factor of the value at {text} [-]" if wide else f"Error at {text} [%]")
     ax.set_yticks(places, [*names, "all together"])
     ax.tick_params(axis="y", length=0)
-    ax.margins(x=0.15)
+    ax.use_sticky_edges = False  # else a bar ends at the frame
+    ax.margins(x=0.15, y=0.06)
     if (towards != 0).any():
         ax.set_title("orange: one direction only", loc="right", fontsize=8)
     if several:
