@@ -13,7 +13,6 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
@@ -226,9 +225,10 @@ def friction(
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
     """Return a result after one Python warning each of missed tolerances, unsolved speeds and sparse tables."""
-    stated = warnings_of(dataset.attrs)
-    for text in filter(None, map(stated.get, ("tolerance", "speeds", "material"))):
-        warnings.warn(text, UserWarning, level)
+    for line in dataset.attrs.get("warnings", "").splitlines():
+        subject, _, text = line.partition(": ")
+        if subject in ("tolerance", "speeds", "material"):
+            warnings.warn(text, UserWarning, level)
     return dataset
 
 

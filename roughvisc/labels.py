@@ -1,22 +1,30 @@
-"""Units, names and comments of the variables of a Dataset, as declared in :mod:`roughvisc.variables`."""
+"""Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps.
+
+A result holds rows at its kept times. The history of every accepted step is a Dataset of its own, the group ``steps``
+of the file. A Dataset carries it in ``encoding``: xarray keeps that through selections and copies and writes it to no
+file.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.units import quantity
-from roughvisc.variables import AXES, ROW, ROWS, STEP, VARIABLES, Variable, axis_of, errors_of
+from roughvisc.variables import AXES, ERRORS, ROW, ROWS, STEP, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
 _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
+#: Group of the steps in a result's file, and its title.
+STEPS, TITLE = "steps", "histories of every accepted step"
+_CARRIED = "roughvisc_steps"
 
 
 def heading(name: str, unit: str) -> str:
@@ -30,7 +38,7 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def label(dataset: xr.Dataset, declared: Mapping[str, Variable] = VARIABLES) -> xr.Dataset:
+def label(dataset: xr.Dataset) -> xr.Dataset:
     """Return a Dataset with the declared dtype and attributes on every variable.
 
     Parameters
@@ -38,8 +46,6 @@ def label(dataset: xr.Dataset, declared: Mapping[str, Variable] = VARIABLES) -> 
     dataset : xarray.Dataset
         Holds declared variables only, and coordinates of any name: what was varied in a case. Extra leading dimensions
         (``case``) are allowed.
-    declared : mapping
-        Name -> declaration.
 
     Raises
     ------
@@ -52,45 +58,31 @@ def label(dataset: xr.Dataset, declared: Mapping[str, Variable] = VARIABLES) -> 
     -----
     Values after the last row of a case are missing, if the cases have rows of their own.
     """
-    axis = axis_of(dataset.variables)
-    if ROW in dataset.dims and axis in dataset.coords:
+    if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())
-    attributes: dict[Hashable, dict[str, Any]] = {}
-    converted = {}
+    rows, attributes, converted = (*AXES, ROW, STEP), {}, {}
     for name, variable in dataset.variables.items():
-        one = declared.get(str(name))
-        if one is None or not _ends_in(variable.dims, one.dims):
+        declared = VARIABLES.get(str(name))
+        if declared is None and name not in dataset.coords:
+            raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
+        wanted = declared.dims if declared else variable.dims
+        found = variable.dims[variable.ndim - len(wanted) :]
+        fits = all(dim in rows if one in (ROW, STEP) else dim == one for dim, one in zip(found, wanted, strict=False))
+        if declared is None or len(found) < len(wanted) or not fits:
             if name in dataset.coords:
-                continue
-            if one is None:
-                raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
-            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {one.dims}")
-        if variable.dtype != np.dtype(one.dtype) and variable.dtype.kind not in "fUO":
-            converted[name] = variable.astype(one.dtype)
-        attributes[name] = one.attributes()
-        if stated := " ".join(other for other in errors_of(str(name)) if other in dataset):
-            attributes[name]["ancillary_variables"] = stated
+                continue  # of another meaning
+            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {wanted}")
+        if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
+            converted[name] = variable.astype(declared.dtype)
+        attributes[name] = dict(declared.attributes)
+        if errors := " ".join(one for one in ERRORS.get(str(name), ()) if one in dataset):
+            attributes[name]["ancillary_variables"] = errors
         if name in _CARTESIAN:
             attributes[name]["cartesian_axis"] = _CARTESIAN[str(name)]
     labelled = dataset.assign(converted)  # once: each assignment merges the whole
     for name, found in attributes.items():
         labelled.variables[name].attrs.update(found)
     return labelled
-
-
-def _ends_in(dims: tuple[Hashable, ...], declared: tuple[str, ...]) -> bool:
-    """Return whether dimensions end in the declared ones; a row may lie over any axis of rows."""
-    own = dims[len(dims) - len(declared) :]
-    rows = (*AXES, ROW, STEP)
-    return len(own) == len(declared) and all(
-        dim in rows if one in (ROW, STEP) else dim == one for dim, one in zip(own, declared, strict=True)
-    )
-
-
-def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result with its variables in the order of their declaration: main results first."""
-    known = list(VARIABLES)
-    return dataset[sorted(dataset.data_vars, key=lambda name: known.index(name) if name in known else len(known))]
 
 
 def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
@@ -146,3 +138,49 @@ def _same_unit(found: str, declared: str) -> bool:
     except InputError:
         return False
     return factor == 1.0
+
+
+def with_steps(result: xr.Dataset, steps: xr.Dataset) -> xr.Dataset:
+    """Return a result that carries the history of its accepted steps."""
+    found = result.copy(deep=False)
+    found.encoding = {**result.encoding, _CARRIED: steps}
+    return found
+
+
+def steps_of(result: xr.Dataset) -> xr.Dataset | None:
+    """Return the history of the accepted steps that a result carries; None if it carries none of its own.
+
+    xarray keeps the encoding of the first of several Datasets that it combines. Therefore the rows are compared with
+    the steps.
+    """
+    steps = result.encoding.get(_CARRIED)
+    return steps if steps is not None and _are_rows_of(result, steps) else None
+
+
+def _are_rows_of(result: xr.Dataset, steps: xr.Dataset) -> bool:
+    """Whether time and force of every row are those of a step."""
+    if not {"time", "force"} <= result.variables.keys() or result["force"].dims not in ((), ("time",)):
+        return False
+    rows, known = (
+        set(zip(np.ravel(one["time"]).tolist(), np.ravel(one["force"]).tolist(), strict=True))
+        for one in (result, steps)
+    )
+    return rows <= known
+
+
+def require_steps(result: xr.Dataset) -> xr.Dataset:
+    """Return the history of the accepted steps of a result.
+
+    Raises
+    ------
+    InputError
+        If the Dataset carries none.
+    """
+    steps = steps_of(result)
+    if steps is None:
+        raise InputError(
+            key=STEPS,
+            found=f"a Dataset over {', '.join(map(str, result.dims)) or 'nothing'}",
+            expected="a result over time from rv.simulate, rv.run or rv.open_result, or a selection of its rows",
+        )
+    return steps

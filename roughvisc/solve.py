@@ -6,7 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,12 +21,11 @@ from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
-from roughvisc.labels import in_order, label
+from roughvisc.labels import TITLE, label, with_steps
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.steps import TITLE, with_steps
 from roughvisc.topography.grid import checked, nominal_area
 from roughvisc.topography.indenters import highest
-from roughvisc.variables import STEPPED
+from roughvisc.variables import STEPPED, VARIABLES
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
@@ -142,8 +141,6 @@ def solve(
     ConvergenceError
         If there is no row.
     """
-    from roughvisc.progress import reporting  # slow to import
-
     height = checked(problem.height, "height", least=1)
     problem = replace(problem, height=height).with_known_boundary(experiment.boundary)
     settings = problem.settings
@@ -155,10 +152,15 @@ def solve(
     if settings.grid_error and isinstance(experiment, Loading) and "pressure" not in settings.fields:
         needed = ("pressure",)
         problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
-    doing = "pressing" if experiment.axis == "time" else "sliding"
     with fft.set_workers(threads_for(threads)):
-        with reporting(progress, doing, at=experiment.progress) as report:
-            dataset = _solve_once(problem, experiment, recorder or Recorder(), report)
+        with ExitStack() as bar:
+            report = progress if callable(progress) else None
+            if progress is True:
+                from roughvisc.progress import reporting  # slow to import
+
+                doing = "pressing" if experiment.axis == "time" else "sliding"
+                report = bar.enter_context(reporting(True, doing, at=experiment.progress))
+            dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         if settings.grid_error and isinstance(experiment, Loading):
             # coarser grids may be of other sizes: the loads are those of the given area
             loads = Loading(experiment.program.on_area(nominal_area(height)))
@@ -166,12 +168,12 @@ def solve(
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
                 with _without_log():
-                    found = _solve_once(coarse, loads, Recorder(), lambda *_: None)
+                    found = solve_on_grid(coarse, loads, Recorder())
                 apart = np.abs(found["time"].values[:, None] - times)  # a slide has others, by half a longer cell
                 return found.isel(time=apart.argmin(axis=0))
 
-            dataset = label(in_order(with_grid_error(dataset, height, on_coarser))).drop_vars(needed)
-    return dataset
+            dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
+    return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
 
 
 @contextmanager
@@ -189,10 +191,10 @@ def _without_log() -> Iterator[None]:
         log.removeFilter(is_of_another_thread)
 
 
-def _solve_once(
-    problem: Problem, experiment: Experiment, recorder: Recorder, report: Callable[[float, float], None]
+def solve_on_grid(
+    problem: Problem, experiment: Experiment, recorder: Recorder, report: Progress | None = None
 ) -> xr.Dataset:
-    """Solve on the given grid, without the runs on coarser grids."""
+    """Solve on the given grid, without the runs on coarser grids and without labels."""
     began, reached = time.perf_counter(), recorder.latest
     state, count, spent = reached.state, reached.rows, reached.wall_time
     while True:
@@ -206,7 +208,8 @@ def _solve_once(
                     values = {experiment.axis: row.at, **row.values, "wall_time": took}
                     recorder.append(values | {"kept": row.kept, "place": row.place}, row.fields)
                     count += 1
-                report(row.done, rows.end)
+                if report is not None:
+                    report(row.done, rows.end)
                 if row.state is not None:
                     recorder.update(Checkpoint(row.state, row.done, count, took, reached.transforms))
             return dataset_of(experiment, rows, recorder)
@@ -231,7 +234,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     Returns
     -------
     xarray.Dataset
-        Over the axis of the experiment, as :mod:`roughvisc.variables` declares it.
+        Over the axis of the experiment, not labelled yet.
 
     Raises
     ------
@@ -242,28 +245,25 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     steps = pd.DataFrame(recorder.plain)
     if not len(steps) or not steps["kept"].any():
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
-    kept = steps[steps["kept"]].sort_values("place", kind="stable").drop(columns=["kept", "place"])
-    variables: dict[str, Any] = {name: (axis, kept[name].to_numpy()) for name in kept if name != axis}
+    kept = steps[steps["kept"]].sort_values("place", kind="stable")
+    dataset = xr.Dataset.from_dataframe(kept.drop(columns=["kept", "place"]).set_index(axis))
+    dataset = dataset.assign_coords(x=height["x"].values, y=height["y"].values)
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
-        variables[name] = (axis, "x", "y"), field
+        dataset[name] = (axis, "x", "y"), field
     origin = {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    variables["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
+    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
     if "filled" in height.coords:
-        variables["filled"] = ("x", "y"), height["filled"].values
-    dataset = xr.Dataset(
-        variables,
-        coords={axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values},
-        attrs={
-            "Conventions": "CF-1.11",
-            "boundary": settings.boundary,
-            "tolerance": settings.tolerance,
-            "history": str(height.attrs.get("history", "")),
-        },
-    )
-    dataset = label(in_order(rows.finish(dataset)))
+        dataset["filled"] = ("x", "y"), height["filled"].values
+    dataset.attrs = {
+        "Conventions": "CF-1.11",
+        "boundary": settings.boundary,
+        "tolerance": settings.tolerance,
+        "history": str(height.attrs.get("history", "")),
+    }
+    dataset = rows.finish(dataset)
     if axis != "time":
         return dataset
-    stepped = {name: ("time", steps[name].to_numpy()) for name in STEPPED if name in steps}
-    histories = xr.Dataset(stepped, coords={"time": steps["time"].to_numpy()}, attrs={"title": TITLE})
-    return with_steps(dataset, label(histories).drop_indexes("time").rename_dims(time="step"))
+    stepped = steps.set_index("time")[pd.Index(STEPPED).intersection(steps.columns)]
+    histories = label(xr.Dataset.from_dataframe(stepped)).assign_attrs(title=TITLE)
+    return with_steps(dataset, histories.drop_indexes("time").rename_dims(time="step"))

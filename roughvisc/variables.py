@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -70,8 +71,9 @@ class Variable:
         """Return the dimensions in a result whose rows lie over an axis."""
         return tuple(axis if dim in (ROW, STEP) else dim for dim in self.dims)
 
+    @cached_property
     def attributes(self) -> dict[str, Any]:
-        """Return the CF attributes."""
+        """The CF attributes."""
         names = ("long_name", "units", "comment")
         found: dict[str, Any] = {name: value for name in names if (value := getattr(self, name))}
         if self.meanings:
@@ -464,18 +466,15 @@ GRID_ERROR = {
     "contact_area": "grid_error_area",
     "friction_force": "grid_error_friction",
 }
-
-
-def errors_of(name: str) -> tuple[str, ...]:
-    """Return the names of the variables that may state the error of a variable.
-
-    Examples
-    --------
-    >>> errors_of("contact_area"), errors_of("leak_rate")
-    (('contact_area_error', 'grid_error_area'), ('leak_rate_solver_lower', 'leak_rate_solver_upper'))
-    """
-    found = (f"{name}_error", f"{name}_solver_lower", f"{name}_solver_upper", GRID_ERROR.get(name, ""))
-    return tuple(one for one in found if one in VARIABLES)
+#: Variable -> variables that may state its error.
+ERRORS = {
+    name: tuple(
+        one
+        for one in (f"{name}_error", f"{name}_solver_lower", f"{name}_solver_upper", GRID_ERROR.get(name, ""))
+        if one in VARIABLES
+    )
+    for name in VARIABLES
+}
 
 
 def variables_in_table(which: Literal["last", "largest"]) -> list[str]:
@@ -540,4 +539,4 @@ def axis_of(names: Container[str]) -> str:
     >>> axis_of({"time", "force"}), axis_of({"speed", "force"})
     ('time', 'speed')
     """
-    return next((name for name in AXES if name != "time" and name in names), "time")
+    return "speed" if "speed" in names else "time"

@@ -8,10 +8,9 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import expect_history, label
+from roughvisc.labels import expect_history, label, steps_of
 from roughvisc.mechanics.program import Program
 from roughvisc.observables.frames import need
-from roughvisc.steps import steps_of
 from roughvisc.variables import STEPPED
 
 #: Times closer than this part of a period are the same.

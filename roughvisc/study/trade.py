@@ -19,9 +19,8 @@ from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.loading import Loading
-from roughvisc.labels import label
+from roughvisc.labels import label, steps_of
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.steps import steps_of
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged

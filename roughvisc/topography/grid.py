@@ -67,10 +67,10 @@ def with_coordinates(
     coordinates = {"x": x, "y": y}
     h = xr.DataArray(
         values,
-        coords={axis: (axis, at, VARIABLES[axis].attributes()) for axis, at in coordinates.items()},
+        coords={axis: (axis, at, VARIABLES[axis].attributes) for axis, at in coordinates.items()},
         dims=("x", "y"),
         name="height",
-        attrs={**VARIABLES["height"].attributes(), **(attrs or {})},
+        attrs={**VARIABLES["height"].attributes, **(attrs or {})},
     )
     return h if filled is None else with_filled_points(h, filled)
 

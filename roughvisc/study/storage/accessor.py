@@ -14,7 +14,7 @@ from typing import Any
 
 import xarray as xr
 
-from roughvisc.steps import require_steps, steps_of, with_steps
+from roughvisc.labels import require_steps, steps_of, with_steps
 
 #: Before the name of a figure.
 _PLOT = "plot_"

@@ -91,7 +91,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
     numbers = np.array(case_numbers(parameters, len(listed)))[here]
     parameters = {key: values[here] for key, values in parameters.items()}
     flat = _stacked(folder, entries)
-    keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes())}
+    keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes)}
     labels = labels_of(parameters, listed[here[0]].case, ("case",))
     number = {"case": ("case", numbers, {"long_name": "number of the case"})}
     return _by_realisation(flat.assign_coords(number | keys | labels), parameters)
@@ -142,7 +142,7 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
     counts = np.array([len(one) for one in places])
     rows = ("case", counts, {"long_name": f"number of {AXES[along].rows}", "units": "1"})
     return dataset.assign_coords(
-        {along: (("case", ROW), _side_by_side(places), VARIABLES[along].attributes()), ROWS: rows}
+        {along: (("case", ROW), _side_by_side(places), VARIABLES[along].attributes), ROWS: rows}
     )
 
 

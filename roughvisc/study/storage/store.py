@@ -25,8 +25,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
 from roughvisc.errors import InputError, short_repr
-from roughvisc.labels import label
-from roughvisc.steps import STEPS, steps_of, with_steps
+from roughvisc.labels import STEPS, label, steps_of, with_steps
 from roughvisc.study.storage.files import atomic_write, require_file
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
