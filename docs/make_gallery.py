@@ -53,7 +53,7 @@ FIGURES = {
     },
     "friction": {
         "curve": lambda ds: rv.plot.friction(
-            ds.merge(rv.observables.persson(ds, Case.of_result(ds).body()))
+            ds.merge(rv.observables.persson(ds, Case.of_result(ds).body))
         ),
         "maps": rv.plot.maps,
     },

@@ -14,8 +14,8 @@ from roughvisc.mechanics.materials.creep import stiffened
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
-from roughvisc.study.si_tables import COLUMNS, unit_of
-from roughvisc.study.study_file import KEPT, PROGRAMS, SEGMENTS
+from roughvisc.study.si_tables import unit_of
+from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.surrogates import surrogate
 from roughvisc.topography.synthesis import RECIPES
@@ -109,7 +109,8 @@ def _all(function, *without, skipped=0):
     return _of(function, *(name for name in arguments(function, skipped) if name not in without))
 
 
-_SETTINGS = [name for name in arguments(Settings) if name not in (*KEPT, "missing")]
+_SETTINGS = [name for name in arguments(Settings) if TABLE_OF[name] == "solve"]
+_KEPT = [name for name in arguments(Settings) if TABLE_OF[name] == "keep"]
 #: Table of the page -> place of its keys in a study, and the argument of each key.
 TABLES = {
     "study": ("", {}),
@@ -143,7 +144,7 @@ TABLES = {
     },
     "material: temperature": (
         "material",
-        _of(rv.wlf, "temperature", "reference_temperature", wlf_c1="c1", wlf_c2="c2")
+        _of(rv.wlf, "temperature", "reference_temperature", "wlf_c1", "wlf_c2")
         | _of(rv.arrhenius, "activation_energy")
         | _of(rv.shift, shift_factor="factor"),
     ),
@@ -162,7 +163,7 @@ TABLES = {
     "friction": ("friction", _all(SteadySliding)),
     "friction.speeds": ("friction.speeds", {}),
     "solve": ("solve", _of(Settings, *_SETTINGS)),
-    "keep": ("keep", _of(Settings, *KEPT)),
+    "keep": ("keep", _of(Settings, *_KEPT)),
     "observe": ("observe", {}),
     "observe.leakage": ("observe.leakage", _all(rv.observables.leakage, skipped=1)),
     "observe.conductance": ("observe.conductance", _all(rv.observables.conductance, skipped=1)),

@@ -80,11 +80,12 @@ def check_keys(function: Callable[..., Any], where: str, table: Mapping[str, Any
     known = arguments(function, skipped)
     refuse_unknown(where, table, known)
     for key, (hint, default) in known.items():
+        if (key not in table and default is not inspect.Parameter.empty) or (key in table and suits(table[key], hint)):
+            continue
         name, expected = dotted(where, key), in_words(hint, units_of(function).get(key, "1"))
-        if key not in table and default is inspect.Parameter.empty:
+        if key not in table:
             raise InputError(f"{name}: missing: expected {expected}", key=name, expected=expected)
-        if key in table and not suits(table[key], hint):
-            raise InputError(key=name, found=table[key], expected=expected)
+        raise InputError(key=name, found=table[key], expected=expected)
 
 
 def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], data: int = 1) -> None:
@@ -134,16 +135,12 @@ def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -
             raise InputError(f"{name}: unknown key{nearest(key, known)}", key=name, found=table[key], expected=expected)
 
 
-def close(word: Any, known: Iterable[str]) -> str:
-    """Return a suggestion for a word that is not known; empty if no known word is similar."""
-    near = difflib.get_close_matches(str(word), list(known), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
-
-
-def nearest(word: Any, known: Iterable[str]) -> str:
-    """Return a suggestion for a word that is not known, or the list of the known ones."""
+def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> str:
+    """Return a suggestion for a word that is not known; if no known word is similar, `otherwise` or the known ones."""
     known = list(known)
-    return close(word, known) or f": expected one of {', '.join(known)}"
+    if near := difflib.get_close_matches(str(word), known, n=1):
+        return f"; did you mean {near[0]!r}?"
+    return f": expected one of {', '.join(known)}" if otherwise is None else otherwise
 
 
 def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
@@ -152,7 +149,7 @@ def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
     found = [key for key in keys if key in table]
     if len(found) != 1:
         expected = f"exactly one of {', '.join(keys)}"
-        hint = "" if found else next(filter(None, (close(key, keys) for key in table)), "")
+        hint = "" if found else next(filter(None, (nearest(key, keys, "") for key in table)), "")
         message = f"{where}: found {short_repr(table)}: expected {expected}{hint}"
         raise InputError(message, key=where, found=table, expected=expected)
     return found[0]

@@ -79,7 +79,7 @@ def test_studies__are_accepted(path, there):
         file.write_text(completed(text))
         for case in read_cases(file):
             case.height()
-            assert case.material().contact_compliance(1.0) > 0
+            assert case.material.contact_compliance(1.0) > 0
 
 
 def run_python(codes, folder):

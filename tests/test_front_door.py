@@ -123,7 +123,7 @@ def test_study__of_a_material_by_either_modulus_states_one_material(by_shear, by
     for text in (by_shear, by_young):
         (tmp_path / "study.toml").write_text(STUDY.format(text))
         cases.append(rv.read_study(tmp_path / "study.toml"))
-    assert cases[0].material() == cases[1].material()
+    assert cases[0].material == cases[1].material
     assert "young_modulus" in cases[1].to_json()
     assert rv.vary(cases[1], {"material.young_modulus": "12 MPa"}).key != cases[1].key
 
@@ -137,6 +137,6 @@ def test_study__of_relaxation_in_tension_is_told_from_one_in_shear(tmp_path):
         return rv.read_study(tmp_path / "study.toml")
 
     usual = case("")
-    assert usual.material() == case('kind = "shear"').material()
+    assert usual.material == case('kind = "shear"').material
     assert case('kind = "tensile"').key != usual.key
-    assert case('kind = "tensile"', 3).material() == usual.material()
+    assert case('kind = "tensile"', 3).material == usual.material

@@ -144,8 +144,8 @@ def gel(modulus: Quantity, drainage: Quantity) -> Prony:
         }
     }
     script = """
-assert case.material() == rv.Prony(glassy=1e-3, compliances=(1e-3,), times=(5.0,))
-assert rv.Case.from_json(case.to_json()).material() == case.material()
+assert case.material == rv.Prony(glassy=1e-3, compliances=(1e-3,), times=(5.0,))
+assert rv.Case.from_json(case.to_json()).material == case.material
 try:
     rv.vary(case, {"material.modulus": "3 kg"})
 except rv.InputError as error:

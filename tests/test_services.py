@@ -111,10 +111,10 @@ def computed(case, body=None, **settings):
     """What the function gives that does the same as a study."""
     solving = case.settings
     shared = {"tolerance": solving.tolerance, "fields": solving.fields, "progress": False} | settings
-    body = case.body() if body is None else body
+    body = case.body if body is None else body
     if asked := case.tables.get("friction"):
         return rv.friction(case.height(), body, **asked, **shared)
-    return rv.simulate(case.height(), body, case.program(), boundary="periodic", times=solving.times, **shared)
+    return rv.simulate(case.height(), body, case.program, boundary="periodic", times=solving.times, **shared)
 
 
 def test_run__gives_rows_over_the_axis(kind, done):
@@ -287,7 +287,7 @@ class Scaled(Kernel):
 
 def test_own_body__is_what_its_kernel_says(kind, done):
     """A kernel of twice the compliance is a material of half the moduli, and no half-space of the material."""
-    own = computed(done.case, rv.Body(done.case.material(), Scaled(2.0)))
+    own = computed(done.case, rv.Body(done.case.material, Scaled(2.0)))
     softer = computed(done.case, rv.zener(0.5e6, 0.25e6, 0.5e3))
     for name in ("contact_area", "approach", kind.curve):
         np.testing.assert_allclose(own[name], softer[name], rtol=1e-9)

@@ -12,8 +12,7 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.settings import Settings
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.study.si_tables import COLUMNS, TABLES
-from roughvisc.study.study_file import GEOMETRY, PROGRAMS, SEGMENTS, TEMPERATURE
+from roughvisc.study.study_file import COLUMNS, GEOMETRY, PROGRAMS, SEGMENTS, TABLES, TEMPERATURE
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.synthesis import RECIPES
 

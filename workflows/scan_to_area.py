@@ -20,7 +20,7 @@ STUDY = Path(__file__).with_suffix(".toml")
 def main(folder=STUDY.parent / "results" / STUDY.stem, changes=None):
     """Compute the cases and draw them; returns the figure."""
     cases = [rv.vary(case, changes or {}) for case in rv.read_cases(STUDY)]
-    poisson, compliance = cases[0].material().poisson, cases[0].material().contact_compliance
+    poisson, compliance = cases[0].material.poisson, cases[0].material.contact_compliance
     limits = {"glassy": 1 / float(compliance(0.0)), "rubbery": 1 / float(compliance(float("inf")))}
     elastic = {}
     for name, contact_modulus in limits.items():

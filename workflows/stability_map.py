@@ -24,10 +24,10 @@ FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "stability_map.png"
 def error_of(case):
     """Largest error of the force over its first value; NaN where the case is refused."""
     try:
-        ds = rv.simulate(case.height(), case.material(), case.program(), times=3, fields=(), progress=False)
+        ds = rv.simulate(case.height(), case.material, case.program, times=3, fields=(), progress=False)
     except rv.InputError:
         return np.nan
-    equilibrium, moduli, times = case.material().relaxation_spectrum()
+    equilibrium, moduli, times = case.material.relaxation_spectrum()
     exact = equilibrium + np.exp(-ds.time.values[:, None] / times) @ moduli
     error = float(np.max(np.abs(ds.force.values / float(ds.force[0]) - exact / exact[0])))
     return error if np.isfinite(error) else np.inf
@@ -59,7 +59,7 @@ def draw(error, largest):
 
 def main(figure=FIGURE, every=1):
     cases = rv.read_cases(STUDY)
-    points = [(case.program().duration, case.material().compliances[0] / case.material().glassy) for case in cases]
+    points = [(case.program.duration, case.material.compliances[0] / case.material.glassy) for case in cases]
     durations, ratios = (sorted(set(values))[::every] for values in zip(*points, strict=True))
     held = ("duration", durations, {"long_name": r"time held over retardation time, $T / \tau$"})
     ratio = ("ratio", ratios, {"long_name": r"early over late modulus, $G / G_K$"})

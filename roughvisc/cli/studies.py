@@ -149,7 +149,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
 
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
-        with reporting(True, label, console, case.at) as report:
+        with reporting(True, label, console, case.experiment.progress) as report:
             run_case(case, folder, progress=report, threads=threads or threads_each(1))
     else:
         say(console, "Already finished: nothing to compute")
@@ -170,7 +170,7 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
     """Add the observables of the study to the results; return what went wrong, empty if nothing."""
     from roughvisc.study.observed import observe
 
-    if not any(case.observed() for case in cases):
+    if not any(case.observed for case in cases):
         return ""
     with console.status("observing") as status:
         try:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import fft
@@ -214,10 +215,9 @@ def require_loading(
     require_memory(shape, needed, savings)
 
 
-def require_surface(shape: tuple[int, int]) -> None:
+def require_surface(shape: Any) -> None:
     """Refuse a surface that has too many cells, or cannot be made in the available memory. [cells]"""
-    counts("shape", shape)
-    require_memory(shape, lambda cells: 8.0 * _MADE * cells)
+    require_memory(counts("shape", shape), lambda cells: 8.0 * _MADE * cells)
 
 
 def require_memory(

@@ -134,7 +134,7 @@ def budgets(
     if not names:
         raise InputError(key="quantity", found=names, expected="at least one")
     observed = [quantity_of(case, name) for name in names]
-    axis = case.experiment().axis
+    axis = case.experiment.axis
     given = in_si(at, VARIABLES[axis].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     base = with_rows(case, [field for one in observed for field in one.fields], places)
@@ -160,7 +160,7 @@ def _own_result(case: Case, finished: Path, base: Case, places: list[float] | No
     """Return the finished result of the case at some places, if it has all that is needed."""
     if not set(base.settings.fields) <= set(case.settings.fields) or not is_result_of(case, finished):
         return None
-    whole, axis = open_result(finished), case.experiment().axis
+    whole, axis = open_result(finished), case.experiment.axis
     found = at_rows(whole, axis, places)
     if unconverged(whole) or (places is not None and not np.allclose(found[axis], places, rtol=1e-9, atol=0)):
         return None

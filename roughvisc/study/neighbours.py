@@ -111,7 +111,7 @@ def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = No
     They are not named among the values that vary, and so not in the title of the result.
     """
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
-    if places is not None and case.experiment().axis == "time":
+    if places is not None and case.experiment.axis == "time":
         changes["keep.times"] = sorted(set(places))
     return replace(vary(case, changes), varied=case.varied)
 
@@ -225,7 +225,7 @@ def sources_of(
         TIME_SCALE: {f"material.{key}": None for key in TEMPERATURE if key in material}
         | {"material.shift_factor": _CHANGE * base.shift_factor},
     }
-    at_once, later = (float(base.material().contact_compliance(t)) for t in (0.0, creep_time(base.experiment(), 1.0)))
+    at_once, later = (float(base.material.contact_compliance(t)) for t in (0.0, creep_time(base.experiment, 1.0)))
     for name, what in ((MODULUS, "moduli"), (TIME_SCALE, "times of the material")):
         key = f"{name.replace(' ', '_')}_error"
         if (error := known.get(key)) is not None:
@@ -340,7 +340,7 @@ def compared(
     """
     sources = sources_of(base, height, known, coarsening or 1.0)
     new = sources if before is None else {name: sources[name] for name in (STEPS, GRID)}
-    case, axis = on_cells(base, height, coarsening or 1.0), base.experiment().axis
+    case, axis = on_cells(base, height, coarsening or 1.0), base.experiment.axis
     near = [one.case for source in new.values() for one in source.neighbours]
     results = solved(near if own is not None else [case, *near])
     if before is not None:

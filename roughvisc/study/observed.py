@@ -59,7 +59,7 @@ def observe(
         If a quantity cannot be computed from a result; its file is not changed.
     """
     cases = read_cases(cases) if isinstance(cases, str | Path) else cases
-    distinct = {case.key: case for case in cases if case.observed()}
+    distinct = {case.key: case for case in cases if case.observed}
     folder = result_folder(cases[0], out, to_write=False).absolute()
     added = []
     for number, case in enumerate(distinct.values()):
@@ -101,4 +101,4 @@ def _add(case: Case, path: Path) -> bool:
 def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
     """Return the observables that a result does not have, or has for other values."""
     before = json.loads(result.attrs.get(OBSERVED, "{}"))
-    return {name: values for name, values in case.observed().items() if before.get(name) != values}
+    return {name: values for name, values in case.observed.items() if before.get(name) != values}

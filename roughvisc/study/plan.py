@@ -265,8 +265,8 @@ class _Setups:
         if isinstance(found, InputError):
             raise found
         height, slope = found
-        area, body = nominal_area(height), case.body()
-        experiment = case.experiment()
+        area, body = nominal_area(height), case.body
+        experiment = case.experiment
         if isinstance(experiment, Loading):
             experiment = Loading(experiment.program.on_area(area))
         problem = Problem(height, body, case.settings).with_known_boundary(experiment.boundary)
@@ -286,7 +286,7 @@ class _Setups:
         options = memory_options(program, case.settings)
         name = f"{case.tables['material']} {options!r}"
         if name not in self._choices:
-            self._choices[name] = choose_memory(case.body(), **options)
+            self._choices[name] = choose_memory(case.body, **options)
         return self._choices[name]
 
     def seconds(self, height: xr.DataArray, problem: Problem, contact: float) -> float:
@@ -613,7 +613,7 @@ def _planned(
             "exponentials": history.times.size,
             "scheme": _scheme(settings.time_step, history.times.size, cells),
             "steps": steps,
-            "program_note": case.program().note,
+            "program_note": case.program.note,
         }
     else:
         row |= {"memory_model": "steady sliding", "speeds": rows}
@@ -701,10 +701,10 @@ def _scheme(time_step: Any, exponentials: int, slid: int) -> str:
 
 def _late_times(case: Case) -> str:
     """Return the listed times after the end of the program, in words."""
-    late = case.late_times()
+    late = case.late_times
     if not late:
         return ""
-    unit, end = unit_for(late, "s"), case.program().duration
+    unit, end = unit_for(late, "s"), case.program.duration
     texts = ", ".join(unit.text(time) for time in late)
     return f"{texts} left out: the program ends at {unit_for([end], 's').text(end)}"
 

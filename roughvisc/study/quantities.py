@@ -50,7 +50,7 @@ class Observable:
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
         """Return its values in a result of a case, over the axis."""
-        found = result[self.name] if self.derive is None else self.derive(result, case.observed())
+        found = result[self.name] if self.derive is None else self.derive(result, case.observed)
         return np.asarray(found.values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
@@ -88,7 +88,7 @@ def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
 
 def _incremental_stiffness(result: xr.Dataset) -> xr.DataArray:
     """Stiffness against a fast increment of load, with the instantaneous modulus."""
-    body = Case.of_result(result).body()
+    body = Case.of_result(result).body
     compliance = float(body.material.contact_compliance(0.0))
     if compliance == 0:
         expected = "a material with an instantaneous compliance"
@@ -125,7 +125,7 @@ QUANTITIES = {
 
 def quantities_of(case: Case) -> list[str]:
     """Return the names of the quantities that the results of a case have."""
-    experiment = case.experiment()
+    experiment = case.experiment
     slides = not isinstance(experiment, Loading) or bool(experiment.program.slides)
     return [name for name in QUANTITIES if slides or name != "friction_coefficient"]
 

@@ -1,14 +1,17 @@
 """Parts of a case from the tables of a study file: surface, body, experiment and settings.
 
-A table contains the arguments of one function, which checks them; see :mod:`roughvisc.arguments`. All tables here are
-in SI, as :func:`roughvisc.study.si_tables.si_tables` returns them.
+A table contains the arguments of one function, which checks them; see :mod:`roughvisc.arguments`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from roughvisc.arguments import a_table, call, check, located, one_key, one_of, refuse_unknown, split
 from roughvisc.errors import InputError
@@ -25,14 +28,17 @@ from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.audit.given import AuditInputs
-from roughvisc.topography.scans import surface_boundary
-from roughvisc.units import number
+from roughvisc.study.machine_history import read_history
+from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
+from roughvisc.topography.scans import check_surface, surface_boundary
+from roughvisc.units import number, quantity
 
-#: Keys of a temperature, which every model has.
+#: Tables of a study, without its sweep.
+TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep", "observe", "audit")
+#: Keys of a temperature, which every model has, and of a body that is not a half-space.
 TEMPERATURE = ("temperature", "reference_temperature", "wlf_c1", "wlf_c2", "activation_energy", "shift_factor")
-#: Keys of a body that is not a half-space.
 GEOMETRY = ("thickness", "base", "on")
-#: Method of each segment of a program, by the key of its first argument.
+#: Method of each segment of a program, by the key of its first argument; and functions that make programs from a table.
 SEGMENTS: dict[str, Callable[..., Program]] = {
     "load": Program.load,
     "pressure": Program.pressure,
@@ -40,24 +46,226 @@ SEGMENTS: dict[str, Callable[..., Program]] = {
     "hold": Program.hold,
     "slide": Program.slide,
 }
-#: Functions that make a part of a program from a table.
 PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": Program.table}
-#: Settings in the table ``[keep]``. ``missing`` is in ``[surface]``, any other one in ``[solve]``.
-KEPT = ("fields", "times")
+#: Table of each setting, and of the precision of the fields in a file.
+TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
+TABLE_OF |= dict.fromkeys(("fields", "times", "precision"), "keep")
 #: Fields of which an observable needs one.
 _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
+#: Largest number of speeds between two ends.
+_MOST_SPEEDS = 1000
 #: Part of its duration by which a kept time may exceed a program.
 _ROUNDING = 1e-12
 
 
-def cells(shape: Any) -> tuple[int, int]:
-    """Return the numbers of cells along x and y, of which a table may state one for both."""
-    both: Any = shape.get("shape") if isinstance(shape, Mapping) else shape
-    return (int(both[0]), int(both[1])) if isinstance(both, list | tuple) else (int(both), int(both))
+class Column(NamedTuple):
+    """Column of a CSV file that states an argument of a material.
+
+    Attributes
+    ----------
+    heading, unit : str
+        Name in the heading, and unit in SI; without one, `unit_key` states the unit of the argument, too.
+    unit_key : str
+        Key of the unit of the column, if the heading does not state it.
+    """
+
+    heading: str
+    unit: str
+    unit_key: str
+
+
+#: Columns of each model that a CSV file may state.
+COLUMNS: dict[str, dict[str, Column]] = {
+    "creep_table": {
+        "times": Column("time", "s", "time_unit"),
+        "compliances": Column("compliance", "1/Pa", "compliance_unit"),
+    },
+    "relaxation_table": {
+        "times": Column("time", "s", "time_unit"),
+        "moduli": Column("modulus", "Pa", "modulus_unit"),
+    },
+    "dynamic_table": {
+        "frequencies": Column("frequency", "", "frequency_unit"),
+        "storage": Column("storage", "Pa", "modulus_unit"),
+        "loss": Column("loss", "Pa", "modulus_unit"),
+        "shift_factors": Column("shift_factor", "1", ""),
+    },
+}
+
+# ----------------------------------------------------------------------------------------------------------------
+# files
+
+
+def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the tables of a study, independent of its folder and of the files of its material and program.
+
+    Parameters
+    ----------
+    data : mapping
+        Tables of the TOML file.
+    folder : Path or None
+        Folder of relative paths. Without one, paths are kept and not checked.
+
+    Returns
+    -------
+    dict
+        The tables with absolute paths of scans, the content of CSV files, and the speeds of a friction curve in order.
+    """
+    refuse_unknown("", data, TABLES)
+    for name in ("surface", "material"):
+        if name not in data:
+            raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
+    tables, surface = dict(data), a_table("surface", data["surface"])
+    if "second" in surface:
+        surface["second"] = a_table("surface.second", surface["second"])
+    for where, face in (("surface", surface), ("surface.second", surface.get("second", {}))):
+        if "file" in face:
+            face["file"] = existing_file(f"{where}.file", face["file"], folder)
+    tables |= {"surface": surface, "material": with_columns("material", data["material"], folder)}
+    if isinstance(data.get("program"), list):
+        segments = enumerate(data["program"])
+        tables["program"] = [with_rows(f"program.{place}", segment, folder) for place, segment in segments]
+    if isinstance(friction := data.get("friction"), Mapping) and "speeds" in friction:
+        tables["friction"] = {**friction, "speeds": speeds_of("friction.speeds", friction["speeds"])}
+    return tables
+
+
+def existing_file(where: str, file: Any, folder: Path | None) -> str:
+    """Return the absolute path of a file that a study names relative to its folder."""
+    if not isinstance(file, str | Path) or not str(file):
+        raise InputError(key=where, found=file, expected="the path of a file")
+    if folder is None:  # a stored case, whose file may have been moved
+        return str(file)
+    path = (folder / Path(file).expanduser()).resolve()
+    if not path.is_file():
+        problem = "is a folder" if path.is_dir() else "does not exist"
+        expected = f"a file ({path})"
+        message = f"{where}: found {str(file)!r}, which {problem}: expected {expected}"
+        raise InputError(message, key=where, found=file, expected=expected)
+    return str(path)
+
+
+@contextmanager
+def _in_file(key: str, file: Any) -> Iterator[None]:
+    """Attribute errors in a file to the key that names the file."""
+    try:
+        yield
+    except InputError as error:
+        problem = str(error) if str(file) in str(error) else f"{file}: {error}"
+        if error.key.isidentifier():  # of an argument
+            raise located(error, key) from error
+        raise located(InputError(problem, found=file, expected=error.expected), key) from error
+
+
+def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
+    """Return a table of a material with the columns of its CSV file, without the name of the file."""
+    table = a_table(where, stated)
+    table |= {key: with_columns(f"{where}.{key}", table[key], folder) for key in ("a", "b", "on") if key in table}
+    columns = COLUMNS.get(str(table.get("model")), {})
+    units, rest = split(table, *(one.unit_key for one in columns.values() if one.unit_key != "frequency_unit"))
+    file = rest.pop("file", None) if columns else None
+    for key, unit in units.items():
+        if file is None or not isinstance(unit, str):
+            expected = "no unit of a column without a file" if file is None else "a unit"
+            raise InputError(key=f"{where}.{key}", found=unit, expected=expected)
+    if file is None:
+        return table
+    for key in columns:
+        if key in table:
+            raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
+    if "frequencies" in columns:
+        one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
+    wanted = {
+        key: Wanted(one.heading, one.unit or table["frequency_unit"], units.get(one.unit_key), not one.unit_key)
+        for key, one in columns.items()
+    }
+    path = existing_file(f"{where}.file", file, folder)
+    with _in_file(f"{where}.file", file):
+        found, _ = read_table(path, wanted)
+    return rest | {key: values.tolist() for key, values in found.items()}
+
+
+def with_rows(where: str, stated: Any, folder: Path | None) -> Any:
+    """Return a segment of a program with the rows of its file, without the name of the file."""
+    table = stated.get("table") if isinstance(stated, Mapping) else None
+    if not isinstance(table, str) and not (isinstance(table, Mapping) and "file" in table):
+        return stated
+    columns = {"file": table, "thin": 0} if isinstance(table, str) else dict(table)
+    control = one_of(f"{where}.control", stated.get("control", "load"), UNITS)
+    where, file = f"{where}.table", columns.pop("file")
+    path = existing_file(where if isinstance(table, str) else f"{where}.file", file, folder)
+    if "control" in stated or not columns.keys() & UNITS:
+        columns.setdefault(control, control)
+    with _in_file(where, file):
+        history = call(read_history, "", columns, path)
+        Program.table(history.times, history.values, history.control)
+    rows = {"times": history.times, "values": history.values, "note": history.note}
+    return {**stated, "table": rows, "control": history.control}
+
+
+def speeds_of(where: str, stated: Any) -> list[float]:
+    """Return speeds in increasing order: one, a list, or a number of speeds between two ends. [m/s]"""
+    if not isinstance(stated, Mapping):
+        listed = stated if isinstance(stated, list) else [stated]
+        return sorted({quantity(one, "m/s", where) for one in listed})
+    table = dict(stated)
+    refuse_unknown(where, table, ("from", "to", "count"))
+    for key in ("from", "to", "count"):
+        if key not in table:
+            raise InputError(f"{where}.{key}: missing: expected from, to and count", key=f"{where}.{key}")
+    first, last = (number(table[key], "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
+    count = table["count"]
+    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= _MOST_SPEEDS:
+        raise InputError(key=f"{where}.count", found=count, expected=f"a whole number from 2 to {_MOST_SPEEDS}")
+    if not first < last:
+        raise InputError(key=f"{where}.from", found=table["from"], expected=f"a speed below {last:g} m/s")
+    return [float(f"{speed:.12g}") for speed in np.geomspace(first, last, count)]
 
 
 # ----------------------------------------------------------------------------------------------------------------
-# body
+# parts
+
+
+def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a case, by the names of its fields; check everything that can be checked without heights.
+
+    Parameters
+    ----------
+    tables : mapping
+        As :func:`with_files` returns them, in SI.
+    """
+    title = tables.get("title", "untitled")
+    if not isinstance(title, str) or not title.strip():
+        raise InputError(key="title", found=title, expected="a text")
+    check_surface(tables["surface"])
+    body, experiment = body_of(tables["material"]), experiment_of(tables)
+    settings, late_times = settings_of(tables, experiment)
+    precision = tables.get("keep", {}).get("precision")
+    if precision is not None:
+        precision = number(precision, "1", "keep.precision", above=0, below=1)
+    check_observed(a_table("observe", tables.get("observe", {})), settings)
+    audit = call(AuditInputs, "audit", a_table("audit", tables.get("audit", {})))
+    if audit.base is not None and audit.thickness is None:
+        raise InputError(key="audit.base", found=audit.base, expected="a thickness, too")
+    return {
+        "title": title,
+        "body": body,
+        "experiment": experiment,
+        "settings": settings,
+        "late_times": late_times,
+        "precision": precision,
+        "audit_inputs": audit.stated(),
+    }
+
+
+def body_of(table: Mapping[str, Any], where: str = "material") -> Body:
+    """Return a half-space of the material of a table, a sheet, or a layer on the body of its table ``on``."""
+    geometry, rest = split(table, *GEOMETRY)
+    material = material_of(rest, where)
+    if "on" in geometry:
+        below = body_of(a_table(f"{where}.on", geometry["on"]), f"{where}.on")
+        return call(layer, where, geometry | {"on": below}, material)
+    return call(sheet, where, geometry, material) if geometry else Body(material)
 
 
 def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
@@ -71,86 +279,29 @@ def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     material = call(MODELS[model], where, arguments)
     factor = shift_factor(thermal, where)
     material = material if factor == 1 else shift(material, factor)
-    if scaling.get("modulus_factor", 1.0) == 1:
+    if scaling.get("modulus_factor", 1) == 1:
         return material
-    try:
-        return stiffened(material, scaling["modulus_factor"])
-    except InputError as error:
-        raise located(error, where) from error
+    return stiffened(material, number(scaling["modulus_factor"], "1", f"{where}.modulus_factor", above=0))
 
 
 def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
     """Return the factor of all times of a material at its temperature; one if none is stated."""
-    stated, _ = split(table, *TEMPERATURE)
+    stated = split(table, *TEMPERATURE)[0]
     if not stated:
         return 1.0
-    if "shift_factor" in stated:
-        key, factor = "shift_factor", stated["shift_factor"]
-        if other := next((one for one in stated if one != key), ""):
-            raise InputError(key=f"{where}.{key}", found=factor, expected=f"either this or {other}")
+    key = "shift_factor" if "shift_factor" in stated else "temperature"
+    if key == "temperature":
+        is_thermal = "activation_energy" in stated and not {"wlf_c1", "wlf_c2"} & stated.keys()
+        factor = call(arrhenius if is_thermal else wlf, where, stated)
+    elif len(stated) == 1:
+        factor = number(stated[key], "1", f"{where}.{key}")
     else:
-        key = "temperature"
-        if "activation_energy" in stated and not {"wlf_c1", "wlf_c2"} & stated.keys():
-            factor = call(arrhenius, where, stated)
-        else:
-            factor = call(_wlf, where, stated)
-    if not (isinstance(factor, int | float) and 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT):
+        other = next(one for one in stated if one != key)
+        raise InputError(key=f"{where}.{key}", found=stated[key], expected=f"either this or {other}")
+    if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
         expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
         raise InputError(key=f"{where}.{key}", found=stated[key], expected=expected)
-    return float(factor)
-
-
-def _wlf(temperature: float, reference_temperature: float, wlf_c1: float, wlf_c2: float) -> float:
-    """Return :func:`roughvisc.wlf` with the constants under the names that they have in a study."""
-    try:
-        return wlf(temperature, reference_temperature, wlf_c1, wlf_c2)
-    except InputError as error:
-        key = f"wlf_{error.key}" if error.key in ("c1", "c2") else error.key
-        raise InputError(key=key, found=error.found, expected=error.expected) from error
-
-
-def body_of(table: Mapping[str, Any], where: str = "material") -> Body:
-    """Return a half-space of the material of a table, a sheet, or a layer on the body of its table ``on``."""
-    geometry, rest = split(table, *GEOMETRY)
-    material = material_of(rest, where)
-    if "on" in geometry:
-        below = body_of(a_table(f"{where}.on", geometry["on"]), f"{where}.on")
-        return call(layer, where, geometry | {"on": below}, material)
-    return call(sheet, where, geometry, material) if geometry else Body(material)
-
-
-# ----------------------------------------------------------------------------------------------------------------
-# experiment
-
-
-def program_of(segments: Any) -> Program:
-    """Return the program of the tables ``[[program]]``."""
-    if not isinstance(segments, list) or not segments:
-        raise InputError(key="program", found=segments, expected="a list of [[program]] tables, at least one")
-    program = Program()
-    for place, stated in enumerate(segments):
-        program = _extended(program, f"program.{place}", a_table(f"program.{place}", stated))
-    return program
-
-
-def _extended(program: Program, where: str, table: dict[str, Any]) -> Program:
-    """Return a program with one more segment, cycle or table."""
-    kind = one_key(where, table, (*SEGMENTS, *PROGRAMS))
-    value = table.pop(kind)
-    if kind in SEGMENTS:
-        return call(SEGMENTS[kind], where, table, program, value)
-    refuse_unknown(where, table, ("control",))
-    control = one_of(f"{where}.control", table.get("control", "load"), UNITS)
-    where = f"{where}.{kind}"
-    arguments = a_table(where, value)
-    if "control" in arguments:
-        raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"this key next to {kind}")
-    added = call(PROGRAMS[kind], where, arguments | {"control": control})
-    before = program.segments[-1] if program.segments else None
-    if kind == "table" and before and arguments["values"][0] == 0 and (before.control, before.end) != (control, 0.0):
-        # a table that begins at zero after something else begins with a jump to zero
-        added = getattr(Program(), control)(0.0, over=0.0) + added
-    return program + added
+    return factor
 
 
 def experiment_of(tables: Mapping[str, Any]) -> Experiment:
@@ -165,76 +316,68 @@ def experiment_of(tables: Mapping[str, Any]) -> Experiment:
     return call(SteadySliding, "friction", a_table("friction", tables["friction"]))
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# settings, observables, audit
+def program_of(segments: Any) -> Program:
+    """Return the program of the tables ``[[program]]``."""
+    if not isinstance(segments, list) or not segments:
+        raise InputError(key="program", found=segments, expected="a list of [[program]] tables, at least one")
+    program = Program()
+    for place, stated in enumerate(segments):
+        where = f"program.{place}"
+        table = a_table(where, stated)
+        kind = one_key(where, table, (*SEGMENTS, *PROGRAMS))
+        value = table.pop(kind)
+        if kind in SEGMENTS:
+            program = call(SEGMENTS[kind], where, table, program, value)
+            continue
+        refuse_unknown(where, table, ("control",))
+        control = one_of(f"{where}.control", table.get("control", "load"), UNITS)
+        where = f"{where}.{kind}"
+        arguments = a_table(where, value)
+        if "control" in arguments:
+            raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"this key next to {kind}")
+        added = call(PROGRAMS[kind], where, arguments | {"control": control})
+        begins_at_zero = kind == "table" and number(arguments["values"][0], UNITS[control]) == 0
+        if begins_at_zero and any((one.control, one.end) != (control, 0.0) for one in program.segments[-1:]):
+            program = getattr(program, control)(0.0, over=0.0)
+        program += added
+    return program
 
 
-def table_of(setting: str) -> str:
-    """Return the table of a study that a setting is in."""
-    return "keep" if setting in KEPT else "surface" if setting == "missing" else "solve"
+def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Settings, tuple[float, ...]]:
+    """Return the settings of a case, and the listed times after the end of the program, which are not kept. [s]
 
-
-def stated_settings(tables: Mapping[str, Any]) -> Settings:
-    """Return the settings that the tables ``[solve]``, ``[keep]`` and ``[surface]`` state."""
-    names: dict[str, list[str]] = {"solve": [], "keep": ["precision"], "surface": []}
-    for one in fields(Settings):
-        names[table_of(one.name)].append(one.name)
-    stated = split(tables["surface"], *names["surface"])[0]
+    The settings have the boundary that ``auto`` resolves to.
+    """
+    stated = split(tables["surface"], "missing")[0]
     for table in ("solve", "keep"):
         here = a_table(table, tables.get(table, {}))
-        refuse_unknown(table, here, names[table])
-        stated |= split(here, *names[table])[0]
+        refuse_unknown(table, here, [name for name, one in TABLE_OF.items() if one == table])
+        stated |= here
     stated.pop("precision", None)
     if stated.get("times") == "all":
         del stated["times"]
     try:
-        return call(Settings, "", stated)
+        settings = call(Settings, "", stated)
     except InputError as error:
-        raise located(error, table_of(error.key.partition(".")[0])) from error
-
-
-def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
-    """Return the settings of a case, with the boundary that ``auto`` resolves to and the times of the program."""
-    settings = stated_settings(tables)
+        raise located(error, TABLE_OF[error.key.partition(".")[0]]) from error
     boundary = known_boundary(settings, experiment.boundary, lambda: surface_boundary(tables["surface"]))
     if boundary is None:
         raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
-    settings = replace(settings, boundary=boundary)
-    if late := late_times(settings, experiment):
-        times: Any = settings.times
-        if late == times:
+    times, late = settings.times, ()
+    if isinstance(experiment, Loading) and isinstance(times, tuple):
+        end = experiment.program.duration * (1 + _ROUNDING)
+        late, times = (tuple(time for time in times if (time > end) is is_late) for is_late in (True, False))
+        if late and not times:
             raise InputError(key="keep.times", found=list(late), expected="a time up to the end of the program")
-        settings = replace(settings, times=times[: -len(late)])
+    settings = replace(settings, boundary=boundary, times=times)
     for name, value, why in experiment.unsupported(settings):
-        key = f"{table_of(name)}.{name}"
+        key = f"{TABLE_OF[name]}.{name}"
         raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)
-    return settings
+    return settings, late
 
 
-def late_times(settings: Settings, experiment: Experiment) -> tuple[float, ...]:
-    """Return the listed times after the end of the program, which are not kept. [s]"""
-    if not isinstance(experiment, Loading) or not isinstance(settings.times, tuple):
-        return ()
-    end = experiment.program.duration * (1 + _ROUNDING)
-    return tuple(time for time in settings.times if time > end)
-
-
-def precision_of(tables: Mapping[str, Any]) -> float | None:
-    """Return the relative precision of the fields in a file; None if they are exact."""
-    if "precision" not in tables.get("keep", {}):
-        return None
-    return number(tables["keep"]["precision"], "1", "keep.precision", above=0, below=1)
-
-
-def observed(tables: Mapping[str, Any], settings: Settings) -> dict[str, dict[str, Any]]:
-    """Return the arguments of each observable of the table ``[observe]``.
-
-    Raises
-    ------
-    InputError
-        If an observable or an argument is wrong, or the settings keep no field that it needs.
-    """
-    asked = a_table("observe", tables.get("observe", {}))
+def check_observed(asked: Mapping[str, Any], settings: Settings) -> None:
+    """Check the arguments of each observable of the table ``[observe]``, and that its fields are kept."""
     refuse_unknown("observe", asked, OBSERVABLES)
     for name, stated in asked.items():
         where, arguments = f"observe.{name}", a_table(f"observe.{name}", stated)
@@ -245,12 +388,3 @@ def observed(tables: Mapping[str, Any], settings: Settings) -> dict[str, dict[st
         if arguments.get("sides") == "periodic" and settings.boundary != "periodic":
             expected = f"'closed', since the boundary is {settings.boundary!r}"
             raise InputError(key=f"{where}.sides", found="periodic", expected=expected)
-    return asked
-
-
-def audit_inputs(tables: Mapping[str, Any]) -> AuditInputs:
-    """Return the quantities of the table ``[audit]``."""
-    stated = call(AuditInputs, "audit", a_table("audit", tables.get("audit", {})))
-    if stated.base is not None and stated.thickness is None:
-        raise InputError(key="audit.base", found=stated.base, expected="a thickness, too")
-    return stated

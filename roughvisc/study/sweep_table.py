@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 import math
 import os
@@ -11,7 +10,7 @@ from glob import glob
 from pathlib import Path
 from typing import Any
 
-from roughvisc.arguments import a_table
+from roughvisc.arguments import a_table, dotted
 from roughvisc.errors import InputError, short_repr
 from roughvisc.topography.scans import is_card, read_toml
 
@@ -25,7 +24,7 @@ SURROGATE, _SEED, _SECOND_SEED = DRAWN = ("surface.realisation", "surface.seed",
 MOST, MOST_CASES = 10_000, 100_000
 
 
-def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], int | None]]:
+def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], dict[str, int]]]:
     """Return the changes of a study that make each of its cases.
 
     Parameters
@@ -39,20 +38,24 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
 
     Returns
     -------
-    list of (dict, int or None)
+    list of (dict, dict)
         Dotted key -> value, and the number of the realisation of a case that is one.
 
     Raises
     ------
     InputError
-        If the tables are not lists of values, a pattern matches no file, there are too many cases, or the surface has
-        no realisations.
+        If the tables are not lists of values, a pattern matches no file, there are too many cases, a key changes no
+        result, or the surface has no realisations.
     """
-    tables = [_with_files(table, folder) for table in sweep] if isinstance(sweep, list) else _with_files(sweep, folder)
-    found: list[tuple[dict[str, Any], int | None]] = []
-    for change in expand(tables):
-        drawn = _realisations(change, data, folder) if REALISATIONS in change else [(change, None)]
-        found += drawn
+    found: list[tuple[dict[str, Any], dict[str, int]]] = []
+    named = [_with_files(one, folder) for one in sweep] if isinstance(sweep, list) else _with_files(sweep, folder)
+    for change in expand(named):
+        for key in change:
+            if key.partition(".")[0] in ("observe", "audit"):
+                expected = "a value in its own table, since it changes no result"
+                raise InputError(key=key, found=change[key], expected=expected)
+        count = change.pop(REALISATIONS, None)
+        found += [(change, {})] if count is None else _realisations(change, count, data, folder)
         if len(found) > MOST_CASES:
             raise InputError(key="sweep", found=f"{len(found)} cases", expected=f"at most {MOST_CASES}")
     return found
@@ -75,7 +78,15 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
     [{'a': 1, 'b': 3}, {'a': 2, 'b': 4}, {'a': 5}]
     """
     if isinstance(sweep, list) and all(isinstance(table, Mapping) and table for table in sweep):
-        return [change for number, table in enumerate(sweep) for change in _entry_by_entry(number, dict(_flat(table)))]
+        found = []
+        for number, table in enumerate(sweep):
+            stated = dict(_flat(table))
+            lengths = {key: len(values) for key, values in stated.items() if isinstance(values, list)}
+            if len(set(lengths.values())) > 1 or 0 in lengths.values():
+                raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
+            for entry in range(min(max(lengths.values(), default=1), MOST_CASES + 1)):
+                found.append({key: one[entry] if isinstance(one, list) else one for key, one in stated.items()})
+        return found
     if not isinstance(sweep, Mapping):
         raise InputError(key="sweep", found=sweep, expected="a table of lists, or [[sweep]] tables")
     lists = {key: [value] if key == REALISATIONS else value for key, value in _flat(sweep)}
@@ -85,16 +96,6 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
     if (count := math.prod(map(len, lists.values()))) > MOST_CASES:
         raise InputError(key="sweep", found=f"{count} cases", expected=f"at most {MOST_CASES}")
     return [dict(zip(lists, chosen, strict=True)) for chosen in itertools.product(*lists.values())]
-
-
-def _entry_by_entry(number: int, table: Mapping[str, Any]) -> list[dict[str, Any]]:
-    lengths = {key: len(values) for key, values in table.items() if isinstance(values, list)}
-    if len(set(lengths.values())) > 1 or 0 in lengths.values():
-        raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
-    count = next(iter(lengths.values()), 1)
-    if count > MOST_CASES:
-        raise InputError(key=f"sweep.{number}", found=f"{count} cases", expected=f"at most {MOST_CASES}")
-    return [{key: v[entry] if isinstance(v, list) else v for key, v in table.items()} for entry in range(count)]
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -107,81 +108,92 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
 
 
 def _with_files(table: Any, folder: Path) -> Any:
-    """Return a table of a sweep with the names of files for patterns such as ``"scans/*.sur"``."""
+    """Return a table of a sweep with the names of files, sorted, for each pattern such as ``"scans/*.sur"``.
+
+    The name of an existing file is no pattern.
+    """
     if not isinstance(table, Mapping):
         return table
-    return {
-        key: _matching(key, value, folder) if key.rpartition(".")[2] == "file" else value for key, value in _flat(table)
-    }
+    named = dict(_flat(table))
+    for key, value in named.items():
+        found: list[Any] = []
+        for one in value if isinstance(value, list) else [value]:
+            is_pattern = isinstance(one, str) and set("*?[") & set(one) and not (folder / one).exists()
+            if key.rpartition(".")[2] != "file" or not is_pattern:
+                found.append(one)
+                continue
+            pattern = os.path.expanduser(one)
+            matches = [name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file()]
+            if not matches:
+                where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
+                raise InputError(key=f"sweep.{key}", found=one, expected=f"a pattern that matches a file{where}")
+            found += sorted(matches)
+        named[key] = value if found == [value] else found
+    return named
 
 
-def _matching(key: str, value: Any, folder: Path) -> Any:
-    """Return names of files, sorted, for each pattern; the name of an existing file is kept."""
-    stated = value if isinstance(value, list) else [value]
-    found: list[Any] = []
-    for one in stated:
-        if not isinstance(one, str) or not set("*?[") & set(one) or (folder / one).exists():
-            found.append(one)
-            continue
-        pattern = os.path.expanduser(one)
-        matches = sorted(name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file())
-        if not matches:
-            where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
-            raise InputError(key=f"sweep.{key}", found=one, expected=f"a pattern that matches a file{where}")
-        found += matches
-    return value if found == stated else found
+def _realisations(
+    change: Mapping[str, Any], count: Any, data: Mapping[str, Any], folder: Path
+) -> list[tuple[dict[str, Any], dict[str, int]]]:
+    """Return the changes that make each realisation of a case, and its number.
 
-
-def _realisations(change: Mapping[str, Any], data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], int]]:
-    """Return the changes that make each realisation of a case, and its number."""
-    where, count = f"sweep.{REALISATIONS}", change[REALISATIONS]
-    rest = {key: value for key, value in change.items() if key != REALISATIONS}
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
-        raise InputError(key=where, found=count, expected=f"a whole number from 2 to {MOST}")
-    for key, value in rest.items():
+    Realisation 0 of a scan is the scan itself, the others are its surrogates. Those of generated faces have seeds from
+    the stated ones.
+    """
+    for key, value in change.items():
         data = place(data, key, value) if key.partition(".")[0] == "surface" else data
     surface = a_table("surface", data.get("surface"))
     second = a_table("surface.second", surface.get("second", {}))
-    if stated := [key for key in DRAWN if key in rest] + [SURROGATE] * ("realisation" in surface):
-        raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
-    if "file" in surface or "file" in second:
-        made = _card_recipe(surface.get("file"), folder)
-        if made not in (None, "self_affine"):
-            raise InputError(key=where, found=f"a card of generate = {made!r}", expected="a scan, or roughness")
-        return [(rest | ({SURROGATE: number} if number != ITSELF else {}), number) for number in range(count + 1)]
-    seeds = _seeds({_SEED: surface, _SECOND_SEED: second}, count)
-    numbers = range(1, count + 1)
-    return [(rest | {key: seed + number - 1 for key, seed in seeds.items()}, number) for number in numbers]
+    is_scan = "file" in surface or "file" in second
+    stated = [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface)
+    rough = {
+        key: face
+        for key, face in ((_SEED, surface), (_SECOND_SEED, second))
+        if not is_scan and face.get("generate") == "self_affine"
+    }
+    seeds = {key: face.get("seed") for key, face in rough.items()}
+    found, expected = count, ""
+    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
+        expected = f"a whole number from 2 to {MOST}"
+    elif stated:
+        expected = f"either realisations or {stated[0]}"
+    elif is_scan:
+        card = Path(folder, Path(str(surface.get("file"))).expanduser())
+        if is_card(card, None) and card.is_file():
+            found = read_toml(card, "a surface card in TOML").get("generate")
+            expected = "" if found in (None, "self_affine") else "a scan, or a card of roughness"
+    elif not rough:
+        found, expected = f"generate = {surface.get('generate')!r}", "a scan, or generate = 'self_affine'"
+    elif not all(isinstance(seed, int) for seed in seeds.values()):
+        found, expected = list(seeds.values()), f"a whole number as {' and '.join(seeds)}"
+    elif not all("amplitudes" in face for face in rough.values()):
+        expected = "amplitudes, 'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
+    elif 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
+        found, expected = list(seeds.values()), f"seeds of the two faces that are equal, or at least {count} apart"
+    if expected:
+        raise InputError(key=f"sweep.{REALISATIONS}", found=found, expected=expected)
+    if is_scan:
+        surrogates = [(number, {SURROGATE: number} if number != ITSELF else {}) for number in range(count + 1)]
+        return [({**change, **drawn}, {REALISATION: number}) for number, drawn in surrogates]
+    return [
+        ({**change, **{key: seed + number - 1 for key, seed in seeds.items()}}, {REALISATION: number})
+        for number in range(1, count + 1)
+    ]
 
 
-def _seeds(faces: Mapping[str, Mapping[str, Any]], count: int) -> dict[str, int]:
-    """Return the first seed of each generated rough face, by its key."""
-    where = f"sweep.{REALISATIONS}"
-    rough = {key: face for key, face in faces.items() if face.get("generate") == "self_affine"}
-    if not rough:
-        made = faces[_SEED].get("generate")
-        raise InputError(key=where, found=f"generate = {made!r}", expected="a scan, or generate = 'self_affine'")
-    seeds: dict[str, Any] = {key: face.get("seed") for key, face in rough.items()}
-    for key, face in rough.items():
-        if not isinstance(seeds[key], int):
-            raise InputError(key=where, found=seeds[key], expected=f"a whole number as {key}")
-        if "amplitudes" not in face:
-            kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
-            raise InputError(key=where, found=count, expected=f"{key.removesuffix('seed')}amplitudes, {kinds}")
-    if 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
-        expected = f"seeds of the two faces that are equal, or at least {count} apart"
-        raise InputError(key=where, found=list(seeds.values()), expected=expected)
-    return seeds
-
-
-def _card_recipe(file: Any, folder: Path) -> Any:
-    """Return the recipe that a surface card contains; None if the file is no card."""
-    path = Path(folder, Path(str(file)).expanduser())
-    return read_toml(path, "a surface card in TOML").get("generate") if is_card(path, None) and path.is_file() else None
-
-
-def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
+def place(tables: Any, key: str, value: Any, above: str = "") -> Any:
     """Return a copy of nested tables with another value at a dotted key; None removes the key.
+
+    Parameters
+    ----------
+    tables : dict or list
+        The tables.
+    key : str
+        Dotted key in these tables.
+    value : object
+        The new value.
+    above : str
+        Dotted key of the tables, for messages.
 
     Raises
     ------
@@ -193,26 +205,24 @@ def place(data: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     >>> place({"program": [{"load": 1}]}, "program.0.load", 2)
     {'program': [{'load': 2}]}
     """
-    changed = copy.deepcopy(dict(data))
-    here: Any = changed
-    *above, last = key.split(".")
-    for depth, part in enumerate([*above, last]):
-        named = ".".join(above[:depth])
-        if isinstance(here, list):
-            if not part.isdecimal() or int(part) >= len(here):
-                message = f"{key}: found {part!r}: {named} has entries 0 to {len(here) - 1}"
-                raise InputError(message, key=key, found=value, expected=f"an entry of {named}")
-        elif not isinstance(here, dict):
-            message = f"{key}: {named} is {short_repr(here)}, which has no keys"
-            raise InputError(message, key=key, found=value, expected=f"a table {named}")
-        if depth < len(above):
-            here = here[int(part)] if isinstance(here, list) else here.setdefault(part, {})
-    if isinstance(here, list):
-        here[int(last)] = value
-    elif value is None:
-        here.pop(last, None)
+    part, _, below = key.partition(".")
+    whole = dotted(above, key)
+    at: Any = part
+    if isinstance(tables, list):
+        if not part.isdecimal() or int(part) >= len(tables):
+            message = f"{whole}: found {part!r}: {above} has entries 0 to {len(tables) - 1}"
+            raise InputError(message, key=whole, found=value, expected=f"an entry of {above}")
+        at, changed = int(part), list(tables)
+    elif isinstance(tables, Mapping):
+        changed = dict(tables)
+        if value is None and not below:
+            changed.pop(part, None)
+            return changed
     else:
-        here[last] = value
+        message = f"{whole}: {above} is {short_repr(tables)}, which has no keys"
+        raise InputError(message, key=whole, found=value, expected=f"a table {above}")
+    inner = changed[at] if isinstance(tables, list) else changed.get(part, {})
+    changed[at] = place(inner, below, value, dotted(above, part)) if below else value
     return changed
 
 

@@ -197,8 +197,8 @@ def choose(
     if case.settings.tolerance < Settings.tolerance:  # sharper than usual, on purpose
         tolerance = min(tolerance, case.settings.tolerance)
     times, places = case.settings.times, None
-    if case.experiment().axis == "time":
-        places = times if isinstance(times, tuple) else case.program().corners
+    if case.experiment.axis == "time":
+        places = times if isinstance(times, tuple) else case.program.corners
 
     # the coarsest grid resolves the waves of the surface, and leaves some cells to the third grid
     level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2

@@ -153,7 +153,7 @@ def trade(
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
 
     # relative work: the number of steps follows the root of the tolerance, iterations hardly change
-    axis = base.experiment().axis
+    axis = base.experiment.axis
     power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
     work = {(tolerance, grid): tolerance**-power / grid**2 for tolerance, grid in wanted}
     results: dict[tuple[float, float], xr.Dataset] = {}
@@ -195,7 +195,7 @@ def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], g
     """Return the case with these fields and the pressure, and rows that all settings have in common."""
     changes: dict[str, Any] = {"solve.grid_error": False, "solve.boundary": case.settings.boundary}
     changes["keep.fields"] = list(dict.fromkeys([*case.settings.fields, *fields, "pressure"]))
-    experiment = case.experiment()
+    experiment = case.experiment
     if isinstance(experiment, Loading):
         times = case.settings.times or _FEW
         if experiment.program.slides:
@@ -216,7 +216,7 @@ def _compared(
     reference: tuple[float, float],
 ) -> xr.Dataset:
     """Return the cost and the errors of the settings that were solved."""
-    (sharp, finest), axis = reference, case.experiment().axis
+    (sharp, finest), axis = reference, case.experiment.axis
     missing = np.full(len(names), math.nan)
 
     def apart(one: tuple[float, float], other: tuple[float, float] = reference) -> NDArray[np.float64]:

@@ -162,8 +162,8 @@ def study(tmp_path_factory):
 def test_study__states_the_same_program(study):
     case = read_study(study)
     program = PRESS.slide(SIDE, speed=0.1).hold(2e-3).slide(0.5 * SIDE, over=5e-3, direction="-x")
-    assert case.program() == program
-    assert Case.from_json(case.to_json()).program() == program
+    assert case.program == program
+    assert Case.from_json(case.to_json()).program == program
     assert unit_of("program.2.speed") == "m/s"
 
 

@@ -191,13 +191,13 @@ def case(tmp_path):
 
 
 def test_study__presses_the_sheet_that_it_states(case, tmp_path):
-    assert case.body().kernel == Sheet(1e-4, 0.5, "slipping")
+    assert case.body.kernel == Sheet(1e-4, 0.5, "slipping")
     ds = rv.run(case, out=tmp_path / "out", progress=False)
     assert (ds.attrs["thickness"], ds.attrs["base"]) == (1e-4, "slipping")
     assert "kernel" not in ds.attrs
-    same = pressed(case.height(), case.material(), case.program(), base="slipping", times=[0, 0.5])
+    same = pressed(case.height(), case.material, case.program, base="slipping", times=[0, 0.5])
     np.testing.assert_array_equal(ds.pressure, same.pressure)
-    assert Case.from_json(ds.attrs["case"]).body() == case.body()
+    assert Case.from_json(ds.attrs["case"]).body == case.body
 
 
 def test_sweep__over_thickness_up_to_a_half_space(tmp_path):

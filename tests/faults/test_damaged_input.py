@@ -99,7 +99,7 @@ def test_edited_study__gives_a_case_or_names_the_file(text, tmp_path):
     for case in cases[:2]:
         with read_or_refused(path):
             assert np.isfinite(case.height().values).any()
-        assert case.material().contact_compliance(1.0) > 0
+        assert case.material.contact_compliance(1.0) > 0
 
 
 @pytest.mark.thorough
@@ -110,7 +110,7 @@ def test_edited_creep_table__gives_a_material_or_names_the_file(text, tmp_path):
     path.write_text(text, encoding="utf-8", errors="replace", newline="")
     study.write_text(TABULATED)
     with read_or_refused(path):
-        assert rv.read_study(study).material().contact_compliance(1.0) > 0
+        assert rv.read_study(study).material.contact_compliance(1.0) > 0
 
 
 @HUNDRED

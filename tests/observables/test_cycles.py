@@ -104,7 +104,7 @@ def test_cycle_work__of_a_run(tmp_path):
     (tmp_path / "punch.toml").write_text(STUDY)
     case = rv.read_study(tmp_path / "punch.toml")
     punch = rv.open_result(run_case(case, tmp_path)).load()
-    found = observables.cycle_work(punch, case.program())
+    found = observables.cycle_work(punch, case.program)
     exact = references.punch_dissipation(RADIUS, RUBBER, 1e-6, PERIOD)
     assert found["cycle"].values.tolist() == [1, 2, 3, 4]
     np.testing.assert_allclose(found["cycle_work"][-1], exact, rtol=0.04)  # the circle is made of 40 cells

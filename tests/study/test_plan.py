@@ -185,10 +185,10 @@ def test_corrected__is_the_contact_of_persson():
 def test_elastic_contact__is_that_of_hertz(study, step):
     """``pi a^2`` with ``a^3 = 3 R F C / 4``, or ``a^2 = R d``, where a load has crept for the whole hold."""
     (case,) = study(SPHERE)
-    program = vary(case, {"program": [step | {"over": 1e-3}, {"hold": 50.0}]}).program()
-    size, radius, compliance = 1e-3, 1e-2, float(case.material().contact_compliance(50.0))
+    program = vary(case, {"program": [step | {"over": 1e-3}, {"hold": 50.0}]}).program
+    size, radius, compliance = 1e-3, 1e-2, float(case.material.contact_compliance(50.0))
     ball = rv.sphere(radius, size, (64, 57))
-    found = plan_module.elastic_contact(Problem(ball, case.body(), case.settings), program)
+    found = plan_module.elastic_contact(Problem(ball, case.body, case.settings), program)
     square = radius * step["approach"] if "approach" in step else (0.75 * radius * step["load"] * compliance) ** (2 / 3)
     assert found == pytest.approx(math.pi * square / size**2, rel=0.08)
 

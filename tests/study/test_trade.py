@@ -98,9 +98,7 @@ def test_friction__errors_are_those_against_its_finest_run(tmp_path):
     assert set(ds.quantity.values) == {"pressure", "approach", AREA, "mean_gap", FRICTION}
 
     def curve(height, tolerance):
-        return rv.friction(
-            height, case.material(), pressure=2e4, speeds=[5e-3, 0.2], tolerance=tolerance, progress=False
-        )
+        return rv.friction(height, case.material, pressure=2e4, speeds=[5e-3, 0.2], tolerance=tolerance, progress=False)
 
     fine = curve(case.height(), 2e-4)
     few = rv.resample(case.height(), (13, 10), periodic=True)
@@ -117,7 +115,7 @@ def test_friction__uncertainty_of_the_finest_run_holds_its_true_error(tmp_path):
     ds = measured(case, (1e-3, 1))
     wave = {"amplitude": 2e-6, "wavelength": 1e-3, "size": (1e-3, 1e-3), "waves": 1}
     solve = {"pressure": 1e4, "speeds": [0.03, 0.3], "tolerance": 2e-4, "progress": False}
-    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material(), **solve) for cells in (192, 24))
+    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material, **solve) for cells in (192, 24))
     for name in (FRICTION, AREA, "approach", "mean_gap"):
         true = float(abs(found[name] - fine[name]).max() / fine[name].max())
         assert 0.3 * true < uncertainty(ds, name) < 1, name

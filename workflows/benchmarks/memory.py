@@ -52,8 +52,8 @@ def one(side, material, boundary):
         with open_result(run_case(case, folder)) as ds:
             contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    settings, program = case.settings, case.program().on_area(nominal_area(case.height()))
-    memory = choose_memory(case.body(), **memory_options(program, settings)).memory
+    settings, program = case.settings, case.program.on_area(nominal_area(case.height()))
+    memory = choose_memory(case.body, **memory_options(program, settings)).memory
     stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact, rows=rows)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",

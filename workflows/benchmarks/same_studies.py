@@ -9,6 +9,7 @@ listed with the reason of the other.
 """
 
 import dataclasses
+import inspect
 import json
 import os
 import re
@@ -165,20 +166,26 @@ def in_first_edition(text):
     return text
 
 
+def value_of(case, name):
+    """Return a part of a case, which is a method in the first edition."""
+    found = getattr(case, name)
+    return found() if inspect.ismethod(found) else found
+
+
 def described(case):
     """Return body, experiment and settings of a case, with all digits."""
-    body = case.body()
+    body = value_of(case, "body")
     settings = case.solving() if hasattr(case, "solving") else case.settings
     told = {"title": case.title}
     for number, material in enumerate(body.materials):
         told[f"creep {number}"] = repr(np.asarray(material.contact_compliance(np.array(TIMES))).tolist())
     told["kernel"] = repr(np.asarray(body.kernel.transfer(WAVES, 0 * WAVES)).tolist()) if body.separates else "layers"
     if "friction" in json.loads(case.to_json()):
-        experiment = case.experiment()
+        experiment = value_of(case, "experiment")
         names = [one.name for one in dataclasses.fields(experiment)]
         told |= {name: repr(getattr(experiment, name)) for name in names if name not in ("last_octave",)}
     else:
-        told["program"] = repr([dataclasses.astuple(segment) for segment in case.program().segments])
+        told["program"] = repr([dataclasses.astuple(segment) for segment in value_of(case, "program").segments])
     stated = {name: getattr(settings, name) for name in SETTINGS}
     stated["boundary"] = RENAMED_BOUNDARY.get(stated["boundary"], stated["boundary"])
     stated["fields"] = sorted(stated["fields"])

@@ -13,7 +13,7 @@ from roughvisc.units import Quantity, quantities, quantity
 
 
 @quantities(temperature="K", reference_temperature="K")
-def wlf(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: float | str) -> float:
+def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, wlf_c2: float | str) -> float:
     r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
 
     Parameters
@@ -22,9 +22,9 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: f
         Temperature ``T`` of the contact. [K]
     reference_temperature : float or str
         Temperature ``T_r`` at which the compliance was measured. [K]
-    c1 : float
+    wlf_c1 : float
         First constant, with the decimal logarithm. [-]
-    c2 : float or str
+    wlf_c2 : float or str
         Second constant, a difference of temperatures. [K]
 
     Returns
@@ -53,14 +53,16 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, c1: float, c2: f
     """
     check_number("temperature", temperature, "K")
     check_number("reference_temperature", reference_temperature, "K")
-    check_number("c1", c1, "1")
-    c2 = quantity(c2, "K", "c2", difference=True)
-    check_number("c2", c2, "K")
+    check_number("wlf_c1", wlf_c1, "1")
+    c2 = quantity(wlf_c2, "K", "wlf_c2", difference=True)
+    check_number("wlf_c2", c2, "K")
     above = temperature - reference_temperature
     if not c2 + above > 0:
-        pole = f"{reference_temperature - c2:g} K, the reference temperature less c2, where the WLF shift has its pole"
+        pole = (
+            f"{reference_temperature - c2:g} K, the reference temperature less wlf_c2, where the WLF shift has its pole"
+        )
         raise InputError(key="temperature", found=temperature, expected=f"a temperature above {pole}")
-    return _power(10.0, -c1 * above / (c2 + above))
+    return _power(10.0, -wlf_c1 * above / (c2 + above))
 
 
 @quantities(temperature="K", reference_temperature="K", activation_energy="J/mol")

@@ -239,7 +239,7 @@ def of_result(dataset: xr.Dataset) -> Evidence:
         area=area,
         fraction=float(row.get("contact_fraction", math.nan)),
         contact=contact,
-        given={} if case is None else case.audit_inputs(),
+        given={} if case is None else case.audit_inputs,
     )
 
 
@@ -275,7 +275,7 @@ def _sliding(dataset: xr.Dataset) -> tuple[float, float]:
 
 def bodies_of(case: Case, end: float) -> tuple[Body, ...]:
     """The deformable bodies of a case after a time [s]; none if Poisson's ratio of one changes in time."""
-    materials = case.materials()
+    materials = case.materials
     if any(map(separability_error, materials)):
         return ()
     return tuple(Body(*(float(one.contact_compliance(t)) for t in (0.0, end)), float(one.poisson)) for one in materials)
@@ -299,12 +299,12 @@ def _facts(dataset: xr.Dataset, case: Case | None, longest: float) -> Mapping[st
     """Return the attributes of a result, with the facts that only the case of a stored one states."""
     if case is None or "time_scale" in dataset.attrs:
         return dataset.attrs
-    experiment = case.experiment()
+    experiment = case.experiment
     time_scale = experiment.program.time_scale if isinstance(experiment, Loading) else math.inf
-    return facts_of(case.body(), creep_time(experiment, longest), time_scale) | dataset.attrs
+    return facts_of(case.body, creep_time(experiment, longest), time_scale) | dataset.attrs
 
 
 def _bodies(attrs: Mapping[str, Any], case: Case | None, size: float) -> tuple[Body, ...]:
     if "poisson" in attrs and "compliance_at_end" in attrs:
         return (Body(*(float(attrs[name]) for name in ("compliance_at_once", "compliance_at_end", "poisson"))),)
-    return bodies_of(case, creep_time(case.experiment(), size)) if case is not None else ()
+    return bodies_of(case, creep_time(case.experiment, size)) if case is not None else ()

@@ -64,4 +64,4 @@ def of_study(path: Path) -> dict[str, Any]:
     """
     from roughvisc.study.case import read_cases  # which checks what it reads by this module
 
-    return read_cases(path)[0].audit_inputs()
+    return read_cases(path)[0].audit_inputs

@@ -6,7 +6,7 @@ import json
 import logging
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
@@ -26,8 +26,8 @@ from roughvisc.experiment.resources import (
 )
 from roughvisc.experiment.scene import memory_options
 from roughvisc.mechanics.memory_choice import choose_memory
-from roughvisc.study import study_file
 from roughvisc.study.case import Case
+from roughvisc.topography.grid import counts
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -195,10 +195,10 @@ def side_by_side(cases: Sequence[Case], most: int) -> int:
         if name not in cells:
             cells[name] = _cells(case)
         if cells[name] >= WORTH_ASKING:
-            settings, experiment = case.settings, case.experiment()
+            settings, experiment = case.settings, case.experiment
             if isinstance(experiment, Loading):
                 program = experiment.program
-                memory = choose_memory(case.body(), **memory_options(program, settings)).memory
+                memory = choose_memory(case.body, **memory_options(program, settings)).memory
                 size = march_bytes(settings, memory, cells[name], rows=least_rows(settings, program))
             else:
                 size = curve_bytes(settings, cells[name])
@@ -208,7 +208,9 @@ def side_by_side(cases: Sequence[Case], most: int) -> int:
 
 def _cells(case: Case) -> float:
     """Return the number of cells of a surface; zero if it is small, or cannot be read now."""
-    shape = study_file.cells(case.surface["resample"]) if case.surface.get("resample") else case.made_shape
+    resample = case.surface.get("resample") or None
+    stated = resample["shape"] if isinstance(resample, Mapping) else resample or case.surface.get("shape")
+    shape = None if stated is None else counts("shape", stated)
     if shape is None and (file := case.surface.get("file")):
         with suppress(OSError, ValueError):  # the case reports it
             if Path(file).stat().st_size >= WORTH_ASKING:  # at least a byte per cell

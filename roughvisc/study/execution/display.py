@@ -50,7 +50,7 @@ class Display:
             varied = ", ".join(f"{name} = {case.written.get(name) or json.dumps(x)}" for name, x in case.varied.items())
             shortened = varied if len(varied) <= 60 else f"{varied[:57]}..."
             self._names[case.key] = f"case {numbers[case.key]}" + (f" ({shortened})" if varied else "")
-            self._at[case.key] = case.at
+            self._at[case.key] = case.experiment.progress
         if link:
             self._bars.say(f"Dashboard: {link}")
         self._bars.start()

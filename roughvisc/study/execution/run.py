@@ -83,8 +83,8 @@ def compute(
     """
     height = case.height()
     with _named(case):
-        problem = Problem(height, case.body(), case.settings)
-        dataset = solve(problem, case.experiment(), keeper, progress=progress, threads=threads)
+        problem = Problem(height, case.body, case.settings)
+        dataset = solve(problem, case.experiment, keeper, progress=progress, threads=threads)
     if "speed" in dataset:
         reduced = case.shift_factor * dataset["speed"].values
         dataset = label(dataset.assign(reduced_speed=("speed", reduced)))

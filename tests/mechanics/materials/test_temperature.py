@@ -77,7 +77,7 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
     ("wrong", "key"),
     [
         (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature"),
-        (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "c1"),
+        (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "wlf_c1"),
         (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
         (lambda: rv.shift(MATERIALS[0], 0.0), "factor"),
         (lambda: rv.shift(MATERIALS[0], np.nan), "factor"),

@@ -76,7 +76,7 @@ def test_limit_of_yielding__is_a_mean_pressure_of_hertz():
 
 
 def test_limits_of_heating__are_retardation_times_by_the_universal_constants_of_wlf():
-    times = [rv.wlf(300.0 + LIMITS["heating"].doubtful * k, 300.0, c1=8.86, c2=101.6) for k in (1, 10)]
+    times = [rv.wlf(300.0 + LIMITS["heating"].doubtful * k, 300.0, wlf_c1=8.86, wlf_c2=101.6) for k in (1, 10)]
     assert 1 - times[0] == pytest.approx(0.2, abs=0.03)
     assert 1 / times[1] == pytest.approx(6, rel=0.05)
     assert LIMITS["heating"].broken == 10 * LIMITS["heating"].doubtful

@@ -133,7 +133,7 @@ def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
     shifted = rv.run(warm, tmp_path, progress=False)
     np.testing.assert_allclose(shifted.reduced_speed, reference.speed, rtol=1e-9)
     np.testing.assert_allclose(shifted.friction_coefficient, reference.friction_coefficient, rtol=1e-6)
-    assert case(TEMPERATURES).body() == case().body(), "at the reference temperature nothing is shifted"
+    assert case(TEMPERATURES).body == case().body, "at the reference temperature nothing is shifted"
 
 
 def test_unconverged_speed__is_told_by_its_speed(case, tmp_path, stubborn):

@@ -9,8 +9,8 @@ import roughvisc as rv
 from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.si_tables import TABLES
 from roughvisc.study.storage.parameters import identifier
+from roughvisc.study.study_file import TABLES
 from roughvisc.variables import VARIABLES
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")

@@ -56,8 +56,8 @@ def test_read_study__units_become_si(study):
     assert case.title == "A ball"
     assert case.surface["radius"] == 0.01
     assert case.surface["size"] == [1e-3, 1e-3]
-    assert case.material() == rv.zener(3e6, 1e6, 1e5)
-    assert case.program() == Program().load(2.0, over=0.05).hold(5.0)
+    assert case.material == rv.zener(3e6, 1e6, 1e5)
+    assert case.program == Program().load(2.0, over=0.05).hold(5.0)
     assert case.settings.boundary == "free"
     assert case.settings.fields == ("pressure", "gap")
     assert case.settings.times is None
@@ -112,7 +112,7 @@ def test_read_study__units_become_si(study):
 def test_material__every_model(study, table, expected):
     head, rest = BALL.split("[material]")
     case = read_study(study(f"{head}[material]\n{table}\n[[program]]" + rest.split("[[program]]", 1)[1]))
-    assert case.material() == expected
+    assert case.material == expected
 
 
 def with_material(table):
@@ -159,13 +159,13 @@ def test_read_cases__takes_a_pattern_for_the_files_that_match_it(study, tmp_path
 def test_material__table_from_csv(study, tmp_path, rows, keys):
     (tmp_path / "creep.csv").write_text(rows)
     case = read_study(study(with_material(f'model = "creep_table"\nfile = "creep.csv"\n{keys}')))
-    assert case.material() == CREEP
+    assert case.material == CREEP
     listed = 'model = "creep_table"\ntimes = [0, 60, 3600]\ncompliances = [1e-7, 2e-7, 5e-7]'
     assert case.key == read_study(study(with_material(listed))).key, "the content counts, not the path or the units"
     (tmp_path / "creep.csv").unlink()
     again = Case.from_json(case.to_json())
     assert again == case, "a stored case needs its CSV file no longer"
-    assert again.material() == CREEP
+    assert again.material == CREEP
     assert vary(again, {"material.noise": 0.1}).tables["material"]["noise"] == 0.1
 
 
@@ -177,7 +177,7 @@ def test_key__knows_a_creep_table_by_its_content(study, tmp_path):
     a, b, c = read_cases(study(with_material('model = "creep_table"\nfile = "a.csv"') + sweep))
     assert a.key == b.key != c.key
     assert c.varied == {"material.file": "c.csv"}
-    assert c.material().creep_compliance(1.0) == pytest.approx(3.0, rel=1e-6)
+    assert c.material.creep_compliance(1.0) == pytest.approx(3.0, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -192,10 +192,10 @@ def test_key__knows_a_creep_table_by_its_content(study, tmp_path):
 def test_material__dynamic_from_csv(study, tmp_path, rows, keys):
     (tmp_path / "dma.csv").write_text(rows)
     table = f'model = "dynamic_table"\nfile = "dma.csv"\nfrequency_unit = "Hz"\n{keys}'
-    material = read_study(study(with_material(table))).material()
+    material = read_study(study(with_material(table))).material
     assert material == rv.dynamic_table((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
     other = read_study(study(with_material(table.replace('"Hz"', '"rad/s"')))) if "[Hz]" not in rows else None
-    assert other is None or other.material() != material
+    assert other is None or other.material != material
 
 
 def test_pair__is_varied_within(study):
@@ -206,7 +206,7 @@ def test_pair__is_varied_within(study):
     assert Case.from_json(case.to_json()).key == case.key
     changed = vary(case, {"material.a.shear_modulus": "2 Pa"})
     assert changed.key != case.key
-    assert changed.material() == rv.pair(rv.elastic(2.0), rv.creep_table((0, 1), (1, 2)))
+    assert changed.material == rv.pair(rv.elastic(2.0), rv.creep_table((0, 1), (1, 2)))
 
 
 def test_program__every_segment(study):
@@ -242,7 +242,7 @@ def test_program__every_segment(study):
         + Program.table([0, 1, 2], [0, 1, 0.5])
         + Program.table([0, 1], [1e-6, 2e-6], control="approach")
     )
-    assert read_study(study(textwrap.dedent(text))).program() == expected
+    assert read_study(study(textwrap.dedent(text))).program == expected
 
 
 @pytest.mark.parametrize(
@@ -256,9 +256,9 @@ def test_program__every_segment(study):
 def test_program__table_from_csv(study, tmp_path, rows):
     (tmp_path / "history.csv").write_text(rows)
     case = read_study(study(BALL.split("[[program]]")[0] + '[[program]]\ntable = "history.csv"'))
-    assert case.program() == Program.table([0, 1.5, 2], [0, 2, 1])
+    assert case.program == Program.table([0, 1.5, 2], [0, 2, 1])
     (tmp_path / "history.csv").unlink()
-    assert Case.from_json(case.to_json()).program() == case.program(), "a stored case needs its CSV file no longer"
+    assert Case.from_json(case.to_json()).program == case.program, "a stored case needs its CSV file no longer"
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,7 @@ def test_read_cases__product(study):
     assert [dict(case.varied) for case in cases] == [
         {"program.0.load": load, "material.poisson": nu} for load in (1.0, 2.0) for nu in (0.4, 0.5)
     ]
-    assert [case.program().segments[0].end for case in cases] == [1, 1, 2, 2]
+    assert [case.program.segments[0].end for case in cases] == [1, 1, 2, 2]
     assert len({case.key for case in cases}) == 4
     with pytest.raises(InputError, match="sweep"):
         read_study(study(BALL + sweep))
@@ -389,7 +389,7 @@ def test_read_cases__zipped(study):
         '\n[[sweep]]\n"program.0.load" = [1, 2]\n"solve.tolerance" = [1e-3, 1e-4]\n[[sweep]]\n"program.0.load" = 3'
     )
     cases = read_cases(study(text))
-    assert [(c.program().segments[0].end, c.settings.tolerance) for c in cases] == [
+    assert [(c.program.segments[0].end, c.settings.tolerance) for c in cases] == [
         (1, 1e-3),
         (2, 1e-4),
         (3, 1e-3),
@@ -399,9 +399,9 @@ def test_read_cases__zipped(study):
 def test_vary__changes_one_value(study):
     case = read_study(study())
     changed = vary(case, {"program.0.load": "3 N", "keep.times": 5})
-    assert changed.program().segments[0].end == 3
+    assert changed.program.segments[0].end == 3
     assert changed.varied == {"program.0.load": 3.0, "keep.times": 5}
-    assert case.program().segments[0].end == 2
+    assert case.program.segments[0].end == 2
     with refused("program.0.load", -1):
         vary(case, {"program.0.load": -1})
 

@@ -149,17 +149,17 @@ def test_study__takes_columns_by_key_and_keeps_the_case_whole(tmp_path):
     study = tmp_path / "study.toml"
     study.write_text(STUDY + 'table = { file = "machine.csv", time = "Zeit", pressure = "Druck" }')
     case = read_study(study)
-    assert case.program() == rv.Program.table([0, 1, 2], [0, 2e4, 2e4], control="pressure")
-    assert case.program().note.startswith("machine.csv: 3 rows became 2 segments")
+    assert case.program == rv.Program.table([0, 1, 2], [0, 2e4, 2e4], control="pressure")
+    assert case.program.note.startswith("machine.csv: 3 rows became 2 segments")
     motion = STUDY + 'table = { file = "machine.csv", time = "Zeit", approach = "Weg" }'
     study.write_text(motion + '\n[sweep]\n"program.0.table.thin" = [0, "1 um"]')
     exact, thin = read_cases(study)
-    assert exact.program() == rv.Program.table([0, 1, 2], [0, 2e-6, 1e-6], control="approach")
+    assert exact.program == rv.Program.table([0, 1, 2], [0, 2e-6, 1e-6], control="approach")
     assert thin.varied == {"program.0.table.thin": "1 um"}
     path.unlink()
     again = Case.from_json(case.to_json())
     assert again.key == case.key
-    assert again.program().note == case.program().note
+    assert again.program.note == case.program.note
 
 
 @pytest.mark.parametrize(

@@ -33,13 +33,13 @@ def read(tmp_path):
 
 
 def test_on__makes_a_layer(read):
-    assert read_study(read(LAYER)).body() == rv.layer(rv.elastic(1e9, poisson=0.35), 2e-5, on=RUBBER)
+    assert read_study(read(LAYER)).body == rv.layer(rv.elastic(1e9, poisson=0.35), 2e-5, on=RUBBER)
 
 
 def test_on__nests(read):
     below = '\nthickness = "1 mm"\n[material.on.on]\nmodel = "elastic"\nshear_modulus = "80 GPa"\npoisson = 0.3\n'
     expected = rv.layer(RUBBER, 1e-3, on=rv.elastic(80e9, poisson=0.3))
-    assert read_study(read(LAYER + below)).body() == rv.layer(rv.elastic(1e9, poisson=0.35), 2e-5, on=expected)
+    assert read_study(read(LAYER + below)).body == rv.layer(rv.elastic(1e9, poisson=0.35), 2e-5, on=expected)
 
 
 def test_on__counts_for_the_key_of_a_case(read):
@@ -47,13 +47,13 @@ def test_on__counts_for_the_key_of_a_case(read):
     assert read_study(read(LAYER.replace('"3 MPa"', "3e6"))).key == first
     assert read_study(read(LAYER.replace('"3 MPa"', '"4 MPa"'))).key != first
     endless = read_study(read(LAYER.replace('"20 um"', "inf")))
-    assert endless.body() == rv.Body(rv.elastic(1e9, poisson=0.35))
+    assert endless.body == rv.Body(rv.elastic(1e9, poisson=0.35))
 
 
 def test_on__is_swept(read):
     sweep = '[sweep]\n"material.on.shear_modulus" = ["1 MPa", "2 MPa"]\n"material.thickness" = ["10 um", inf]\n'
     cases = read_cases(read(LAYER, sweep))
-    bases = [one.body().materials[1] for one in list(cases)[::2]]
+    bases = [one.body.materials[1] for one in list(cases)[::2]]
     assert [float(base.creep_compliance(0.0)) for base in bases] == pytest.approx([1e-6, 5e-7])
     assert unit_of("material.on.shear_modulus") == "Pa"
     assert unit_of("material.on.on.thickness") == "m"

@@ -34,14 +34,14 @@ def study(tmp_path):
 
 def test_leakage__is_read_in_si(study):
     case = read_study(study(LEAKAGE))
-    assert case.observed() == {"leakage": {"viscosity": 2e-3, "pressure_drop": 3e5, "along": "y"}}
-    assert Case.from_json(case.to_json()).observed() == case.observed()
+    assert case.observed == {"leakage": {"viscosity": 2e-3, "pressure_drop": 3e5, "along": "y"}}
+    assert Case.from_json(case.to_json()).observed == case.observed
 
 
 @pytest.mark.parametrize("stated", ['["5 m K/W", 0.5]', '["2 uohm cm", 0]', '[1, 2]\nkind = "electrical"'])
 def test_conductance__is_accepted_with_numbers_or_units(study, stated):
     case = read_study(study(f"[observe.conductance]\nresistivity = {stated}\n"))
-    assert len(case.observed()["conductance"]["resistivity"]) == 2
+    assert len(case.observed["conductance"]["resistivity"]) == 2
 
 
 def test_key__does_not_know_what_is_observed(study):

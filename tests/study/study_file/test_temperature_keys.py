@@ -26,17 +26,17 @@ def at(case, table, where="material"):
 def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(case):
     # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
     warm = at(case, WLF)
-    assert warm.material().times == pytest.approx((0.1 * 10**-0.8,))
-    assert at(case, {"shift_factor": 10**-0.8}).material().times == pytest.approx(warm.material().times)
+    assert warm.material.times == pytest.approx((0.1 * 10**-0.8,))
+    assert at(case, {"shift_factor": 10**-0.8}).material.times == pytest.approx(warm.material.times)
     assert warm.key != case.key
-    assert at(case, ARRHENIUS).material().times == pytest.approx((0.1 * rv.arrhenius(303.15, 293.15, 8e4),))
+    assert at(case, ARRHENIUS).material.times == pytest.approx((0.1 * rv.arrhenius(303.15, 293.15, 8e4),))
     again = Case.from_json(warm.to_json())
-    assert (again.key, again.material()) == (warm.key, warm.material())
+    assert (again.key, again.material) == (warm.key, warm.material)
 
 
 def test_temperature__at_the_reference_is_the_material_without(case):
-    assert at(case, {**WLF, "temperature": "20 degC"}).material() == case.material()
-    assert at(case, {"shift_factor": 1}).material() == case.material()
+    assert at(case, {**WLF, "temperature": "20 degC"}).material == case.material
+    assert at(case, {"shift_factor": 1}).material == case.material
 
 
 def test_temperature__both_bodies_of_a_pair_or_one(case):
@@ -44,8 +44,8 @@ def test_temperature__both_bodies_of_a_pair_or_one(case):
     rubber = {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}
     two = vary(case, {"material": {"model": "pair", "a": steel, "b": rubber}})
     both, one = at(two, WLF), at(two, WLF, "material.b")
-    assert both.material() == one.material() != two.material()
-    assert both.material().fluidity == pytest.approx(two.material().fluidity * 10**0.8)
+    assert both.material == one.material != two.material
+    assert both.material.fluidity == pytest.approx(two.material.fluidity * 10**0.8)
 
 
 def test_temperature__sweeps_and_its_axis_has_a_unit(tmp_path):
@@ -56,8 +56,8 @@ def test_temperature__sweeps_and_its_axis_has_a_unit(tmp_path):
     study.write_text(text.replace('model = "zener"\n', f'model = "zener"\n{law}') + swept)
     cold, room, hot = read_cases(study)
     assert [one.varied["material.temperature"] for one in (cold, room, hot)] == [273.15, 293.15, 313.15]
-    assert cold.material().times > room.material().times > hot.material().times
-    assert room.material() == rv.read_study(WORKFLOWS / "quickstart.toml").material()
+    assert cold.material.times > room.material.times > hot.material.times
+    assert room.material == rv.read_study(WORKFLOWS / "quickstart.toml").material
     assert unit_of("material.temperature") == "K"
 
 
