@@ -11,7 +11,7 @@ from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.settings import Settings
-from roughvisc.study.audit.given import AuditInputs
+from roughvisc.study.audit.limits import AuditInputs
 from roughvisc.study.study_file import COLUMNS, GEOMETRY, PROGRAMS, SEGMENTS, TABLES, TEMPERATURE
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.synthesis import RECIPES

@@ -138,13 +138,14 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
 
     from roughvisc.cli.accuracy_tables import audit_table
     from roughvisc.study.audit.audit import audit as audited
-    from roughvisc.study.audit.given import AuditInputs, of_study
+    from roughvisc.study.case import read_cases
     from roughvisc.study.storage.store import open_result, results_at
 
-    given = AuditInputs(**properties).over(of_study(study) if study is not None else {})
+    stated = {} if study is None else read_cases(study)[0].audit_inputs
+    given = stated | {name: value for name, value in properties.items() if value is not None}
     for path in results_at(result):
         with open_result(path) as dataset:
-            Console().print(audit_table(audited(dataset, **given.stated())))
+            Console().print(audit_table(audited(dataset, **given)))
 
 
 @click.command()

@@ -1,0 +1,256 @@
+"""What a result records of its surface, contact and bodies."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.experiment.base import facts_of
+from roughvisc.experiment.loading import Loading
+from roughvisc.mechanics.body import separability_error
+from roughvisc.observables.histories import history
+from roughvisc.study.audit.limits import AuditInputs
+from roughvisc.study.case import Case
+from roughvisc.study.quantities import creep_time
+from roughvisc.topography.borders import is_analytic
+from roughvisc.topography.framing import mirror
+from roughvisc.topography.grid import spacing
+from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.spectrum import hann, last_octave, modes
+from roughvisc.variables import axis_of
+
+Array = NDArray[np.float64]
+
+#: Relative rounding of loads, areas and wavelengths.
+_ROUNDING = 1e-9
+#: Part of the mean square slope beyond the shortest wavelength of a recipe, up to which the heights are the recipe's.
+_SHORTER = 1e-6
+
+
+class NotKnown(Exception):
+    """A number is not known; the message names the missing input."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Surface, contact and bodies of a result. A property that the result does not record raises :class:`NotKnown`.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        Result of one case.
+    case : Case or None
+        Its case, if it is that of a study.
+    given : AuditInputs
+        Stated properties.
+    """
+
+    dataset: xr.Dataset
+    case: Case | None
+    given: AuditInputs
+
+    def need(self, *names: str) -> list[float]:
+        """Return stated properties. [SI]"""
+        if missing := [name for name in names if getattr(self.given, name) is None]:
+            raise NotKnown(f"Give {' and '.join(missing)}.")
+        return [getattr(self.given, name) for name in names]
+
+    @property
+    def boundary(self) -> str:
+        """``free``, ``periodic`` or ``mirror``."""
+        return str(self.dataset.attrs["boundary"])
+
+    # ---------------------------------------------------------------------------------------------------- surface
+
+    @cached_property
+    def height(self) -> xr.DataArray:
+        """Heights over (x, y). [m]"""
+        if "height" not in self.dataset:
+            raise NotKnown("The result contains no heights.")
+        return self.dataset["height"].transpose("x", "y").compute()
+
+    @cached_property
+    def period(self) -> xr.DataArray:
+        """Heights; under a mirror boundary with the mirror images. [m]"""
+        return mirror(self.height) if self.boundary == "mirror" else self.height
+
+    @property
+    def cells(self) -> tuple[float, float]:
+        """Cell sides. [m]"""
+        return spacing(self.height, "audit")
+
+    @property
+    def sides(self) -> list[float]:
+        """Sides of the surface, under a mirror boundary with the mirror images. [m]"""
+        return [count * side for count, side in zip(self.period.shape, self.cells, strict=True)]
+
+    @cached_property
+    def waves(self) -> tuple[float, float, float]:
+        """``sum |q| |h_q|^2`` [m], part of the rms slope from the last octave [-], and its longest wavelength [m].
+
+        In free space they are those under a cosine window. NaN if the surface is flat or points are missing.
+        """
+        z = self.period.values - self.period.values.mean()
+        if not np.ptp(z) > 0:
+            return math.nan, math.nan, math.nan
+        q_x, q_y, power, count = modes(hann(z) if self.boundary == "free" else z, self.cells, "forward")
+        q = np.hypot(q_x, q_y)
+        squares = count * q**2 * power
+        begins = last_octave(q, squares)
+        kept = float(squares[q <= begins].sum()) / float(squares.sum())
+        return float((count * q * power).sum()), 1 - math.sqrt(kept), 2 * np.pi / begins if begins else 0.0
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether there is form alone: a recipe's, or wavelengths above a quarter of the shorter side."""
+        return is_analytic(self.period) or self.waves[2] > min(self.sides) / 2
+
+    @cached_property
+    def stated_wave(self) -> tuple[float, float] | None:
+        """Shortest wavelength that the recipe states [m] and its cells, along the axis where it has the fewest.
+
+        None if the recipe states none, or the heights contain shorter wavelengths and are no longer the recipe's.
+        """
+        try:
+            recipe = json.loads(self.dataset["height"].attrs["recipe"])
+            made = recipe["parameters"]
+            if recipe["name"] == "wavy":
+                waves = [made["wavelength"], made["wavelength"] if made["waves"] == 2 else math.inf]
+            else:  # self_affine; other recipes have no such parameters
+                stretch = math.sqrt(made["anisotropy"])
+                waves = [made["shortcut"] * stretch, made["shortcut"] / stretch]
+        except (KeyError, TypeError, ValueError):
+            return None
+        z = self.period.values
+        if not is_analytic(self.period):
+            q_x, q_y, power, count = modes(z - z.mean(), self.cells, "forward")
+            squares = count * (q_x**2 + q_y**2) * power
+            beyond = np.hypot(q_x * waves[0], q_y * waves[1]) > 2 * np.pi * (1 + _ROUNDING)
+            if not squares[beyond].sum() <= _SHORTER * squares.sum():  # NaN if points are missing
+                return None
+        cells, wave = min((wave / side, wave) for side, wave in zip(self.cells, waves, strict=True))
+        return wave, cells
+
+    @cached_property
+    def loaded_slope(self) -> float:
+        """Root mean square slope that may be loaded: in free space down to the largest approach. [-]"""
+        depth, highest = math.inf, float(self.height.max())
+        if self.boundary == "free":  # the highest point of an indenter may lie between the cells
+            depth = float(self.dataset["approach"].max()) - (float(self.height.attrs.get("highest", highest)) - highest)
+        slope = rms_slope(self.height, self.boundary == "periodic", depth)
+        if math.isnan(slope):
+            raise NotKnown("The result contains no loaded heights.")
+        return slope
+
+    # ---------------------------------------------------------------------------------------------------- contact
+
+    @cached_property
+    def fullest(self) -> xr.Dataset:
+        """Row with the largest force: of these that with the largest contact area, the last of them."""
+        force = self.dataset["force"].values
+        area = np.nan_to_num(self.dataset["contact_area"].values)  # NaN: not solved
+        area = np.where(force >= force.max() * (1 - _ROUNDING), area, -1.0)
+        last = int(np.flatnonzero(area >= area.max() * (1 - _ROUNDING))[-1])
+        return self.dataset.isel({axis_of(self.dataset): last})
+
+    @property
+    def force(self) -> float:
+        """Largest force. [N]"""
+        if not self.fullest["force"] > 0:
+            raise NotKnown("There was no load, and so no contact to judge.")
+        return float(self.fullest["force"])
+
+    def pressure_in(self, row: xr.Dataset) -> Array:
+        """Return the pressure in a row with contact, zero at missing points. [Pa]"""
+        pressure = np.nan_to_num(row["pressure"].transpose("x", "y").values) if "pressure" in row else np.zeros(1)
+        if not pressure.any():
+            raise NotKnown('Keep the pressure, fields = ["pressure"].')
+        return pressure
+
+    @cached_property
+    def pressure(self) -> Array:
+        """Pressure where the force is largest. [Pa]"""
+        return self.pressure_in(self.fullest)
+
+    @property
+    def extent(self) -> float:
+        """Half the longer side of the contact. [m]"""
+        extents = (np.ptp(at) + 1 for at in np.nonzero(self.pressure))
+        return max(count * side for count, side in zip(extents, self.cells, strict=True)) / 2
+
+    @property
+    def curvature(self) -> float:
+        """Mean curvature of the profile over the contact, where all neighbours are known; positive at summits. [1/m]"""
+        z = self.height
+        curvature = sum(
+            (2 * z - z.shift({axis: 1}) - z.shift({axis: -1})) / (2 * side**2)
+            for axis, side in zip(("x", "y"), self.cells, strict=True)
+            if z.sizes[axis] > 1
+        )
+        return float(xr.DataArray(curvature).where(self.pressure > 0).mean())
+
+    @cached_property
+    def slide(self) -> tuple[float, float]:
+        """Largest speed [m/s] and friction power [W]; zero if nothing slides."""
+        if "speed" in self.dataset.dims:
+            speed = self.dataset["speed"]
+            return float(speed.max()), float((self.dataset["friction_force"] * speed).max())
+        if "sliding_distance" not in self.dataset:
+            return 0.0, 0.0
+        steps = history(self.dataset)
+        lasting = np.diff(steps["time"]) > 0
+        if not lasting.any():
+            raise NotKnown("The speed of the slides is not known: audit the result with all of its steps.")
+        speeds = np.diff(steps["sliding_distance"])[lasting] / np.diff(steps["time"])[lasting]
+        return float(speeds.max()), float(np.max(steps["friction_force"].values[1:][lasting] * speeds))
+
+    # ----------------------------------------------------------------------------------------------------- bodies
+
+    @cached_property
+    def creep_time(self) -> float:
+        """Time during which the material of a stored result creeps. [s]"""
+        assert self.case is not None
+        longest = max(float(np.ptp(self.height[axis].values)) for axis in ("x", "y"))
+        return creep_time(self.case.experiment, longest)
+
+    @cached_property
+    def facts(self) -> Mapping[str, Any]:
+        """Attributes of the result, with the facts on material and program that the case of a stored one states."""
+        if self.case is None:
+            if "time_scale" not in self.dataset.attrs:
+                raise NotKnown("The material is not stated: audit the file from run, or the Dataset from simulate.")
+            return self.dataset.attrs
+        experiment = self.case.experiment
+        time_scale = experiment.program.time_scale if isinstance(experiment, Loading) else math.inf
+        return facts_of(self.case.body, self.creep_time, time_scale) | self.dataset.attrs
+
+    @property
+    def late(self) -> float:
+        """Contact compliance at the end of the program. [1/Pa]"""
+        if not self.facts["compliance_at_end"] > 0:
+            raise NotKnown("There is no creep by the end of the program.")
+        return float(self.facts["compliance_at_end"])
+
+    @cached_property
+    def bodies(self) -> list[tuple[float, float, float]]:
+        """Early and late contact compliance [1/Pa] and Poisson's ratio [-] of one or two bodies.
+
+        Empty if a ratio is not known or changes in time.
+        """
+        if "poisson" in self.facts:
+            return [(float(self.facts["compliance_at_once"]), self.late, float(self.facts["poisson"]))]
+        materials = [] if self.case is None else self.case.materials
+        if any(map(separability_error, materials)):
+            return []
+        return [
+            (float(one.contact_compliance(0.0)), float(one.contact_compliance(self.creep_time)), float(one.poisson))
+            for one in materials
+        ]
