@@ -65,14 +65,11 @@ class Numerics:
     def __post_init__(self) -> None:
         if self.time_step != "auto":
             try:
-                self._keep("time_step", number(self.time_step, "s", "time_step", above=0))
+                step = number(self.time_step, "s", "time_step", above=0)
             except InputError as error:
                 expected = f"'auto', or {error.expected}"
                 raise InputError(key="time_step", found=self.time_step, expected=expected) from error
-
-    def _keep(self, name: str, value: Any) -> None:
-        """Replace a stated value by the value that the program uses."""
-        object.__setattr__(self, name, value)
+            object.__setattr__(self, "time_step", step)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +87,7 @@ class Settings(Numerics):
     ------
     InputError
         If a value is invalid. What depends on the program or on the surface is checked where these are known, in
-        :func:`roughvisc.experiment.scene.build_scene`.
+        :func:`roughvisc.experiment.loading.check_program`.
 
     Examples
     --------
@@ -111,17 +108,28 @@ class Settings(Numerics):
         for name, words in WORDS.items():
             if (found := getattr(self, name)) not in words:
                 raise InputError(key=name, found=found, expected=" or ".join(map(repr, words)))
-        self._keep("tolerance", number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1))
-        self._keep("times", _times(self.times))
+        tolerance = number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1)
+        times: Any = self.times
+        expected = f"a positive number of times up to {MOST_TIMES}, a list of times [s], or None"
+        if isinstance(times, int | np.integer):
+            if not 1 <= times <= MOST_TIMES:
+                raise InputError(key="times", found=int(times), expected=expected)
+            times = int(times)
+        elif times is not None:
+            try:
+                times = tuple(np.unique(np.asarray(in_si(times, "s", "times"), dtype=float)).tolist())
+            except (TypeError, ValueError) as error:  # an InputError is a ValueError
+                raise InputError(key="times", found=self.times, expected=expected) from error
         try:
             names = tuple(self.fields)
         except TypeError:
             names = (self.fields,)
         if not set(names) <= set(FIELDS):
             raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")
-        self._keep("fields", names)
-        if self.grid_error != "auto":
-            self._keep("grid_error", bool(self.grid_error))
+        grid_error = self.grid_error if self.grid_error == "auto" else bool(self.grid_error)
+        found = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}
+        for name, value in found.items():
+            object.__setattr__(self, name, value)
 
     def has_grid_error(self, cells: int, axis: str) -> bool:
         """Return whether a result over an axis states its grid error.
@@ -133,21 +141,6 @@ class Settings(Numerics):
             return self.grid_error
         fewest, most = GRID_ERROR_CELLS
         return fewest <= cells <= most and (axis == "speed" or "pressure" in self.fields)
-
-
-def _times(value: Any) -> int | tuple[float, ...] | None:
-    """Return a number of times, or listed times in order, each once. [s]"""
-    expected = f"a positive number of times up to {MOST_TIMES}, a list of times [s], or None"
-    if value is None:
-        return None
-    if isinstance(value, int | np.integer):
-        if not 1 <= value <= MOST_TIMES:
-            raise InputError(key="times", found=int(value), expected=expected)
-        return int(value)
-    try:
-        return tuple(np.unique(np.asarray(in_si(value, "s", "times"), dtype=float)).tolist())
-    except (TypeError, ValueError) as error:  # an InputError is a ValueError
-        raise InputError(key="times", found=value, expected=expected) from error
 
 
 #: Message if ``auto`` cannot be resolved, for a study file; in Python ``=`` has no spaces.

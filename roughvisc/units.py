@@ -90,7 +90,7 @@ def quantity(value: str | float, unit: str, key: str = "", *, difference: bool =
     >>> quantity("0.3 1/MPa", "1/Pa"), quantity("0.31/MPa", "1/Pa"), quantity("2 1/(kPa s)", "1/(Pa s)")
     (3e-07, 3.1e-07, 0.002)
     """
-    expected, problem = _expected(unit), ""
+    finite = problem = ""
     result = math.nan
     if isinstance(value, str):
         try:
@@ -102,9 +102,9 @@ def quantity(value: str | float, unit: str, key: str = "", *, difference: bool =
             result = float(value)
         except OverflowError:  # an integer of hundreds of digits
             result = math.inf
-        expected = f"{expected}, finite"
+        finite = ", finite"
     if not math.isfinite(result):
-        named = f"{key}: " if key else ""
+        named, expected = f"{key}: " if key else "", _expected(unit) + finite
         message = f"{named}found {short_repr(value)}{problem}: expected {expected}"
         raise InputError(message, key=key, found=value, expected=expected)
     return result

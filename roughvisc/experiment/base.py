@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body, separability_error
+from roughvisc.mechanics.body import Body
 from roughvisc.settings import OPEN_BOUNDARY, OVER_TIME, Settings, known_boundary
 from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing
@@ -73,7 +73,7 @@ def facts_of(body: Body, end: float, time_scale: float) -> dict[str, Any]:
         Shortest time in which the load or the approach changes; infinite in a steady state. [s]
     """
     material = body.material
-    poisson = {} if separability_error(body.material) else {"poisson": material.poisson}
+    poisson = {} if material.stands_for else {"poisson": material.poisson}
     return {
         **body.attributes(),
         "compliance_at_once": float(material.contact_compliance(0.0)),

@@ -1,15 +1,19 @@
-"""Times of the rows that a result keeps."""
+"""Times of the rows that a result keeps, and the shortest age of the material that matters to them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.memory_choice import SERIES_SHARE
 from roughvisc.mechanics.program import Program, instant
+from roughvisc.mechanics.stepping import SHORTEST_PAIR
+from roughvisc.settings import Settings
 
 Array = NDArray[np.float64]
 #: Times that differ by at most this many units in the last place are one: sums and logarithms of times err by a few.
@@ -111,3 +115,32 @@ def spread_times(program: Program, count: int) -> Array:
             found.append(began + parts * segment.duration)
             before = segment.duration
     return np.unique(np.concatenate(found))
+
+
+def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
+    """Return the arguments of :func:`~roughvisc.mechanics.memory_choice.choose_memory` that do not depend on the body.
+
+    Notes
+    -----
+    ``shortest`` is the shortest age, next to zero, at which the compliance matters to the kept rows; zero for a program
+    of jumps alone. The shortest interval ``h`` lies between a corner of the program and the kept time after it. Ages
+    below ``f h`` only belong to pressure that came in the last part ``f`` of the interval. There a compliance that
+    starts from the right value is wrong by at most the creep, which is less than ``f C(h)`` over the interval. With a
+    tenth of the tolerance for ``f`` this is as large as the error allowed beyond. No step is shorter than a millionth
+    of a segment, so a smaller ``f`` is not needed.
+    """
+    shortest, kept = math.inf, kept_times(program, settings.times)
+    for segment in program.segments:
+        if segment.duration > 0:
+            shortest = min(shortest, segment.duration, segment.period)
+    if math.isinf(shortest):
+        shortest = 0.0
+    elif kept is None:
+        shortest *= SHORTEST_PAIR
+    else:
+        corners, times = np.array(program.corners), np.array(kept)
+        after = np.searchsorted(times, corners, side="right")
+        corners, after = corners[after < times.size], after[after < times.size]
+        shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
+        shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
+    return {"duration": program.duration, "tolerance": settings.tolerance, "shortest": shortest}

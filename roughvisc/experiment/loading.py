@@ -12,25 +12,39 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.errors import EdgeContactError
+from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows, facts_of
-from roughvisc.experiment.notes import loading_warnings, table_note
+from roughvisc.experiment.kept_times import kept_times, memory_options
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
-from roughvisc.experiment.scene import build_scene, check_program
 from roughvisc.experiment.stated import area_error, error_columns, length_of, meets_tolerance
+from roughvisc.experiment.warnings import loading_warnings
 from roughvisc.labels import warnings_text
+from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.layer import LayeredBody
+from roughvisc.mechanics.layer_memory import check_convergence
 from roughvisc.mechanics.memory import History
+from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import Difference, Point, State, Step, march
+from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
-from roughvisc.topography.grid import nominal_area
+from roughvisc.settings import Settings
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
+
+#: Times and loads whose squares and products stay far from overflow. [s], [N]
+LARGEST = 1e100
+#: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: time steps of a
+#: millionth of it must move the time.
+LEAST_ROUNDINGS = 4e6
+#: Displacements of a periodic surface may exceed its heights by this factor before their rounding exceeds a tenth of
+#: these.
+MOST_HEIGHTS = 1e15
 
 
 @dataclass(frozen=True)
@@ -54,6 +68,10 @@ class LoadingState:
     enlarged: int = 0
     outgrown: int = 0
     border: float | None = None
+
+
+#: Dataclasses that the state of a row is made of, beside plain values, tuples and arrays: for checkpoints.
+STATES = (LoadingState, State, Point, History, Difference)
 
 
 @dataclass(frozen=True)
@@ -83,10 +101,6 @@ class Loading(Experiment):
         return f"t = {unit(done):.3g} of {unit.text(end)}"
 
 
-#: Dataclasses that the state of a row is made of, beside plain values, tuples and arrays: for checkpoints.
-STATES = (LoadingState, State, Point, History, Difference)
-
-
 class LoadingRows(Rows):
     """Accepted steps of a run, in order: histories of all of them, fields of those that are kept.
 
@@ -105,20 +119,37 @@ class LoadingRows(Rows):
     def __init__(
         self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
     ) -> None:
-        height, body, settings = problem.height, problem.body, problem.settings
-        shape = height.sizes["x"], height.sizes["y"]
-        self._area, self.end = nominal_area(height), program.duration
-        program = program.on_area(self._area)
-        require_loading(shape, program, settings, body, in_memory=in_memory)
+        height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
+        require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory=in_memory)
         profile = Profile(height, settings.missing, body.kernel)
+        program = program.on_area(profile.area)
         check_program(profile, body, program, settings)
+
         enlarged, outgrown = (None, 0) if state is None else (state.enlarged, state.outgrown)
-        profile, self._domain, enlarged, _ = choose_surface(profile, problem, program, enlarged, outgrown)
-        self._start = state or LoadingState(enlarged=enlarged)
-        self._scene, self._choice = build_scene(profile, self._domain, body, program, settings)
-        self.problem, self._profile = replace(problem, height=profile.height), profile
-        log.info("memory: %s", self._choice.note)
+        surface = choose_surface(profile, problem, program, enlarged, outgrown)
+        self._area, self._profile, self._domain = profile.area, surface.profile, surface.domain
+        self.problem = replace(problem, height=surface.profile.height)
+        self._start = state or LoadingState(enlarged=surface.enlarged)
         self._border = self._start.border
+
+        profile, cells = surface.profile, surface.domain.cells
+        gap = np.ascontiguousarray(profile.gap[cells])
+        grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel)
+        options = memory_options(program, settings)
+        self._choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
+        log.info("memory: %s", self._choice.note)
+        self._scene = Scene(
+            grid=grid,
+            gap=gap,
+            memory=self._choice.memory,
+            program=program,
+            kept=kept_times(program, settings.times, profile.spacing),
+            tolerance=settings.tolerance,
+            time_step=None if settings.time_step == "auto" else settings.time_step,
+            present=None if profile.all_present else profile.present[cells],
+        )
+        if isinstance(body, LayeredBody):
+            check_convergence(body, self._scene)
 
     def __iter__(self) -> Iterator[Row]:
         """Compute the steps to the end of the program.
@@ -126,13 +157,21 @@ class LoadingRows(Rows):
         Raises
         ------
         Outgrown
-            If contact outgrows the domain: the run must begin again.
+            If contact outgrows the domain, or reaches the border of an indenter's surface: the run must begin again.
+        EdgeContactError
+            If contact reaches the border of another free surface, unless that is accepted.
         """
-        scene, start, largest = self._scene, self._start, self._start.largest
-        every, ends = scene.kept is None, set(scene.program.corners)
+        scene, start, largest, domain = self._scene, self._start, self._start.largest, self._domain
+        every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
         for step in march(scene, start.march):
             point = step.point
-            self._check_border(step)
+            if is_free and point.force > 0:
+                if BEYOND * point.approach >= domain.outside:
+                    raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
+                touches = point.pressure > 0
+                if domain.is_whole and (touches[[0, -1]].any() or touches[:, [0, -1]].any()):
+                    self._reach_border(point.time)
+
             so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
             stated = error_columns(step, scene, self._choice.series_error, so_far)
             kept = scene.keeps(point.time)
@@ -149,24 +188,16 @@ class LoadingRows(Rows):
                 values, fields = self._row(step, stated, kept)
             yield Row(point.time, values, fields, kept, state=state, done=point.time)
 
-    def _check_border(self, step: Step) -> None:
-        """Record contact at the border of a free surface, or refuse it; find out if the domain is outgrown."""
-        scene, start, point, domain = self._scene, self._start, step.point, self._domain
-        if scene.grid.boundary != "free" or point.force == 0:
-            return
-        if BEYOND * point.approach >= domain.outside:
-            raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
-        touches = point.pressure > 0
-        if not domain.is_whole or not (touches[[0, -1]].any() or touches[:, [0, -1]].any()):
-            return
+    def _reach_border(self, time: float) -> None:
+        """Record that contact reaches the border of a free surface, enlarge an indenter, or refuse the contact."""
+        start, (nx, ny) = self._start, self._profile.gap.shape
         if self.problem.settings.edge == "accept":
-            self._border = point.time if self._border is None else self._border
+            self._border = time if self._border is None else self._border
             return
         if enlarged_indenter(self._profile.height) is not None:
             raise Outgrown(LoadingState(enlarged=start.enlarged + 1, outgrown=start.outgrown))
-        nx, ny = scene.gap.shape
         raise EdgeContactError(
-            f"at {point.time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected "
+            f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected "
             "contact inside it; use boundary='mirror' for a nominally flat scan, a larger scan, a smaller load, or "
             "edge='accept' to treat the scan outline as a punch"
         )
@@ -184,7 +215,7 @@ class LoadingRows(Rows):
             Whether it is a row of the result, or of the histories of all steps only.
         """
         scene, profile, domain, point = self._scene, self._profile, self._domain, step.point
-        contact, grid = point.pressure > 0, scene.grid
+        contact, grid, is_whole = point.pressure > 0, scene.grid, domain.is_whole
         present = scene.memory.displacement(point.history)
         displacement, effective = present[0], present[-1]
         gap = np.maximum(scene.gap + displacement - point.approach, 0.0)
@@ -193,18 +224,18 @@ class LoadingRows(Rows):
         # The count is too large by a part of the strip along the perimeter, where contact ends although the material
         # goes on. Where the material itself ends, at an absent cell or at the border of a scan in free space, the edge
         # of the contact is known, and the count exact. A cell at a mirror neighbours its own image: no edge either.
-        free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not domain.is_whole
+        free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not is_whole
         count = int(np.count_nonzero(contact))
         counted = count * grid.cell_area
         strip = staircase(contact, free, grid.cell_area, grid.boundary == "periodic", before=goes_on, beyond=goes_on)
         area = max(counted - strip, 0.0)
 
-        if domain.is_whole:
+        is_full = is_whole and count == np.count_nonzero(profile.present)
+        status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
+        if is_whole:
             mean_gap = float(np.mean(gap, where=profile.present))
         else:
             mean_gap = profile.mean_gap + domain.mean_displacement(effective) - point.approach
-        is_full = domain.is_whole and count == np.count_nonzero(profile.present)
-        status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
         row: dict[str, Any] = {
             "force": point.force,
             "approach": point.approach,
@@ -231,19 +262,20 @@ class LoadingRows(Rows):
             return row, {}
         row |= stated | {"contact_area_error": area_error(step, scene, gap, counted, area)}
 
-        names = self.problem.settings.fields
-        fields = {"pressure": point.pressure, "displacement": displacement, "gap": gap}
-        if domain.is_whole:
-            fields["gap"] = np.where(profile.present, gap, np.nan)
+        names, fields, pressure = self.problem.settings.fields, {}, point.pressure
+        if is_whole:
+            gap = np.where(profile.present, gap, np.nan)
         else:
-            fields["pressure"] = domain.padded(point.pressure)
+            pressure = domain.padded(pressure)
             if "displacement" in names or "gap" in names:
                 whole = domain.displacement(effective)
                 whole[domain.cells] = displacement
                 opening = np.maximum(profile.gap + whole - point.approach, 0.0)
                 opening[domain.cells] = gap
-                fields |= {"displacement": whole, "gap": opening}
-        return row, {name: fields[name] for name in names}
+                displacement, gap = whole, opening
+        for name in names:
+            fields[name] = {"pressure": pressure, "displacement": displacement, "gap": gap}[name]
+        return row, fields
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result with the cost of each row, the nominal pressure and the attributes.
@@ -254,19 +286,99 @@ class LoadingRows(Rows):
         dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
         dataset["nominal_pressure"] = dataset["force"] / self._area
         loaded = self._profile.height[self._domain.cells]
-        warnings = loading_warnings(scene, self._profile, dataset, loaded=loaded, border=self._border)
-        warnings["series"] = choice.warning(scene.tolerance)
-        for subject, note in warnings.items():
-            if note and subject not in ("accuracy", "tolerance"):
-                log.warning("%s", note)
-        warnings["material"] = table_note(body.materials)
+        warnings = loading_warnings(
+            scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border
+        )
+        for subject, text in warnings.items():
+            if text and subject not in ("accuracy", "tolerance", "material"):
+                log.warning("%s", text)
         attributes = facts_of(body, self.end, scene.program.time_scale)
         if body.separates:  # of what was pressed, a series or not; of layers those of the top one
             attributes["compliance_at_once"] = scene.memory.compliance(0.0)
             attributes["compliance_at_end"] = scene.memory.compliance(self.end)
-        attributes |= {
-            "memory": choice.note,
-            "series_error": choice.series_error,
-            "warnings": warnings_text(warnings),
-        }
-        return dataset.assign_attrs({name: value for name, value in attributes.items() if value != ""})
+        attributes |= {"memory": choice.note, "series_error": choice.series_error}
+        if text := warnings_text(warnings):
+            attributes["warnings"] = text
+        return dataset.assign_attrs(attributes)
+
+
+def check_program(profile: Profile, body: Body, program: Program, settings: Settings) -> None:
+    """Refuse surface, material, program and settings that do not go together.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    body, program, settings
+        Of the case; the program has loads in place of nominal pressures.
+
+    Raises
+    ------
+    InputError
+        Naming the segment or the setting, and what is expected.
+    """
+    if not program.segments:
+        raise InputError("the program is empty: expected at least one segment")
+    boundary = settings.boundary
+    for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
+        where, shortest = f"program.{number}", min(segment.duration, segment.period)
+        what = "the period of a cycle" if segment.period < segment.duration else "a segment"
+        if segment.duration > 0 and not (shortest >= 1 / LARGEST and end <= LARGEST):
+            raise InputError(
+                f"{where}: {what} lasts {shortest:g} s and ends by {end:g} s: expected times from "
+                f"{1 / LARGEST:g} to {LARGEST:g} s"
+            )
+        if segment.duration > 0 and shortest < LEAST_ROUNDINGS * math.ulp(end):
+            raise InputError(
+                f"{where}: {what} lasts {shortest:g} s where time has reached {end:g} s, which has a resolution of "
+                f"{math.ulp(end):.2g} s: expected at least {LEAST_ROUNDINGS * math.ulp(end):.2g} s"
+            )
+        if segment.slide is not None:
+            if boundary == "mirror":
+                raise InputError(
+                    key="boundary",
+                    found="mirror",
+                    expected="'periodic' for a program that slides, on the unfolded surface rv.mirror(height): mirror "
+                    "images would slide towards each other",
+                )
+            if boundary != "periodic":
+                raise InputError(
+                    "boundary is 'free' and the program slides: in free space the wake of the profile leaves the grid "
+                    "at its back; expected boundary = 'periodic'"
+                )
+            if number == 0:
+                raise InputError(f"{where} slides before there is a load: expected load, pressure or approach before")
+            try:
+                segment.slide.cells(profile.spacing)
+            except InputError as error:
+                raise error.prefixed(where) from None
+    duration = program.duration
+    if settings.time_step != "auto" and settings.time_step < 4 * math.ulp(duration):
+        raise InputError(
+            f"time_step is {settings.time_step!r} s and the program ends at {duration:g} s, which has a resolution of "
+            f"{math.ulp(duration):.2g} s: expected a longer step"
+        )
+    load, heights = program.largest_load, float(np.ptp(profile.gap[profile.present]))
+    if load > LARGEST:
+        raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
+    if boundary != "free" and heights > 0:
+        # as if the whole surface gave way like a punch of its longer side
+        compliance = float(body.material.contact_compliance(duration))
+        sides = profile.gap.shape[0] * profile.spacing[0], profile.gap.shape[1] * profile.spacing[1]
+        displaced = load / math.prod(sides) * compliance * max(sides)
+        if displaced > MOST_HEIGHTS * heights:
+            raise InputError(
+                f"the load reaches {load:g} N, which would close gaps {displaced / heights:.1g} times as high as this "
+                f"surface has: rounding would hide the variation of the pressure; expected at most "
+                f"{load * MOST_HEIGHTS * heights / displaced:.1g} N"
+            )
+    # Beyond full contact an approach has no pressure. Where cells are absent the body bulges into them, and every
+    # approach has its force.
+    if boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):
+        for number, segment in enumerate(program.segments):
+            largest = (segment.end or 0.0) + abs(segment.amplitude)
+            if segment.control == "approach" and segment.end is not None and largest >= profile.mean_gap:
+                raise InputError(
+                    f"program.{number}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is "
+                    f"full at {profile.mean_gap:.6g} m: expected less"
+                )

@@ -18,18 +18,17 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows, facts_of
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
-from roughvisc.experiment.notes import (
-    border_note,
-    contact_stands_alone,
-    creep_left,
-    slope_note,
-    speeds_note,
-    surface_stands_alone,
-    table_note,
-    wake_note,
-)
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
+from roughvisc.experiment.warnings import (
+    border_warning,
+    slope_warning,
+    speeds_warning,
+    stands_alone,
+    table_warning,
+    unrecovered,
+    wake_warning,
+)
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import faces_between, staircase
@@ -226,7 +225,6 @@ class SlidingRows(Rows):
         self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.speeds))
         self._force = curve.force(self._profile.area)
         self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
-        self._alone = surface_stands_alone(self._profile.height)
         self._coarser: list[SlidingGrid] = []
         if problem.settings.grid_error:
             twice, four_times = self._grid.coarser(2.0), self._grid.coarser(4.0)
@@ -255,9 +253,10 @@ class SlidingRows(Rows):
             if not found.converged:
                 row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
                 fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
-            elif contact_stands_alone(found.pressure, 0) if self._alone is None else self._alone:
-                ages = grid.period / speed, np.inf
-                creep = max(creep_left(*(float(one.contact_compliance(age)) for age in ages)) for one in law.materials)
+            elif stands_alone(self._profile.height, found.pressure, 0):
+                for one in law.materials:
+                    crept, most = (float(one.contact_compliance(age)) for age in (grid.period / speed, np.inf))
+                    creep = max(creep, unrecovered(crept, most))
             row["convolutions"] = sliding.convolutions
             row["creep_left"] = creep  # where the next contact comes
             yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
@@ -294,13 +293,13 @@ class SlidingRows(Rows):
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         longest = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
         warnings = {
-            "slope": slope_note(height, "periodic", np.inf),
-            "border": border_note(height, xr.Dataset()),
-            "wake": wake_note(left, self._grid.period),
+            "slope": slope_warning(height, "periodic", np.inf),
+            "border": border_warning(height, xr.Dataset()),
+            "wake": wake_warning(left, self._grid.period),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
-        stated = {"speeds": speeds_note(dataset), "material": table_note(self._body.materials)}
+        stated = {"speeds": speeds_warning(dataset), "material": table_warning(self._body.materials)}
         attributes = facts_of(self.problem.body, longest / min(self._curve.speeds), math.inf) | {
             "direction": self._curve.direction,
             "warnings": warnings_text(stated | warnings),

@@ -21,8 +21,9 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import check_grid, love_kernel
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
+from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
 
@@ -199,10 +200,9 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
 
 def periodic_waves(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
     """Return the wave numbers of a symbol under periodic pressure, along x and along y, which broadcast. [1/m]"""
-    qx, qy = (
-        np.array(2 * math.pi / (n * side) * np.arange(n // 2 + 1), dtype=np.float64)
-        for n, side in zip(shape, spacing, strict=True)
-    )
+    (nx, ny), (dx, dy) = shape, spacing
+    qx = 2 * math.pi / (nx * dx) * np.arange(nx // 2 + 1.0)
+    qy = 2 * math.pi / (ny * dy) * np.arange(ny // 2 + 1.0)
     return qx[:, None], qy[None, :]
 
 
@@ -239,9 +239,9 @@ class Body:
     kernel: Kernel = HALF_SPACE
 
     def __post_init__(self) -> None:
-        if isinstance(self.material, Body):
-            raise InputError(f"material is the body {self.material!r}: expected a material")
-        check_material(self.material)
+        if not isinstance(self.material, Prony | Creep):
+            expected = "a material, such as rv.zener(...) or rv.creep(function)"
+            raise InputError(key="material", found=self.material, expected=expected)
         for name in ("influence", "transfer"):
             if not callable(getattr(self.kernel, name, None)):
                 found = type(self.kernel).__name__
@@ -261,11 +261,6 @@ class Body:
     def materials(self) -> tuple[Material, ...]:
         """Materials of the body."""
         return (self.material,)
-
-    @property
-    def note(self) -> str:
-        """How the materials were obtained, for the notes of a result; empty if there is nothing to say."""
-        return "; ".join(one.note for one in self.materials if one.note)
 
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> Self:
         """Return the body with materials that represent its own at some frequencies, see :func:`over_frequencies`.
@@ -305,8 +300,3 @@ class Body:
 def body_of(material: Any) -> Body:
     """Return a body itself, or the half-space of a material."""
     return material if isinstance(material, Body) else Body(material)
-
-
-def separability_error(material: Material) -> str:
-    """Return what a material represents if it is not one body of a constant Poisson ratio; otherwise empty."""
-    return check_material(material).stands_for

@@ -16,9 +16,9 @@ from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Gauss points per side that give 1e-15 beyond a distance in units of the longer cell side. The closed form
-# cancels as eps (r / side)^2 (7e-8 at 16384 cells) and is used inside the first distance only.
-_GAUSS = ((4.0, 8), (16.0, 5), (40.0, 4), (200.0, 3))
+# Rings of distances in units of the longer cell side, and the Gauss points per side that give 1e-15 in them. The closed
+# form cancels as eps (r / side)^2 (7e-8 at 16384 cells) and is used inside the first ring only.
+_GAUSS = ((4.0, 16.0, 8), (16.0, 40.0, 5), (40.0, 200.0, 4), (200.0, math.inf, 3))
 
 
 def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
@@ -64,8 +64,7 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     near = distance <= _GAUSS[0][0]
     rows, columns = np.nonzero(near)
     kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
-    bounds = [start for start, _ in _GAUSS[1:]] + [math.inf]
-    for (start, points), end in zip(_GAUSS, bounds, strict=True):
+    for start, end, points in _GAUSS:
         ring = (distance > start) & (distance <= end)
         if ring.any():
             rows, columns = np.nonzero(ring)
@@ -140,7 +139,8 @@ def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
 
 def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
     """Refuse an impossible grid."""
-    if any(int(n) != n or n < 1 for n in shape):
+    (nx, ny), (dx, dy) = shape, spacing
+    if int(nx) != nx or int(ny) != ny or min(nx, ny) < 1:
         raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")
-    if not all(math.isfinite(side) and side > 0 for side in spacing):
+    if not (0 < dx < math.inf and 0 < dy < math.inf):
         raise InputError(f"spacing is {spacing}: expected two positive lengths [m]")

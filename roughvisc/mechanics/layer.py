@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, separability_error
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
 from roughvisc.mechanics.half_space import cell_mean, check_grid, corner_sum, love_kernel
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -599,7 +599,7 @@ def _check(name: str, material: Any) -> None:
     """Refuse what is not a material of one body with a constant Poisson's ratio of 0 to 1/2."""
     if isinstance(material, Body):
         raise InputError(key=name, found=material, expected="a material" + " or a layer" * (name == "on"))
-    amiss = separability_error(material)
+    amiss = check_material(material).stands_for
     if amiss:
         raise InputError(key=name, found=amiss, expected="one body, Poisson's ratio constant")
     poisson = material.poisson

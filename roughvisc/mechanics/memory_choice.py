@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.creep import Creep, Material, check_material
+from roughvisc.mechanics.body import Body, body_of
+from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
 from roughvisc.mechanics.memory import Memory
@@ -45,16 +45,6 @@ class Choice:
     def material(self) -> Prony:
         """The Prony series that the solver uses."""
         return self.memory.series
-
-    def warning(self, tolerance: float) -> str:
-        """Return a warning if the series is farther from the material than the tolerance, else ''."""
-        off = max(self.series_error, self.misfit)
-        if off <= tolerance:
-            return ""
-        return (
-            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
-            f"{tolerance:g} (memory): no passive material comes nearer to it."
-        )
 
 
 def choose_memory(
@@ -94,12 +84,13 @@ def choose_memory(
         If the material is not known over the whole program, or no memory of the body is known.
     """
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
-    if isinstance(body, Body) and not body.separates:
+    body = body_of(body)
+    if not body.separates:
         return _of_layers(body, duration, tolerance, shortest, grid)
-    material = body.material if isinstance(body, Body) else check_material(body)
+    material = body.material
     if isinstance(material, Prony):
         memory = Memory(material, duration, keeps_pressure)
-        return Choice(memory, 0.0, _joined(in_words(material), material.note))
+        return Choice(memory, 0.0, "; ".join(filter(None, (in_words(material), material.note))))
     if duration == 0:
         found = at_once(material)
         note = "instantaneous compliance" if found.glassy else "no instantaneous compliance"
@@ -107,8 +98,8 @@ def choose_memory(
     found, error = series(material, shortest, duration, SERIES_SHARE * tolerance)
     within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
     active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
-    note = _joined(in_words(found) + within * bool(error), material.note, active)
-    return Choice(Memory(found, duration, keeps_pressure), error, note, material.misfit)
+    notes = in_words(found) + within * bool(error), material.note, active
+    return Choice(Memory(found, duration, keeps_pressure), error, "; ".join(filter(None, notes)), material.misfit)
 
 
 def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, grid: Any) -> Choice:
@@ -138,7 +129,8 @@ def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, g
             f"share, each with compliances of its own, within {error:.1e} of them from {shortest:.1g} s on"
         )
     misfit = max(one.misfit if isinstance(one, Creep) else 0.0 for one in given)
-    return Choice(LayerMemory(waves, duration, grid), error, _joined(note, *(one.note for one in given)), misfit)
+    notes = "; ".join(filter(None, (note, *(one.note for one in given))))
+    return Choice(LayerMemory(waves, duration, grid), error, notes, misfit)
 
 
 def at_once(material: Prony | Creep) -> Prony:
@@ -156,7 +148,3 @@ def in_words(found: Prony) -> str:
     if not count:
         return "a fluidity"
     return f"{exponentials} and a fluidity" if found.fluidity else exponentials
-
-
-def _joined(*notes: str) -> str:
-    return "; ".join(filter(None, notes))

@@ -17,7 +17,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.units import Quantity, format_quantity, number, quantities
+from roughvisc.units import Quantity, format_quantity, number
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
@@ -481,7 +481,6 @@ class Program:
         duration = length * number(cycles, "1", "cycles", above=0, most=MOST_CYCLES)
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
-    @quantities(area="m^2")
     def on_area(self, area: Quantity) -> Program:
         """Convert nominal pressures to loads on a surface.
 
@@ -497,14 +496,15 @@ class Program:
         """
         if not self.prescribes_pressure:
             return self
-        return replace(self, segments=tuple(segment.on_area(area) for segment in self.segments))
+        size = number(area, "m^2", "area", above=0)
+        return replace(self, segments=tuple(segment.on_area(size) for segment in self.segments))
 
     @cached_property
     def slides(self) -> bool:
         """Whether the profile slides anywhere."""
         return any(segment.slide is not None for segment in self.segments)
 
-    @property
+    @cached_property
     def prescribes_pressure(self) -> bool:
         """Whether a nominal pressure is prescribed anywhere."""
         return any(segment.control == "pressure" for segment in self.segments)
@@ -533,7 +533,7 @@ class Program:
         """Start of the program and end of each segment. [s]"""
         return [0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist()]
 
-    @property
+    @cached_property
     def largest_load(self) -> float:
         """Largest load prescribed anywhere; zero if none is. [N]
 

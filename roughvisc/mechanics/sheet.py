@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body, Kernel, separability_error
+from roughvisc.mechanics.body import Body, Kernel
 from roughvisc.mechanics.half_space import cell_mean, check_grid, love_kernel
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     >>> ds.attrs["thickness"], ds.attrs["base"]
     (0.0001, 'bonded')
     """
-    amiss = separability_error(material)
+    amiss = check_material(material).stands_for
     if amiss:
         expected = f"none with a material that is {amiss}; a sheet has one material, Poisson's ratio constant"
         raise InputError(key="thickness", found=thickness, expected=expected)

@@ -26,8 +26,8 @@ from scipy.special import erf, erfinv
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Experiment, Problem
 from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
-from roughvisc.experiment.kept_times import kept_times
-from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.kept_times import kept_times, memory_options
+from roughvisc.experiment.loading import Loading, check_program
 from roughvisc.experiment.profile import Domain, Profile, choose_domain, choose_surface
 from roughvisc.experiment.resources import (
     PART,
@@ -40,7 +40,6 @@ from roughvisc.experiment.resources import (
     memory_available,
     too_large,
 )
-from roughvisc.experiment.scene import check_program, memory_options
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid

@@ -113,14 +113,11 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
         raise InputError(f"{step}: found dimensions {tuple(map(str, h.dims))}: expected heights over ('x', 'y')")
     h = h.transpose("x", "y").compute()
     h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
-    positions = {
-        axis: (axis, in_metres(h[axis], f"{step}: coordinate {axis!r}"), h[axis].attrs)
-        for axis in ("x", "y")
-        if axis in h.coords and unit_of(h[axis]) not in (None, "m")
-    }
-    h = h.assign_coords(positions) if positions else h
     for axis in ("x", "y"):
         if axis in h.coords:
+            if unit_of(h[axis]) not in (None, "m"):
+                centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
+                h = h.assign_coords({axis: (axis, centres, h[axis].attrs)})
             h[axis].attrs["units"] = "m"
     spacing(h, step)
     for axis in ("x", "y"):
@@ -137,8 +134,6 @@ def unit_of(numbers: Any) -> str | None:
 
 def metres_in(unit: str, name: str) -> float:
     """Metres in a unit of length; an :class:`InputError` that names who is in it, if it is none."""
-    if unit == "m":
-        return 1.0
     try:
         return quantity(f"1 {unit}", "m")
     except InputError as error:
@@ -161,7 +156,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
         If they are no real numbers, are packed as in a file or held by pint, or their unit is no length.
     """
     unit = unit_of(numbers)
-    factor = 1.0 if unit is None else metres_in(unit, name)
+    factor = 1.0 if unit in (None, "m") else metres_in(unit, name)
     if isinstance(numbers, xr.DataArray):
         packed = _PACKED & set(numbers.attrs)
         if packed:
@@ -184,7 +179,13 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
     """Cell sides (dx, dy) of a grid [m]; an :class:`InputError` if the steps along a coordinate are not equal."""
-    return axis_step(h, "x", step), axis_step(h, "y", step)
+    sides = []
+    for axis in ("x", "y"):
+        if axis not in h.coords:
+            raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
+        name = f"{step}: coordinate {axis!r}"
+        sides.append(cell_side(in_metres(h[axis], name), name))
+    return sides[0], sides[1]
 
 
 def filled_points(h: xr.DataArray) -> np.ndarray | None:
@@ -202,14 +203,6 @@ def with_filled_points(h: xr.DataArray, filled: np.ndarray | None) -> xr.DataArr
 def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
     """Area of the whole grid, absent cells included, to which the nominal pressure refers. [m2]"""
     return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))
-
-
-def axis_step(h: xr.DataArray | xr.Dataset, axis: str, step: str) -> float:
-    """Side of the cells along one axis of a grid [m], as :func:`cell_side` gives it."""
-    if axis not in h.coords:
-        raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
-    name = f"{step}: coordinate {axis!r}"
-    return cell_side(in_metres(h[axis], name), name)
 
 
 def cell_side(centres: Any, name: str = "the coordinate") -> float:

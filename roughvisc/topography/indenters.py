@@ -201,8 +201,8 @@ def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, flo
     try:
         recipe = json.loads(h.attrs["recipe"])
         evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
-        (width, depth), cell = recipe["size"], cell_of(recipe["size"], recipe["shape"])
-        centre = width / 2, depth / 2
+        (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
+        cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None

@@ -106,13 +106,14 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
         NaN where no point is left for it. [-]
     """
     slope_x, slope_y = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
-    return float(np.sqrt(_mean(slope_x**2 + slope_y**2)))
+    return float(np.sqrt((slope_x**2 + slope_y**2).mean())) if slope_x.size else math.nan
 
 
 def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
     """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1)."""
-    dx, dy = spacing(h)
-    z = np.pad(h.values, [(0, n) for n in _beyond(h, periodic)], mode="wrap")
+    (dx, dy), (nx, ny) = spacing(h), h.shape
+    beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
+    z = np.pad(h.values, beyond, mode="wrap")
     slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
     counts = np.isfinite(slope_x) & np.isfinite(slope_y)
     if depth < math.inf:
@@ -123,17 +124,12 @@ def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[n
 
 def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:
     """Sum of the second differences along x and y where all five points are there."""
-    dx, dy = spacing(h)
-    z = np.pad(h.values, [(n, n) for n in _beyond(h, periodic)], mode="wrap")
+    (dx, dy), (nx, ny) = spacing(h), h.shape
+    z = np.pad(h.values, [(n, n) for n in (int(periodic or nx == 1), int(periodic or ny == 1))], mode="wrap")
     middle = z[1:-1, 1:-1]
     laplacian = (z[2:, 1:-1] - 2 * middle + z[:-2, 1:-1]) / dx**2
     laplacian += (z[1:-1, 2:] - 2 * middle + z[1:-1, :-2]) / dy**2
     return laplacian[np.isfinite(laplacian)]
-
-
-def _beyond(h: xr.DataArray, periodic: bool) -> tuple[int, int]:
-    """Rows and columns that come round beyond the border: of a map that repeats, and of a strip one cell wide."""
-    return int(periodic or h.shape[0] == 1), int(periodic or h.shape[1] == 1)
 
 
 def _mean(values: np.ndarray) -> np.float64:

@@ -234,7 +234,7 @@ def test_python__refuses(case):
     thick = rv.Body(rv.elastic(1e6), Sheet(1.0))
     with refused("material", thick):
         pressed(case.height(), thick, load)
-    with pytest.raises(rv.InputError, match=r"material is the body Body.*: expected a material"):
+    with refused("material", thick):
         rv.Body(thick, Sheet(1.0))
     with pytest.raises(rv.InputError, match="kernel is a float: expected a Kernel; it has no influence"):
         rv.Body(rv.elastic(1e6), 1e-4)

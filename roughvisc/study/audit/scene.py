@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.base import facts_of
 from roughvisc.experiment.loading import Loading
-from roughvisc.mechanics.body import separability_error
 from roughvisc.observables.histories import history
 from roughvisc.study.audit.limits import AuditInputs
 from roughvisc.study.case import Case
@@ -248,7 +247,7 @@ class Scene:
         if "poisson" in self.facts:
             return [(float(self.facts["compliance_at_once"]), self.late, float(self.facts["poisson"]))]
         materials = [] if self.case is None else self.case.materials
-        if any(map(separability_error, materials)):
+        if any(one.stands_for for one in materials):
             return []
         return [
             (float(one.contact_compliance(0.0)), float(one.contact_compliance(self.creep_time)), float(one.poisson))

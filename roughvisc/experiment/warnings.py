@@ -1,0 +1,261 @@
+"""Warnings about a result: missed tolerances, steep slopes, borders that do not meet, wakes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.experiment.profile import Profile
+from roughvisc.mechanics.materials.creep import Creep, Material
+from roughvisc.mechanics.memory_choice import Choice
+from roughvisc.mechanics.stepping import Scene
+from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
+from roughvisc.topography.indenters import is_indenter
+from roughvisc.topography.parameters import rms_slope
+from roughvisc.units import format_quantity
+from roughvisc.variables import NOT_CONVERGED
+
+Array = NDArray[np.float64]
+#: Part of all creep that is still to recover after a period, from which on a result says so. Friction of a sphere on a
+#: period of 6 to 11 contact radii, with 1 and 9 times the instantaneous compliance retarded: 0.4 to 0.6 % off where
+#: 1e-6 of the creep is left, 5 to 6 % where 1 to 2 % are left, 26 % where 7 to 12 % are left.
+_LEFT = 0.01
+#: The distance of a slide differs from the requested one by more than this part of it if a result says so.
+_SAME_DISTANCE = 1e-9
+#: Part of the period over which nothing touches, in one piece along the motion, from which on a contact stands alone.
+_FREE = 0.25
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
+#: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
+#: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+LARGEST_SLOPE = 0.3
+#: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
+_AT_ONCE = 0.1
+
+
+def loading_warnings(
+    scene: Scene,
+    profile: Profile,
+    dataset: xr.Dataset,
+    choice: Choice,
+    materials: Sequence[Material],
+    *,
+    loaded: xr.DataArray,
+    border: float | None,
+) -> dict[str, str]:
+    """Return the warnings about a loading by subject; a text is empty if there is nothing to say.
+
+    Parameters
+    ----------
+    scene, profile : Scene, Profile
+        As they were computed.
+    dataset : Dataset
+        The result.
+    choice : Choice
+        Memory of the body.
+    materials : sequence of Material
+        Materials of the body.
+    loaded : DataArray
+        Heights of the part of the surface that was solved on. [m]
+    border : float or None
+        End of the first step in which contact reached the border of a free surface. [s]
+    """
+    boundary, end, limit = scene.grid.boundary, scene.program.duration, scene.tolerance
+    at_once, final = scene.memory.compliance(0.0), scene.memory.compliance(end)
+    jump = tolerance = seam = edge = series = ""
+    if at_once == 0:
+        jump = "The material has no instantaneous compliance: pressure, and force under a given approach, jump"
+    elif at_once < _AT_ONCE * final:
+        jump = (
+            f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
+            "approach, nearly jump"
+        )
+    accuracy = (
+        f"{jump} in each cell that makes contact. The approach meets the tolerance; each row states its own error of "
+        "pressure, force and work."
+    )
+
+    errors = dataset["stated_error"].values
+    missed = errors[errors > limit]
+    if missed.size:
+        tolerance = (
+            f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
+            f"tolerance {limit:g}, {missed.max():.2g} at worst (stated_error)."
+        )
+        if scene.time_step is not None:
+            tolerance += " The time step is fixed, and not chosen by the tolerance."
+        if scene.motions:
+            tolerance += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
+
+    if boundary == "periodic":
+        seam = border_warning(profile.height, dataset)
+    if border is not None:
+        edge = (
+            f"Contact reached the border of the surface, first in the step to {border:.3g} s: there the surface acts "
+            "as a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "
+            '"accept").'
+        )
+    off = max(choice.series_error, choice.misfit)
+    if off > limit:
+        series = (
+            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
+            f"{limit:g} (memory): no passive material comes nearer to it."
+        )
+
+    slides, wakes, strokes = [], [], dict[int, list[tuple[float, float]]]()
+    for number, segment in enumerate(scene.program.segments):
+        if segment.slide is not None:
+            slide, cells = segment.slide, segment.slide.cells(profile.spacing)
+            strokes.setdefault(slide.axis, []).append((slide.distance, slide.distance / segment.duration))
+            real = cells * profile.spacing[slide.axis]
+            if abs(real - slide.distance) > _SAME_DISTANCE * slide.distance:
+                done, wanted = format_quantity(real, "m"), format_quantity(slide.distance, "m")
+                slides.append(f"program.{number} slides {done}, {cells} whole cells, of {wanted}")
+    for axis, runs in sorted(strokes.items()):
+        period = profile.height.shape[axis] * profile.spacing[axis]
+        if sum(distance for distance, _ in runs) < period / 2:  # it does not come as far as the next wake
+            continue
+        pressure = dataset["pressure"][-1].values if "pressure" in dataset else None
+        if stands_alone(profile.height, pressure, axis):
+            left = {speed: unrecovered(scene.memory.compliance(min(period / speed, end)), final) for _, speed in runs}
+            wakes.append(wake_warning(left, period))
+
+    approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
+    return {
+        "accuracy": accuracy if jump else "",
+        "tolerance": tolerance,
+        "slope": slope_warning(loaded, boundary, approach),
+        "border": seam,
+        "edge": edge,
+        "wake": " ".join(filter(None, wakes)),
+        "slide": "; ".join(slides),
+        "series": series,
+        "material": table_warning(materials),
+    }
+
+
+def speeds_warning(dataset: xr.Dataset) -> str:
+    """Name the speeds whose contact is not solved; empty if there are none."""
+    missing = dataset["speed"].values[dataset["status"].values == NOT_CONVERGED]
+    if not missing.size:
+        return ""
+    which = ", ".join(format_quantity(speed, "m/s") for speed in missing)
+    return (
+        f"{missing.size} of {dataset.sizes['speed']} speeds are not solved and missing: {which}. Try a looser "
+        "tolerance, a coarser grid, or layers whose moduli differ less."
+    )
+
+
+def table_warning(materials: Sequence[Material]) -> str:
+    """Return the warnings of creep tables, such as rows more than a decade apart; empty if there are none."""
+    found = [one.warning for one in materials if isinstance(one, Creep)]
+    return " ".join(dict.fromkeys(filter(None, found)))
+
+
+def border_warning(height: xr.DataArray, dataset: xr.Dataset) -> str:
+    """Return a warning if a periodic surface has a step where it repeats, else ''.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    dataset : Dataset
+        The result. If it holds the pressure, the warning states the part that the outermost cells carry.
+    """
+    borders = border_mismatch(height)
+    if not borders.jumps:
+        return ""
+    (x, y), (nx, ny) = borders.of_rms, borders.of_neighbours
+    note = (
+        f"The surface repeats with a step: opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, "
+        f"{nx:.2g} and {ny:.2g} times as much as neighbouring rows."
+    )
+    if "pressure" in dataset and float(dataset["force"][-1]) > 0:
+        last = dataset["pressure"].isel(time=-1)
+        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
+        ratio = max(float(side.mean()) for side in sides) / float(last.mean())
+        note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
+    return note + " Use boundary = 'mirror'."
+
+
+def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
+    """Return a warning if a surface is too steep for small slopes, else ''.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    boundary : {"free", "periodic", "mirror"}
+        In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
+    approach : float
+        The largest at kept times, from the highest cell. [m]
+    """
+    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else np.inf)
+    if not slope > LARGEST_SLOPE:
+        return ""
+    return (
+        f"The rms slope of the loaded surface is {slope:.2g}: the method assumes small slopes, with an error of the "
+        f"order of the squared slope. Beyond {LARGEST_SLOPE:g} the results are a rough estimate."
+    )
+
+
+def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> bool:
+    """Return whether a periodic contact is a single one: by the recipe of its surface, or by its pressure.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        An indenter is single, a regular wave is not. [m]
+    pressure : ndarray, shape (nx, ny), or None
+        Of any other surface the contact is single if a gap without contact spans at least a quarter of the period. [Pa]
+    axis : {0, 1}
+        Axis of the motion.
+    """
+    if "recipe" in height.attrs:
+        if is_indenter(height):
+            return True
+        if is_analytic(height):
+            return False
+    if pressure is None or not (pressure > 0).any():
+        return False
+    touching = np.flatnonzero((pressure > 0).any(axis=1 - axis))
+    count = pressure.shape[axis]
+    free = np.diff(touching, append=touching[0] + count) - 1
+    return bool(free.max() >= _FREE * count)
+
+
+def unrecovered(after_a_period: float, in_the_end: float) -> float:
+    """Return the part of the creep that has not recovered after a period; 1 for a material that creeps without end.
+
+    Parameters
+    ----------
+    after_a_period, in_the_end : float
+        Contact compliance. [1/Pa]
+    """
+    return 1.0 - after_a_period / in_the_end if math.isfinite(in_the_end) else 1.0
+
+
+def wake_warning(left: Mapping[float, float], period: float) -> str:
+    """Return a warning if contacts slide into each other's wake, else ''.
+
+    Parameters
+    ----------
+    left : mapping
+        Speed of a contact that stands alone [m/s] -> :func:`unrecovered` there.
+    period : float
+        Along the motion. [m]
+    """
+    speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
+    if not speeds:
+        return ""
+    slowest = format_quantity(speeds[0], "m/s")
+    where = f"at {slowest}" if len(speeds) == 1 else f"from {slowest} on"
+    percent = float(f"{100 * max(left[speed] for speed in speeds):.2g}")
+    return (
+        f"The surface repeats every {format_quantity(period, 'm')}, and {where} the contact slides into the wake of "
+        f"the one before: after a period up to {percent:g} % of the creep has not recovered. Friction and area are "
+        "those of a row of such contacts; those of a single one are not known. Use a longer period."
+    )
