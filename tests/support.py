@@ -11,7 +11,7 @@ from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
 RUBBER = rv.zener(3e6, 3e6, 0.3e6)

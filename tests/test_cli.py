@@ -15,7 +15,7 @@ import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.netcdf import write_result
 from roughvisc.topography.scans import raw_height
 
 

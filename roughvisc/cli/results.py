@@ -33,7 +33,7 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     from roughvisc.experiment.resources import cores
     from roughvisc.plot import save_sweep_figures, trade
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files, write_figure
-    from roughvisc.study.storage.store import results_at
+    from roughvisc.study.storage.folder import results_at
     from roughvisc.study.trade import is_trade, open_trade
 
     paths = results_at(result)
@@ -85,9 +85,9 @@ def table(results: Path, out: Path | None) -> None:
     from rich.console import Console
 
     from roughvisc.study.storage.export import to_csv
-    from roughvisc.study.storage.files import atomic_write
-    from roughvisc.study.storage.store import open_result
-    from roughvisc.study.storage.table import to_table
+    from roughvisc.study.storage.folder import atomic_write
+    from roughvisc.study.storage.netcdf import open_result
+    from roughvisc.study.storage.results_table import to_table
 
     if results.is_dir():
         path = out or results / "table.csv"
@@ -139,7 +139,8 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
     from roughvisc.cli.accuracy_tables import audit_table
     from roughvisc.study.audit.audit import audit as audited
     from roughvisc.study.case import read_cases
-    from roughvisc.study.storage.store import open_result, results_at
+    from roughvisc.study.storage.folder import results_at
+    from roughvisc.study.storage.netcdf import open_result
 
     stated = {} if study is None else read_cases(study)[0].audit_inputs
     given = stated | {name: value for name, value in properties.items() if value is not None}

@@ -114,7 +114,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     from roughvisc.cli.tables import scan_table
     from roughvisc.plot import surface
     from roughvisc.plot.save import write_figure
-    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.study.storage.folder import atomic_write
     from roughvisc.topography.bandwidth import level
     from roughvisc.topography.inspection import inspect
     from roughvisc.topography.parameters import parameters
@@ -178,7 +178,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
 
     from roughvisc.study.first_pressure import first_pressure
     from roughvisc.study.first_study import starter_study
-    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.study.storage.folder import atomic_write
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.topography.inspection import inspect
     from roughvisc.units import number
@@ -224,7 +224,7 @@ def _advice(found: Inspection) -> Group:
 
 def _write_example(path: Path) -> None:
     """Write the scan that ships with roughvisc, unless it is there already."""
-    from roughvisc.study.storage.files import atomic_write
+    from roughvisc.study.storage.folder import atomic_write
     from roughvisc.topography.example import example_scan
 
     shipped = example_scan()

@@ -144,8 +144,8 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
-    from roughvisc.study.storage.files import is_writable, require_writable
-    from roughvisc.study.storage.store import open_result, result_path
+    from roughvisc.study.storage.folder import is_writable, require_writable, result_path
+    from roughvisc.study.storage.netcdf import open_result
 
     if not is_result_of(case, result_path(folder, case.key)):
         require_writable(folder, "since the case is not finished")
@@ -187,15 +187,15 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Clien
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.failures import LOG
     from roughvisc.study.storage.index import index_of
+    from roughvisc.study.storage.results_table import CASES, REALISATIONS, realisations_table
     from roughvisc.study.storage.sweep_cases import sweep_cases
-    from roughvisc.study.storage.table import CASES, REALISATIONS, realisations_table
 
     outcomes = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
     console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
     if (folder / REALISATIONS).exists():
-        console.print(realisations_tables(realisations_table(index_of(folder, warn=False), sweep_cases(cases))))
+        console.print(realisations_tables(realisations_table(index_of(folder), sweep_cases(cases))))
     say_path(console, "Results", folder)
     for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
         if (folder / name).exists():
@@ -262,7 +262,7 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     from roughvisc.plot.save import write_figure
     from roughvisc.study.case import read_study
     from roughvisc.study.execution.run import result_folder
-    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.study.storage.netcdf import write_dataset
     from roughvisc.study.trade import FOLDER
     from roughvisc.study.trade import trade as measured
     from roughvisc.units import number
@@ -321,7 +321,7 @@ def budget(
 
     from roughvisc.study.budget import budgets, case_of
     from roughvisc.study.case import read_study
-    from roughvisc.study.storage.store import open_result
+    from roughvisc.study.storage.netcdf import open_result
 
     console = Console(quiet=quiet)
     case = open_result(study) if study.suffix == ".nc" else read_study(study)
@@ -336,7 +336,7 @@ def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, p
     from roughvisc.cli.accuracy_tables import budget_table
     from roughvisc.plot import budget as figure
     from roughvisc.plot.save import write_figure
-    from roughvisc.study.storage.store import write_dataset
+    from roughvisc.study.storage.netcdf import write_dataset
 
     console.print(budget_table(found))
     say_path(console, "Budget", write_dataset(found, folder / f"budget-{name}.nc"))

@@ -126,7 +126,7 @@ def realisations_tables(table: pd.DataFrame) -> Group:
     Parameters
     ----------
     table : pandas.DataFrame
-        Of :func:`roughvisc.study.storage.table.realisations_table`.
+        Of :func:`roughvisc.study.storage.results_table.realisations_table`.
     """
     headings, rows, notes = realisation_rows(table)
     shown = Table(box=None, pad_edge=False, collapse_padding=True)

@@ -24,9 +24,9 @@ from roughvisc.plot.section import section
 from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.case_text import case_words, file_stems
-from roughvisc.study.storage.files import atomic_write
-from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.folder import atomic_write
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.sweep_data import open_results
 
 _Result = TypeVar("_Result")
 

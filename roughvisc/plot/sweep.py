@@ -24,7 +24,7 @@ from roughvisc.plot import style
 from roughvisc.study.case_text import names_of
 from roughvisc.study.realisations import statistics
 from roughvisc.study.si_tables import unit_of
-from roughvisc.study.storage.parameters import identifier
+from roughvisc.study.storage.sweep_cases import identifier
 from roughvisc.study.sweep_table import DRAWN, ITSELF, REALISATION
 from roughvisc.units import Unit, in_si, unit_for
 from roughvisc.variables import CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of

@@ -21,7 +21,7 @@ def realisation_rows(table: pd.DataFrame) -> tuple[list[str], list[list[str]], l
     Parameters
     ----------
     table : pandas.DataFrame
-        Of :func:`roughvisc.study.storage.table.realisations_table`.
+        Of :func:`roughvisc.study.storage.results_table.realisations_table`.
     """
     table = table if table.empty else table[~table["quantity"].isin(_FOLLOW)]
     if table.empty:

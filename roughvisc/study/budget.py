@@ -16,7 +16,8 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
 from roughvisc.study.neighbours import at_rows, compared, solve, with_rows
 from roughvisc.study.quantities import quantity_of
-from roughvisc.study.storage.store import open_result, result_path
+from roughvisc.study.storage.folder import result_path
+from roughvisc.study.storage.netcdf import open_result
 from roughvisc.units import Quantity, in_si, quantities
 from roughvisc.variables import VARIABLES
 

@@ -23,7 +23,8 @@ from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable, creep_time
-from roughvisc.study.storage.store import open_result, result_path
+from roughvisc.study.storage.folder import result_path
+from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.study_file import TEMPERATURE
 from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing

@@ -14,12 +14,11 @@ from roughvisc.errors import InputError
 from roughvisc.observables import asked
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.storage.files import require_writable
+from roughvisc.study.storage.folder import lock_case, lock_path, require_writable, result_path
 from roughvisc.study.storage.index import index_of, save_index
-from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.store import open_result, result_path, write_result
+from roughvisc.study.storage.netcdf import open_result, write_result
+from roughvisc.study.storage.results_table import write_table
 from roughvisc.study.storage.sweep_cases import sweep_cases
-from roughvisc.study.storage.table import write_table
 
 log = logging.getLogger("roughvisc")
 

@@ -49,8 +49,8 @@ from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.quantities import creep_time
-from roughvisc.study.storage.files import existing_part
-from roughvisc.study.storage.parameters import labels_of, parameters_of
+from roughvisc.study.storage.folder import existing_part
+from roughvisc.study.storage.sweep_cases import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.indenters import remade
 from roughvisc.topography.parameters import rms_slope

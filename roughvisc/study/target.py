@@ -46,8 +46,8 @@ from roughvisc.study.neighbours import (
     with_rows,
 )
 from roughvisc.study.quantities import QUANTITIES, quantity_of
-from roughvisc.study.storage.files import atomic_write, require_writable
-from roughvisc.study.storage.store import result_path, write_dataset
+from roughvisc.study.storage.folder import atomic_write, require_writable, result_path
+from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.topography.grid import spacing
 from roughvisc.units import is_quantity, number
 

@@ -26,7 +26,7 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged
 from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
-from roughvisc.study.storage.store import NETCDF
+from roughvisc.study.storage.netcdf import NETCDF
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import AXES, RESULT_FORMAT, Variable, axis_of

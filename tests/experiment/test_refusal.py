@@ -17,7 +17,7 @@ from roughvisc.mechanics import grid as grids
 from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution import cluster as side_module
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 ROUGH = """
 title = "Rough"

@@ -13,7 +13,7 @@ from support import BALL
 
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.upkeep import clean_folder
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")

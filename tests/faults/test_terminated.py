@@ -12,7 +12,7 @@ from support import BALL
 
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", 'time_step = "160 us"\n[keep]')
 TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'

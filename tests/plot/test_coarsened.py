@@ -8,7 +8,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.plot.maps import frame_of
-from roughvisc.study.storage import store
+from roughvisc.study.storage import netcdf
 
 SHAPE, CELL = (50, 37), (2e-6, 3e-6)
 
@@ -43,18 +43,18 @@ def coarse(monkeypatch):
 @pytest.fixture
 def stored(tmp_path, monkeypatch):
     """The result in a file of small chunks, and the shapes that are read of it."""
-    monkeypatch.setattr(store, "_MANY_CELLS", 100)
-    monkeypatch.setattr(store, "_CHUNK_OF_MANY", (1, 8, 8))
-    path, shapes = store.write_result(result(displacement=True), tmp_path / "result.nc"), []
-    read = store._Field._read
+    monkeypatch.setattr(netcdf, "_MANY_CELLS", 100)
+    monkeypatch.setattr(netcdf, "_CHUNK_OF_MANY", (1, 8, 8))
+    path, shapes = netcdf.write_result(result(displacement=True), tmp_path / "result.nc"), []
+    read = netcdf._Field._read
 
     def told(self, key):
         found = read(self, key)
         shapes.append(found.shape)
         return found
 
-    monkeypatch.setattr(store._Field, "_read", told)
-    with store.open_result(path) as dataset:
+    monkeypatch.setattr(netcdf._Field, "_read", told)
+    with netcdf.open_result(path) as dataset:
         yield dataset, shapes
 
 

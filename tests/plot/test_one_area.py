@@ -12,8 +12,8 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli.tables import result_table
-from roughvisc.study.storage.store import open_result
-from roughvisc.study.storage.table import CASES
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.results_table import CASES
 from roughvisc.topography.grid import nominal_area
 
 STUDY = BALL.replace("[24, 21]", "[17, 12]").replace("[keep]", "tolerance = 1e-2\n[keep]")

@@ -15,9 +15,9 @@ from roughvisc.reports.report import report
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.netcdf import write_result
+from roughvisc.study.storage.results_table import to_table
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
-from roughvisc.study.storage.table import to_table
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = f"""

@@ -13,9 +13,9 @@ from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.realisations import over_realisations
-from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import open_result
-from roughvisc.study.storage.table import REALISATIONS, to_table
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.results_table import REALISATIONS, to_table
+from roughvisc.study.storage.sweep_data import open_results
 
 
 def of(values, **coords):

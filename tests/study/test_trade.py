@@ -10,7 +10,7 @@ from support import PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, m
 import roughvisc as rv
 from roughvisc.experiment.grid_error import grid_uncertainty
 from roughvisc.study.neighbours import on_cells, solve
-from roughvisc.study.storage.store import write_dataset
+from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.study.trade import VARIABLES, cheapest, format_tolerance, open_trade, pareto_front, uncertainty
 
 WAVE = """

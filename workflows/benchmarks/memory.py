@@ -15,7 +15,7 @@ from roughvisc.experiment.resources import PROCESS, march_bytes
 from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 from roughvisc.topography.grid import nominal_area
 
 CASE = {

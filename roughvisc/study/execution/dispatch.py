@@ -23,7 +23,7 @@ from distributed.core import Status
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import Case
 from roughvisc.study.execution.outcome import Outcome, attempt
-from roughvisc.study.storage.lock import lock_path
+from roughvisc.study.storage.folder import lock_path
 
 if TYPE_CHECKING:
     from distributed import Future, Worker

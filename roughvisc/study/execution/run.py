@@ -23,10 +23,18 @@ from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.files import existing_part, is_writable, partial_files, require_writable
-from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.parameters import labels_of_case
-from roughvisc.study.storage.store import DamagedError, open_result, result_path, set_aside, write_result
+from roughvisc.study.storage.folder import (
+    checkpoint_path,
+    existing_part,
+    is_writable,
+    lock_case,
+    lock_path,
+    partial_files,
+    require_writable,
+    result_path,
+)
+from roughvisc.study.storage.netcdf import DamagedError, open_result, set_aside, write_result
+from roughvisc.study.storage.sweep_cases import labels_of_case
 from roughvisc.variables import AXES, NOT_CONVERGED, axis_of
 
 if TYPE_CHECKING:
@@ -180,7 +188,7 @@ def run_case(
             for torn in partial_files(path):
                 torn.unlink()
             keeper = CheckpointWriter(
-                folder / f".{case.key}.unfinished",
+                checkpoint_path(folder, case.key),
                 case.key,
                 seconds=checkpoint_seconds,
                 steps=checkpoint_steps,

@@ -28,13 +28,12 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attempt, outcome_of
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
-from roughvisc.study.storage.files import is_writable, require_writable
-from roughvisc.study.storage.index import Entry, Index, index_of, save_index
-from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.results import open_results
-from roughvisc.study.storage.store import DamagedError, open_result, result_path, set_aside
+from roughvisc.study.storage.folder import is_writable, lock_case, lock_path, require_writable, result_path
+from roughvisc.study.storage.index import Entry, index_of, save_index
+from roughvisc.study.storage.netcdf import DamagedError, open_result, set_aside
+from roughvisc.study.storage.results_table import write_table
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
-from roughvisc.study.storage.table import write_table
+from roughvisc.study.storage.sweep_data import open_results
 from roughvisc.study.storage.upkeep import clean_folder
 
 if TYPE_CHECKING:
@@ -159,14 +158,14 @@ def run_cases(
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     writable = is_writable(folder)
     with log_file(folder) if writable else nullcontext():
-        index = Index({})
+        index: dict[str, Entry] = {}
         if folder.exists():
             if writable:
                 clean_folder(folder)
             index = index_of(folder)
         outcomes = {}
         for key in distinct:
-            if entry := index.entries.get(key):
+            if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
             elif (failed := recorded_failure(folder, key)) and not retry_failed:
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
@@ -186,8 +185,8 @@ def run_cases(
         if not writable:
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
-            for key in index.problems.keys() & todo.keys():
-                _require_own(todo[key], folder, record)
+            for case in todo.values():
+                _require_own(case, folder, record)
             _compute(todo, record, client, processes, threads)
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
@@ -306,10 +305,10 @@ class Record:
             return
         index = index_of(self.folder, self._entries())
         for key, outcome in self._outcomes.items():
-            if key in index.entries:
+            if key in index:
                 forget_failure(self.folder, key)
                 if outcome.entry is None:
-                    self._outcomes[key] = outcome_of(index.entries[key], reused=True)
+                    self._outcomes[key] = outcome_of(index[key], reused=True)
         save_index(self.folder, index)
         held = {key: outcome.message for key, outcome in self._outcomes.items() if outcome.kind == "held"}
         write_table(self.folder, index, self._listed, held)

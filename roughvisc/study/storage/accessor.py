@@ -19,7 +19,7 @@ from roughvisc.labels import require_steps, steps_of, with_steps
 #: Before the name of a figure.
 _PLOT = "plot_"
 #: Module that opens a result.
-_STORE = "roughvisc.study.storage.store"
+_NETCDF = "roughvisc.study.storage.netcdf"
 #: beginning of a method's name -> module whose public names follow
 _ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.plot"}
 
@@ -42,7 +42,7 @@ class ResultAccessor:
         """Histories of every accepted step, over ``step``; read from the file if xarray alone has opened it."""
         dataset, source = self._dataset, Path(self._dataset.encoding.get("source", ""))
         if steps_of(dataset) is None and source.is_file():
-            steps = steps_of(import_module(_STORE).open_result(source))
+            steps = steps_of(import_module(_NETCDF).open_result(source))
             dataset = dataset if steps is None else with_steps(dataset, steps)
         return require_steps(dataset)
 

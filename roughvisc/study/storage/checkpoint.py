@@ -27,7 +27,7 @@ from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_i
 from roughvisc.experiment.loading import STATES
 from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.case import NUMERICS_REVISION
-from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.folder import atomic_write
 from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")

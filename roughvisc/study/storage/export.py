@@ -10,7 +10,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.observables.frames import need
-from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.folder import atomic_write
 from roughvisc.variables import OTHER_DIMS, VARIABLES, axis_of
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.study.case import NUMERICS_REVISION, Case, program
-from roughvisc.study.storage.files import atomic_write
+from roughvisc.study.storage.folder import atomic_write
 
 log = logging.getLogger("roughvisc")
 

@@ -1,20 +1,30 @@
-"""The cases of the sweep that ran last in a folder, in the order of its study: numbers and labels of its results."""
+"""Cases of a sweep: what was varied in them, their numbers, and the list of those that ran last in a folder."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case
-from roughvisc.study.storage.json_files import DAMAGED, read_json, write_json
-from roughvisc.study.storage.parameters import case_numbers, parameters_of
+from roughvisc.study.si_tables import default_of, unit_of
+from roughvisc.study.storage.folder import DAMAGED, read_json, write_json
+from roughvisc.study.sweep_table import DRAWN, REALISATION, SURROGATE
 
 #: File with the cases of the last sweep.
 SWEEP = ".cases.json.gz"
+#: Coordinate that holds the key of the case.
+CASE_KEY = "case_key"
+#: dimensions, values, attributes
+Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
+
+_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
 
 
 @dataclass(frozen=True)
@@ -43,16 +53,6 @@ def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
     return [SweepCase(case.key, json.loads(case.to_json())) for case in distinct.values()]
 
 
-def numbers_of(cases: Sequence[SweepCase]) -> list[int]:
-    """Number of each case, from 0; the realisations of one case share its number."""
-    return case_numbers(parameters_of([one.case for one in cases]), len(cases))
-
-
-def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
-    """Key -> number of the first case that has it."""
-    return dict(reversed([(one.key, number) for one, number in zip(cases, numbers_of(cases), strict=True)]))
-
-
 def write_sweep(folder: Path, cases: Sequence[SweepCase]) -> None:
     """Write the cases of a sweep to its folder; if that is impossible, the folder has no list of cases."""
     write_json(folder / SWEEP, [{"key": one.key, "case": one.case} for one in cases])
@@ -68,7 +68,7 @@ def read_sweep(folder: Path) -> list[SweepCase]:
     """
     path = folder / SWEEP
     try:
-        cases = [SweepCase(str(one["key"]), dict(one["case"])) for one in read_json(path)]
+        return [SweepCase(str(one["key"]), dict(one["case"])) for one in read_json(path)]
     except FileNotFoundError:
         return []
     except DAMAGED as error:
@@ -77,4 +77,91 @@ def read_sweep(folder: Path) -> list[SweepCase]:
             "which computes nothing that is finished, or ask for cases='all'",
             key=SWEEP,
         ) from error
-    return cases
+
+
+def numbers_of(cases: Sequence[SweepCase]) -> list[int]:
+    """Number of each case, from 0 in their order; the realisations of one case share its number."""
+    parameters = parameters_of([one.case for one in cases])
+    if REALISATION not in parameters:
+        return list(range(len(cases)))
+    drawn = parameters[REALISATION].tolist()
+    stated = [values.tolist() for key, values in parameters.items() if key not in (REALISATION, *DRAWN)]
+    # as text, in which a missing number equals another
+    settings = [repr([values[n] for values in stated] if drawn[n] == drawn[n] else n) for n in range(len(cases))]
+    first = {one: number for number, one in enumerate(dict.fromkeys(settings))}
+    return [first[one] for one in settings]
+
+
+def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
+    """Key -> number of the first case that has it."""
+    return dict(reversed([(one.key, number) for one, number in zip(cases, numbers_of(cases), strict=True)]))
+
+
+def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
+    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
+    known = (*keys, SURROGATE) if REALISATION in keys else tuple(keys)
+    for key in dict.fromkeys(key for leaf in leaves for key in leaf):
+        stated = any(key == one or key.startswith(f"{one}.") for one in known)
+        if not stated and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
+            keys[key] = None
+    values = [leaf | case.get("varied", {}) for case, leaf in zip(cases, leaves, strict=True)]
+    return {
+        key: _column(
+            [one[key] if key in one else default_of(key, case) for one, case in zip(values, cases, strict=True)]
+        )
+        for key in keys
+    }
+
+
+def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
+    for key, value in stated.items() if isinstance(stated, dict) else enumerate(stated):
+        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
+            yield from _leaves(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    """Return values as numbers, with NaN for None, or as strings."""
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return np.array([np.nan if value is None else value for value in values])
+    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
+
+
+def labels_of(
+    parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
+) -> dict[str, Label]:
+    """Coordinates that hold what was varied; ``long_name`` is the dotted key.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Dotted key -> values over `dims`: numbers in SI, or strings.
+    case : mapping
+        A case in JSON, which determines the units.
+    dims : tuple of str
+        None: the values are of one case.
+    """
+    labels: dict[str, Label] = {}
+    for key, values in parameters.items():
+        unit = unit_of(key, case) if values.dtype.kind in "if" else ""
+        labels[identifier(key)] = (dims, values, {"long_name": key} | ({"units": unit} if unit else {}))
+    return labels
+
+
+def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
+    """Scalar coordinates of one result in JSON: what was varied in it."""
+    return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
+
+
+def identifier(key: str) -> str:
+    """Name of a varied parameter that Python and pandas accept: its dotted key with underscores.
+
+    Examples
+    --------
+    >>> identifier("program.0.load")
+    'program_0_load'
+    """
+    return key.replace(".", "_")

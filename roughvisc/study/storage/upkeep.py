@@ -9,16 +9,30 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import netCDF4
+
 from roughvisc.errors import InputError
 from roughvisc.study.storage.checkpoint import STATE
-from roughvisc.study.storage.files import require_file, require_folder
-from roughvisc.study.storage.lock import lock_case, lock_path
-from roughvisc.study.storage.store import NETCDF, open_result, require_hdf5, result_path, results_at
+from roughvisc.study.storage.folder import (
+    checkpoint_path,
+    lock_case,
+    lock_path,
+    require_file,
+    require_folder,
+    result_path,
+    results_at,
+)
+from roughvisc.study.storage.netcdf import ERRORS, NETCDF, open_result
+
+_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
+_PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
+#: A partial file of no case that was not changed for so long is not being written. [s]
+_ABANDONED = 3600.0
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found in one file.
+    """Integrity of one file.
 
     Attributes
     ----------
@@ -61,11 +75,8 @@ def verify(place: str | Path) -> list[Verdict]:
 
 def _verdict(path: Path) -> Verdict:
     """Open a result as any other program does, and read all variables."""
-    import netCDF4
-
     try:
         require_file(path)
-        require_hdf5(path)
         checked = True
         with NETCDF, netCDF4.Dataset(path) as file:
             for group in (file, *file.groups.values()):
@@ -75,24 +86,9 @@ def _verdict(path: Path) -> Verdict:
                         variable[first : first + 16]
     except InputError as error:
         return Verdict(path, str(error), False)
-    except (OSError, RuntimeError, LookupError, AttributeError, ValueError) as error:
+    except ERRORS as error:
         return Verdict(path, f"{path}: is damaged: {error}", False)
     return Verdict(path, "", checked)
-
-
-def _opens(path: Path) -> bool:
-    """Return whether a file is a result, as far as opening it shows."""
-    try:
-        open_result(path).close()
-    except InputError:
-        return False
-    return True
-
-
-_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
-_PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
-#: A file that nobody has written to for so long, and that no lock tells of, is not being written. [s]
-_ABANDONED = 3600.0
 
 
 def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
@@ -101,9 +97,9 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     Parameters
     ----------
     folder : path
-        Of results. A case that a run is at work on is left alone.
+        Results folder. Cases that are being computed are left alone.
     everything : bool
-        Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were set aside,
+        Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were renamed,
         and records of failures.
 
     Returns
@@ -119,38 +115,37 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     folder = Path(folder)
     require_folder(folder)
     of_cases: dict[str, list[Path]] = {}
-    others = []
+    unused = []
     for path in sorted(folder.glob(".*")):
         if matched := _OF_A_CASE.fullmatch(path.name):
             of_cases.setdefault(matched[1], []).append(path)
-        elif _PART.fullmatch(path.name) and _is_abandoned(path):
-            others.append(path)
+        elif _PART.fullmatch(path.name):
+            with suppress(OSError):  # it is gone meanwhile
+                unused += [path] if time.time() - path.lstat().st_mtime > _ABANDONED else []
     if everything:
-        others += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
-    removed = [one for key, paths in of_cases.items() for one in _of_case(folder, key, paths, everything)]
-    return removed + [path for path in others if _removed(path)]
+        unused += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
+    removed = [path for path in unused if _remove(path)]
+    for key, paths in of_cases.items():
+        checkpoint, lock = checkpoint_path(folder, key), lock_path(folder, key)
+        if (checkpoint / STATE).exists() and not (everything or _opens(result_path(folder, key))):
+            paths = [path for path in paths if path != checkpoint]
+        if paths:
+            with suppress(OSError), lock_case(lock, patience=0.0):
+                removed += [path for path in paths if path == lock or _remove(path)]
+    return removed
 
 
-def _is_abandoned(path: Path) -> bool:
+def _opens(path: Path) -> bool:
+    """Return whether a file is a result, as far as opening it shows."""
     try:
-        return time.time() - path.lstat().st_mtime > _ABANDONED
-    except OSError:  # gone meanwhile
+        open_result(path).close()
+    except InputError:
         return False
+    return True
 
 
-def _of_case(folder: Path, key: str, paths: list[Path], everything: bool) -> list[Path]:
-    """Remove what no run of one case can use, while its lock is held."""
-    lock, result = lock_path(folder, key), result_path(folder, key)
-    finished = everything or _opens(result)
-    needed = [path for path in paths if path.suffix == ".unfinished" and (path / STATE).exists() and not finished]
-    if needed == paths:
-        return []
-    with suppress(OSError), lock_case(lock, patience=0.0):
-        return [path for path in paths if path not in needed and (path == lock or _removed(path))]
-    return []
-
-
-def _removed(path: Path) -> bool:
+def _remove(path: Path) -> bool:
+    """Remove a file or folder; return whether that was possible."""
     with suppress(OSError):
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)

@@ -16,7 +16,7 @@ from roughvisc.study.audit.audit import VERDICTS, Finding
 from roughvisc.study.audit.limits import LIMITS, STATED
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 RADIUS, MODULUS, LOAD = 1e-2, 4e6, 5e-3
 #: Radius and modulus make E* = 2 G / (1 - nu) = 4 MPa.

@@ -11,7 +11,7 @@ from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 
 @pytest.fixture

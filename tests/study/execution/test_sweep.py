@@ -24,8 +24,8 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.failures import record_path
 from roughvisc.study.storage.index import INDEX
+from roughvisc.study.storage.results_table import CASES
 from roughvisc.study.storage.sweep_cases import SWEEP
-from roughvisc.study.storage.table import CASES
 
 RUN = [sys.executable, "-m", "roughvisc", "run"]
 

@@ -9,7 +9,7 @@ import roughvisc as rv
 from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.storage.parameters import identifier
+from roughvisc.study.storage.sweep_cases import identifier
 from roughvisc.study.study_file import TABLES
 from roughvisc.variables import VARIABLES
 

@@ -20,8 +20,8 @@ from roughvisc.study.case import read_study, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage import checkpoint as checkpoint_module
-from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.folder import lock_case
+from roughvisc.study.storage.netcdf import open_result
 
 # Recovers after a jump down, holds the approach, and keeps times that no step would land on by itself.
 MODES = """

@@ -16,7 +16,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.netcdf import write_result
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 #: Units as UDUNITS, which CF refers to, writes them.

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.netcdf import write_result
 
 
 def test_accessor__gives_observables_and_figures():

@@ -13,9 +13,9 @@ from xarray.core.indexing import LazilyIndexedArray
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.storage import checkpoint as records
-from roughvisc.study.storage import store
-from roughvisc.study.storage.files import atomic_write
-from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage import netcdf
+from roughvisc.study.storage.folder import atomic_write
+from roughvisc.study.storage.netcdf import open_result, write_result
 
 
 def test_missing__of_a_punch_are_height_and_gap_alone():
@@ -70,7 +70,7 @@ def test_write_result__leaves_nothing_behind_when_it_fails(tmp_path, monkeypatch
         assert any(p.name.endswith(".part.nc") for p in tmp_path.iterdir())
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(store, "_write", fails)
+    monkeypatch.setattr(netcdf, "_write", fails)
     with pytest.raises(OSError, match="No space left"):
         write_result(hertz_creep((5, 6), 3), path)
     assert path.read_bytes() == before
@@ -163,7 +163,7 @@ def test_field__is_compressed_by_what_that_saves(tmp_path):
 
 def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, monkeypatch):
     """By itself it holds 64 MB of each till the file is closed: all frames of a scan of 1024 x 1024 points."""
-    held, write = {}, store._write
+    held, write = {}, netcdf._write
 
     def asked(written, variable):
         if written.chunking() != "contiguous":
@@ -172,7 +172,7 @@ def test_write_result__has_the_library_hold_one_chunk_of_a_variable(tmp_path, mo
             )
         write(written, variable)
 
-    monkeypatch.setattr(store, "_write", asked)
+    monkeypatch.setattr(netcdf, "_write", asked)
     write_result(hertz_creep((130, 128), 12), tmp_path / "r.nc")
     assert {"pressure", "gap", "height"} <= held.keys()
     assert set(held.values()) == {1.0}

@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.storage.index import INDEX
-from roughvisc.study.storage.store import open_result, write_result
+from roughvisc.study.storage.netcdf import open_result, write_result
 from roughvisc.study.storage.sweep_cases import SWEEP
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
@@ -330,7 +330,7 @@ def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
 
 
 def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
+    monkeypatch.setattr("roughvisc.study.storage.sweep_data._BLOCK", 3 * 8 * 6 * 8)
     ds = rv.open_results(synthetic(tmp_path, loads=2, seeds=1, times=7))
     assert ds.pressure.chunks[1] == (3, 3, 1)
     assert ds.height.dims == ("x", "y"), "one surface"
@@ -386,7 +386,7 @@ def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path)
 
 
 def test_open_results__padded_blocks_of_large_fields(tmp_path, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.storage.results._BLOCK", 3 * 8 * 6 * 8)
+    monkeypatch.setattr("roughvisc.study.storage.sweep_data._BLOCK", 3 * 8 * 6 * 8)
     synthetic(tmp_path, loads=1, seeds=1, times=4)
     path = tmp_path / f"{0:016x}.nc"
     with open_result(path) as ds:

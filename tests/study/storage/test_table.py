@@ -11,8 +11,8 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.storage.store import open_result
-from roughvisc.study.storage.table import CASES
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.results_table import CASES
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 #: The last two touch the border of the grid, which counts as measured and does not grow.

@@ -9,8 +9,8 @@ from support import BALL
 
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.storage.lock import lock_case
-from roughvisc.study.storage.store import write_result
+from roughvisc.study.storage.folder import lock_case
+from roughvisc.study.storage.netcdf import write_result
 from roughvisc.study.storage.upkeep import clean_folder
 
 KEYS = [f"{i:016x}" for i in range(4)]

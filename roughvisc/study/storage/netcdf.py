@@ -1,0 +1,371 @@
+"""Results in NetCDF files: written whole or not at all, and read lazily in any thread; no file stays open.
+
+CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them. xarray's own engine reads under netCDF's
+lock, but opens and closes files outside it, which netCDF-4 does not support. Here every call of the library is locked.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import math
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray, BackendEntrypoint
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
+from xarray.core import indexing
+
+from roughvisc.errors import InputError, short_repr
+from roughvisc.labels import STEPS, label, steps_of, with_steps
+from roughvisc.study.storage.folder import atomic_write, require_file
+from roughvisc.topography.grid import cell_edges
+from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
+
+#: Errors of reading a file that the library cannot read.
+ERRORS = (OSError, RuntimeError, LookupError, ValueError, AttributeError)
+#: Free space below which a failed write is put down to a full disk. [bytes]
+_NEARLY_FULL = 1 << 20
+#: Fields that are not compressed unless they are rounded, because hardly two of their numbers are equal. On 512 x 512
+#: cells compression takes 34 ms for an exact gap, to 0.66 of its size; 15 ms for a gap rounded to 1e-4, to 0.23; and
+#: 3.6, 6.2 and 9.7 ms for a pressure on 2, 9 and 18 % of the cells, to 0.03, 0.10 and 0.19. Shuffling the bytes of a
+#: pressure first takes longer and gives larger files.
+_DENSE = ("gap", "height")
+_TINY = 1 << 12  # not compressed [bytes]
+#: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
+#: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
+#: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.
+_CHUNK = (8, 64, 64)
+#: The same of a grid of more cells than this: a frame is read without its neighbours in time, which no memory has room
+#: for. At 4096 x 4096 x 20, in ms, compressed: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51; (1, 256, 256) 331
+#: and 41; (1, 1024, 1024) 309 and 302.
+_MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
+#: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
+_LONGEST_CHUNK = 1024
+#: End of the name of the borders of cells in a file. A Dataset has none, because its cells are equal.
+BOUNDS = "_bounds"
+#: Variables without missing values.
+_COORDINATES = (*AXES, *(f"{axis}{end}" for axis in ("x", "y") for end in ("", BOUNDS)))
+
+
+class DamagedError(InputError):
+    """The content of a file is damaged."""
+
+
+def _unreadable(path: Path, error: Exception, what: str = "") -> InputError:
+    """Return the error of a file that the library could not read: the system refused, or its content is broken."""
+    if not (isinstance(error, OSError) and (error.errno or 0) > 0):  # errors of the library have negative numbers
+        try:
+            with path.open("rb") as stream:  # it reports a failing disk as wrong bytes
+                while stream.read(1 << 24):
+                    pass
+        except OSError as refusal:
+            error = refusal
+    if isinstance(error, OSError) and (error.errno or 0) > 0:
+        text = f"{path}: cannot be read: {error.strerror or error}: expected a result of roughvisc (.nc)"
+        return InputError(text, key=str(path), found=error.strerror, transient=True)
+    reason = f"{what}{error}"
+    text = f"{path}: is damaged: {reason}: expected a whole result; remove the file and run its study again"
+    return DamagedError(text, key=str(path), found=reason, transient=True)
+
+
+def set_aside(path: Path, error: DamagedError) -> str:
+    """Rename a damaged result and return a message about it."""
+    aside = path.with_name(f"{path.name}.damaged")
+    os.replace(path, aside)
+    return f"{path}: is damaged: {error.found}; it is renamed to {aside.name} and computed again"
+
+
+def open_result(path: str | Path) -> xr.Dataset:
+    """Open a result; its fields are read when they are needed, in any thread or process.
+
+    Parameters
+    ----------
+    path : path
+        A file written by :func:`write_result`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Times are plain numbers in seconds. The history of all accepted steps is ``ds.roughvisc.steps``.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, must not be read, is of a later version, or holds something else than a result.
+    DamagedError
+        If its content is damaged.
+
+    Notes
+    -----
+    Every block of a variable has a checksum (fletcher32), which is verified when the block is read. Histories are read
+    here. :func:`roughvisc.study.storage.upkeep.verify` reads all.
+    """
+    path = Path(path)
+    require_file(path)
+    try:
+        dataset = xr.open_dataset(path, engine=ResultBackend)
+    except ERRORS as error:
+        raise _unreadable(path, error) from error
+    if found := _foreign(dataset):
+        expected = f"a result of roughvisc of format {RESULT_FORMAT}"
+        raise InputError(
+            f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
+        )
+    return dataset
+
+
+def _foreign(dataset: xr.Dataset) -> str:
+    """Return what shows that a Dataset is no result of this format; empty if nothing."""
+    attributes, rows = dataset.attrs, axis_of(dataset)
+    if (stated := attributes.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
+        return f"is of format {stated}"
+    for name in AXES[rows].needed:
+        if name not in dataset.variables:
+            return f"holds no {name}"
+        if dataset[name].dims != (rows,):
+            return f"holds {name} over {', '.join(map(str, dataset[name].dims)) or 'nothing'}"
+    for name, variable in dataset.variables.items():
+        if name in VARIABLES and variable.dtype.kind not in ("U" if VARIABLES[str(name)].dtype == "str" else "fiub"):
+            return f"holds {name} as {variable.dtype}"
+    if not isinstance(attributes.get("tolerance", 1.0), float | np.floating):
+        return f"has the tolerance {short_repr(attributes['tolerance'])}"
+    try:
+        case = json.loads(attributes.get("case", "{}"))
+    except (TypeError, ValueError, RecursionError):
+        case = None
+    return "" if isinstance(case, dict) else "has an attribute case that is no case in JSON"
+
+
+class ResultBackend(BackendEntrypoint):
+    """Engine of xarray that reads fields over x and y when they are needed, and everything else immediately."""
+
+    def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
+        """Open a file as the engine ``netcdf4`` does, with durations as plain numbers."""
+        path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
+            steps = _dataset(path, file.groups[STEPS]) if STEPS in file.groups else None
+        return result if steps is None else with_steps(result, steps.set_coords("time"))
+
+
+def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
+    """Return the variables of a file or of a group, without the borders of the cells."""
+    variables = {}
+    for name, stored in file.variables.items():
+        lazily = stored.dimensions[-2:] == ("x", "y")
+        data = indexing.LazilyIndexedArray(_Field(path, stored)) if lazily else np.asarray(stored[...])
+        chunking, filters = stored.chunking(), stored.filters() or {}
+        encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
+        encoding |= {"contiguous": True} if chunking == "contiguous" else {"chunksizes": tuple(chunking or ())}
+        variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__, encoding)
+    for axis in ("x", "y"):
+        if axis in variables and variables[axis].attrs.get("bounds") == f"{axis}{BOUNDS}":
+            variables.pop(variables[axis].attrs.pop("bounds"), None)
+    decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
+    texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
+    return decoded.assign_coords(texts)
+
+
+class _Field(BackendArray):
+    """A variable whose file is opened for each reading, so that threads and processes can share it."""
+
+    def __init__(self, path: str, stored: netCDF4.Variable) -> None:
+        self.path, self.name = path, stored.name
+        self.shape, self.dtype = stored.shape, stored.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        return read_variable(self.path, self.name, key)
+
+
+def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
+    """Part of a variable of a result, as it is stored.
+
+    Raises
+    ------
+    InputError
+        If the file is gone or must not be read.
+    DamagedError
+        If a block does not match its checksum, or the file holds no such variable.
+    """
+    require_file(Path(path))
+    try:
+        with NETCDF, netCDF4.Dataset(path) as file:
+            file.set_auto_maskandscale(False)
+            return np.asarray(file[name][key])
+    except ERRORS as error:
+        raise _unreadable(Path(path), error, f"its {name}: ") from error
+
+
+def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | None = None) -> Path:
+    """Write a result to one NetCDF file, by a temporary file and a rename.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Fields that are read from elsewhere
+        when they are needed are read and written a chunk at a time. The history of accepted steps that the Dataset
+        carries becomes the group ``steps``.
+    path : path
+        The file to write; one of that name is replaced.
+    precision : float, optional
+        Relative precision to which fields over (time, x, y) are rounded, in binary, so that they compress better;
+        their attributes say so. None: exact.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    KeyError, ValueError
+        If a variable is not declared, or its dimensions differ.
+    InputError
+        If the folder cannot be written to.
+    OSError
+        If the disk is full.
+
+    Notes
+    -----
+    zlib level 1 is the one filter that every reader has. netCDF4 is called directly: on a Dask worker xarray would ask
+    the scheduler for a lock at every variable, though no other process knows the temporary file.
+    """
+    root = label(dataset).drop_vars([f"{axis}{BOUNDS}" for axis in ("x", "y")], errors="ignore")
+    root = root.assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
+    for axis in [axis for axis in ("x", "y") if axis in root.dims]:
+        edges = cell_edges(root[axis].values)
+        root = root.assign({f"{axis}{BOUNDS}": ((axis, "bnds"), np.stack([edges[:-1], edges[1:]], axis=1))})
+        root[axis].attrs = root[axis].attrs | {"bounds": f"{axis}{BOUNDS}"}
+    steps = steps_of(dataset)
+    with atomic_write(path) as temporary:
+        try:
+            with NETCDF:
+                file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+            try:
+                # all are declared before any is written: each change of mode would write the file's metadata again
+                with NETCDF:
+                    declared = _declare(file, root, precision)
+                    if steps is not None:
+                        declared += _declare(file.createGroup(STEPS), steps, None)
+                for stored, variable in declared:
+                    _write(stored, variable)
+            finally:
+                with NETCDF:
+                    file.close()
+        except (RuntimeError, PermissionError) as error:  # the library's error of any failed write
+            full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
+            if not full and isinstance(error, PermissionError):
+                raise
+            number = errno.ENOSPC if full else errno.EIO
+            raise OSError(number, os.strerror(number), str(path)) from error
+    return Path(path)
+
+
+def _declare(
+    place: netCDF4.Dataset, part: xr.Dataset, precision: float | None
+) -> list[tuple[netCDF4.Variable, xr.Variable]]:
+    """Declare the variables of a file or of a group; return each with the values to write."""
+    place.setncatts(plain_attributes(part.attrs))
+    labels = {str(name): set(one.dims) for name, one in part.coords.items() if name not in part.dims}
+    declared = []
+    for name, variable in part.variables.items():
+        attributes = plain_attributes(variable.attrs)
+        if name in part.data_vars and (own := [one for one, dims in labels.items() if dims <= set(variable.dims)]):
+            attributes["coordinates"] = " ".join(own)  # by which CF tells a coordinate from a variable
+        if variable.dtype.kind == "U":
+            # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length
+            # if a file is open twice and one is closed
+            characters = netCDF4.stringtochar(np.char.encode(variable.values, "utf-8"))
+            variable = xr.Variable((*variable.dims, f"string{characters.shape[-1]}"), characters)
+            attributes["_Encoding"] = "utf-8"
+        for dimension, size in variable.sizes.items():
+            if dimension not in place.dimensions and dimension not in getattr(place.parent, "dimensions", ()):
+                place.createDimension(str(dimension), size)
+        encoding = encoding_of(str(name), variable, precision)
+        stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
+        stored.set_auto_maskandscale(False)
+        if "chunksizes" in encoding:  # a chunk is written at once: the library would hold 64 MB of each variable
+            stored.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
+        if bits := encoding.get("significant_digits"):
+            attributes["relative_precision"] = precision
+            attributes["quantization"] = f"rounded to nearest in binary, {bits} bits of the fraction kept"
+        stored.setncatts(attributes)
+        declared.append((stored, variable))
+    return declared
+
+
+def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
+    """Return the arguments of netCDF4 for a variable; coordinates have no fill value."""
+    encoding: dict[str, Any] = {"fill_value": False}
+    if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
+        encoding["fill_value"] = variable.dtype.type(np.nan)
+    if not variable.ndim:
+        return encoding
+    encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
+    rounded = precision is not None and is_field(variable)
+    if rounded:  # bits of the fraction of a double
+        bits = min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
+        encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
+    if variable.nbytes > _TINY and (rounded or name not in _DENSE):
+        encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
+    return encoding
+
+
+def is_field(variable: xr.Variable) -> bool:
+    """Return whether a variable is a field for each row of a result."""
+    return variable.ndim == 3 and variable.dims[0] in AXES and variable.dims[1:] == ("x", "y")
+
+
+def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the sides of the chunks, as equal as possible: a chunk that sticks out takes its whole space."""
+    many = len(shape) > 1 and shape[-2] * shape[-1] > _MANY_CELLS
+    fields = _CHUNK_OF_MANY if many else _CHUNK
+    longest = fields[-len(shape) :] if len(shape) == 3 or many else (_LONGEST_CHUNK,) * len(shape)
+    return tuple(math.ceil(n / math.ceil(n / most)) for n, most in zip(shape, longest, strict=True))
+
+
+def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
+    """Write a variable; a field one layer of chunks at a time, so that no more of it is in memory."""
+    together = chunks(variable.shape)[0] if is_field(variable) else 0
+    for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
+        values = variable[layer].values  # not under the lock, which the source may need
+        with NETCDF:
+            stored[layer] = values
+        del values  # before the next layer is read
+
+
+def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return attributes as NetCDF can hold them: no None, no booleans, no nested values."""
+    plain: dict[str, Any] = {}
+    for name, value in attributes.items():
+        if value is None:
+            continue
+        if isinstance(value, bool | np.bool_):
+            value = np.int8(value)
+        elif not isinstance(value, str | int | float | np.generic | np.ndarray | list | tuple):
+            value = str(value)
+        plain[str(name)] = value
+    return plain
+
+
+def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write a Dataset that is no result to one NetCDF file, whole or not at all."""
+    kept = dataset.copy()
+    kept.attrs = plain_attributes(dataset.attrs)
+    numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
+    with atomic_write(path) as temporary:
+        kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
+    return Path(path)

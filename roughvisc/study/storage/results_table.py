@@ -1,0 +1,199 @@
+"""The table of a sweep: what was varied in each case, how it ended, and its numbers at the end or at its peak."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from roughvisc.errors import InputError
+from roughvisc.labels import heading
+from roughvisc.study.realisations import over_realisations
+from roughvisc.study.si_tables import unit_of
+from roughvisc.study.storage.failures import stated_failure
+from roughvisc.study.storage.folder import atomic_write, no_results
+from roughvisc.study.storage.index import Entry, index_of
+from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, parameters_of, read_sweep
+from roughvisc.study.sweep_table import DRAWN, REALISATION
+from roughvisc.units import number_and_unit, quantity
+from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, variables_in_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+log = logging.getLogger("roughvisc")
+
+CASES, REALISATIONS = "cases.csv", "realisations.csv"
+#: Values that differ by less than this, relative, are prescribed.
+_ALIKE = 1e-9
+
+
+def to_table(out: str | Path) -> pd.DataFrame:
+    """Table of the cases of the last sweep in a folder, one row per case, including failed ones.
+
+    Parameters
+    ----------
+    out : path
+        Results folder. If no sweep ran in it, all its results are included.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The index is the number of the case, from 0 in the order of the study, as in :func:`open_results`; the
+        realisations of one case have its number. Columns: title; varied parameters under their dotted keys, in the
+        units of the study; at the last kept time force, approach, contact area with its bounds, contact fraction, mean
+        gap, friction if the profile slides, and observables; for a friction curve the same at the speed of largest
+        friction, and this speed; the largest stated error and its parts; status, message and file. Units are in
+        brackets.
+
+    Raises
+    ------
+    InputError
+        If the folder contains no result.
+
+    Examples
+    --------
+    >>> rv.to_table("results/load_sweep").to_excel("load_sweep.xlsx")  # doctest: +SKIP
+    """
+    folder = Path(out).absolute()
+    index, cases = index_of(folder), read_sweep(folder)
+    if not index and not cases:
+        raise no_results(folder)
+    return _table(folder, index, cases, {})
+
+
+def write_table(
+    folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase], held: Mapping[str, str] | None = None
+) -> None:
+    """Write the table of a sweep as CSV; if that is impossible, the log says so and the sweep goes on.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    index : mapping
+        Key -> entry of each result in the folder.
+    cases : sequence of SweepCase
+        Cases of the sweep.
+    held : mapping, optional
+        Key -> message, of the cases that another run computes.
+    """
+    tables = {CASES: _table(folder, index, cases, held or {})}
+    (folder / REALISATIONS).unlink(missing_ok=True)  # of a sweep before
+    found = realisations_table(index, cases)
+    if len(found):
+        tables[REALISATIONS] = found.set_index("case")
+    for name, table in tables.items():
+        try:
+            with atomic_write(folder / name) as temporary:
+                # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
+                table.map(_no_formula).to_csv(
+                    temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n"
+                )
+        except (OSError, InputError) as error:
+            log.warning("%s cannot be written: %s", folder / name, error)
+
+
+def _no_formula(value: Any) -> Any:
+    """Put an apostrophe in front of text that a spreadsheet would take for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+
+
+def _table(
+    folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase], held: Mapping[str, str]
+) -> pd.DataFrame:
+    import pandas as pd
+
+    cases = cases or [SweepCase(key, entry.case) for key, entry in index.items()]
+    stated = [one.case for one in cases]
+    numbers, ends = [], []
+    for one in cases:
+        entry, message = index.get(one.key), ""
+        found = {}
+        if entry is not None:
+            bad = int((entry.histories["status"] == NOT_CONVERGED).sum())
+            status = f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"
+            found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
+            for name in variables_in_table("largest"):
+                known = [value for value in entry.histories.get(name, ()) if np.isfinite(value)]
+                found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
+        elif one.key in held:
+            status, message = "held by another run", held[one.key]
+        else:
+            record = stated_failure(folder, one.key)
+            status, message = ("failed", str(record.get("message", ""))) if record else ("not computed", "")
+        numbers.append(found)
+        ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
+    table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)})
+    table = table.join(pd.DataFrame(numbers, table.index)).dropna(axis="columns", how="all").join(pd.DataFrame(ends))
+    return table.set_index(pd.Index(numbers_of(cases), name="case"))
+
+
+def _telling(entry: Entry) -> dict[str, float]:
+    """Return the numbers of a case at its end; of a friction curve where friction is largest."""
+    row = AXES[entry.along].telling_row(entry.histories)
+    names = [name for name in variables_in_table("last") if len(entry.histories.get(name, ()))]
+    return {name: float(entry.histories[name][row]) for name in names}
+
+
+def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the values of what was varied, under its key and the unit that the study states first."""
+    columns: dict[str, Any] = {}
+    for key, values in parameters_of(stated).items():
+        si = unit_of(key, stated[0]) if values.dtype.kind in "if" else ""
+        written = [case.get("written", {}).get(key) for case in stated]
+        unit = next((number_and_unit(text)[1] for text in written if text), si) if si else ""
+        numbers = values.tolist()
+        for place, text in enumerate(written):
+            if unit and math.isfinite(numbers[place]):
+                text = text or f"{numbers[place]!r} {si}"
+                exact = text.endswith(f" {unit}")
+                numbers[place] = number_and_unit(text)[0] if exact else quantity(text, unit)
+        columns[heading(key, unit)] = numbers
+    return columns
+
+
+def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
+    """Mean, scatter and intervals over the realisations of each case of the last sweep, one row per quantity.
+
+    Parameters
+    ----------
+    index : mapping
+        Key -> entry of each result in the folder.
+    cases : sequence of SweepCase
+        Cases of the sweep.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Number of the case and varied parameters as in :func:`to_table`; the quantity, its unit and its row; then the
+        variables of :func:`roughvisc.over_realisations`. Prescribed quantities are left out.
+    """
+    import pandas as pd
+
+    parameters = _parameters([one.case for one in cases])
+    groups: dict[int, list[int]] = {}
+    for place, (number, one) in enumerate(zip(numbers_of(cases), cases, strict=True)):
+        if one.key in index and REALISATION in one.case.get("varied", {}):
+            groups.setdefault(number, []).append(place)
+    rows = []
+    for number, places in groups.items():
+        varied = {key: values[places[0]] for key, values in parameters.items() if key not in (REALISATION, *DRAWN)}
+        numbers = [_telling(index[cases[place].key]) for place in places]
+        axis = AXES[index[cases[places[0]].key].along]
+        where = f"largest {axis.telling}" if axis.telling else "end"
+        for name in variables_in_table("last"):
+            values = np.array([one.get(name, np.nan) for one in numbers])
+            known = values[np.isfinite(values)]
+            if name in AXES or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
+                continue
+            drawn = [cases[place].case["varied"][REALISATION] for place in places]
+            found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
+            what = {"case": number, **varied, "quantity": name, "unit": VARIABLES[name].units, "where": where}
+            rows.append(what | {str(key): one.item() for key, one in found.data_vars.items()})
+    return pd.DataFrame(rows)

@@ -1,0 +1,243 @@
+"""All results of a sweep as one lazy Dataset over case, time or speed or row, x and y."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
+
+from roughvisc.errors import InputError
+from roughvisc.labels import label
+from roughvisc.study.case import Case
+from roughvisc.study.storage.folder import no_results, warn_once
+from roughvisc.study.storage.index import Entry, index_of, save_index
+from roughvisc.study.storage.netcdf import read_variable
+from roughvisc.study.storage.sweep_cases import (
+    CASE_KEY,
+    SweepCase,
+    identifier,
+    labels_of,
+    numbers_of,
+    parameters_of,
+    read_sweep,
+    sweep_cases,
+)
+from roughvisc.study.sweep_table import DRAWN, REALISATION
+from roughvisc.units import unit_for
+from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
+
+#: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
+_BLOCK = 16 << 20
+#: Attributes that the Dataset has if all results of a sweep share their value.
+_SHARED = (
+    "Conventions",
+    "result_format",
+    "source",
+    "boundary",
+    "tolerance",
+    "direction",
+    "thickness",
+    "base",
+    "kernel",
+)
+
+
+def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "all"] = "last") -> xr.Dataset:
+    """Open all results of a sweep together; fields are read when they are needed.
+
+    Parameters
+    ----------
+    out : path
+        Folder of the results.
+    cases : "last", "all", or sequence of Case
+        "last": the finished cases of the last sweep in this folder, or all results if there was no sweep. "all": all
+        results in the folder. A sequence: the results of these cases, in this order.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables as in a single result, with ``case`` as first dimension; ``height`` has it only if heights differ.
+        ``case`` is the number of the case, from 0, as in :func:`to_table`; a case without a result is left out.
+
+        - Cases with common times or speeds: variables over ``(case, time, x, y)`` or ``(case, speed, x, y)``.
+        - Others: variables over ``(case, row, x, y)``, with the coordinates ``time(case, row)`` or
+          ``speed(case, row)``, and ``rows(case)``, the number of rows of each case. Later rows are NaN. Whole numbers,
+          such as ``status``, become floats.
+        - Cases on different grids: histories only, without fields, and a warning in the log names the grids.
+
+        Varied parameters are coordinates over ``case``, numbers in SI or strings. The name of each is its dotted key
+        with underscores, ``program_0_load``. A sweep with ``realisations`` has ``realisation`` as second dimension, in
+        which 0 is a measured surface itself; a realisation without a result is missing there, with an empty key.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to open, or some results lie over time and others over speed.
+
+    Examples
+    --------
+    >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
+    >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack("case").contact_area  # doctest: +SKIP
+    """
+    folder = Path(out).absolute()
+    index = index_of(folder)
+    save_index(folder, index)
+    if not isinstance(cases, str):
+        listed = sweep_cases(cases)
+    elif cases in ("last", "all"):
+        listed = read_sweep(folder) if cases == "last" else []
+        listed = listed or [SweepCase(key, entry.case) for key, entry in index.items()]
+    else:
+        raise InputError(key="cases", found=cases, expected="'last', 'all', or a list of cases")
+    here = [place for place, one in enumerate(listed) if one.key in index]
+    if not here:
+        raise no_results(folder)
+    entries = [index[listed[place].key] for place in here]
+    if len(axes := {entry.along: entry.file for entry in entries}) > 1:
+        found = ", ".join(f"{file} over {along}" for along, file in axes.items())
+        raise InputError(f"{folder}: found {found}: expected results over one of them; give cases", key="cases")
+    parameters = {key: values[here] for key, values in parameters_of([one.case for one in listed]).items()}
+    number = {"case": ("case", np.array(numbers_of(listed))[here], {"long_name": "number of the case"})}
+    keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes)}
+    labels = labels_of(parameters, listed[here[0]].case, ("case",))
+    return _by_realisation(_stacked(folder, entries).assign_coords(number | keys | labels), parameters)
+
+
+def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
+    """Return results one after another over ``case``."""
+    first = entries[0]
+    along = first.along
+    places = [entry.histories[along] for entry in entries]
+    common = all(np.array_equal(one, places[0]) for one in places)
+    shared = [name for name in first.histories if all(name in entry.histories for entry in entries)]
+    variables: dict[str, Any] = {
+        name: (("case", *VARIABLES[name].over(along)), _side_by_side([entry.histories[name] for entry in entries]))
+        for name in shared
+        if name != along
+    }
+    coords = {along: places[0]} if common else {}
+    grids = {(entry.x.tobytes(), entry.y.tobytes()): entry for entry in entries}
+    if len(grids) == 1:
+        coords |= {"x": first.x, "y": first.y}
+        one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
+        for name in first.fields:
+            if name in VARIABLES and all(name in entry.fields for entry in entries):
+                of_all = one_surface and VARIABLES[name].dims == ("x", "y")
+                field = _field(folder, entries[:1] if of_all else entries, name)
+                variables[name] = field[0] if of_all else field
+    else:
+        texts = []
+        for entry in grids.values():
+            sides = [one[1] - one[0] if len(one) > 1 else 0.0 for one in (entry.x, entry.y)]
+            unit = unit_for(sides, "m")
+            cells = f"{len(entry.x)} x {len(entry.y)} cells of {unit.text(sides[0], 4)} by {unit.text(sides[1], 4)}"
+            texts.append(cells)
+        warn_once(
+            f"{folder}: the results lie on different grids ({', '.join(dict.fromkeys(texts))}): their histories are "
+            "opened together, without fields; open each with open_result for its fields"
+        )
+    alike = {
+        name: first.attributes[name]
+        for name in _SHARED
+        if name in first.attributes and all(e.attributes.get(name) == first.attributes[name] for e in entries)
+    }
+    dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))
+    if common:
+        return dataset
+    counts = np.array([len(one) for one in places])
+    rows = ("case", counts, {"long_name": f"number of {AXES[along].rows}", "units": "1"})
+    place = (("case", ROW), _side_by_side(places), VARIABLES[along].attributes)
+    return dataset.rename_dims({along: ROW}).assign_coords({along: place, ROWS: rows})
+
+
+def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Return histories over (case, row); NaN after the last row of a case."""
+    if len({len(one) for one in histories}) == 1:
+        return np.stack(histories)
+    table = np.full((len(histories), max(map(len, histories))), np.nan)
+    for row, one in zip(table, histories, strict=True):
+        row[: len(one)] = one
+    return table
+
+
+def _field(folder: Path, entries: Sequence[Entry], name: str) -> xr.Variable:
+    """Return a variable over (case, ...) in blocks of one case and some rows, which Dask reads."""
+    frames = _Frames(folder, entries, name)
+    dims = ("case", *VARIABLES[name].over(entries[0].along))
+    rows = max(1, _BLOCK // (frames.shape[-2] * frames.shape[-1] * frames.dtype.itemsize))
+    return xr.Variable(dims, LazilyIndexedArray(frames)).chunk({"case": 1} | ({dims[1]: rows} if len(dims) > 3 else {}))
+
+
+class _Frames(BackendArray):
+    """Field of several results, read from their files over (case, x, y) or (case, row, x, y); NaN after a last row."""
+
+    def __init__(self, folder: Path, entries: Sequence[Entry], name: str) -> None:
+        self.name, self.paths = name, [str(folder / entry.file) for entry in entries]
+        self.rows = [entry.rows for entry in entries]
+        self.dtype = np.result_type(*(entry.fields[name] for entry in entries))
+        rows = () if VARIABLES[name].dims == ("x", "y") else (max(self.rows),)
+        self.shape = (len(entries), *rows, len(entries[0].x), len(entries[0].y))
+
+    def __getitem__(self, key: Any) -> Any:
+        return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
+        cases = np.arange(len(self.paths))[key[0]]
+        if cases.ndim:
+            return np.stack([self._read((case, *key[1:])) for case in cases])
+        path = self.paths[cases]
+        if len(self.shape) == 3:
+            return read_variable(path, self.name, key[1:])
+        rows = np.arange(self.shape[1])[key[1]]
+        known = rows < self.rows[cases]
+        if known.all():
+            return read_variable(path, self.name, key[1:])
+        read = np.full((rows.size, *self.shape[2:]), np.nan, self.dtype)[(slice(None), *key[2:])]
+        if known.any():
+            read[known] = read_variable(path, self.name, (rows[known], *key[2:]))
+        return read.reshape(rows.shape + read.shape[1:])
+
+
+def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
+    """Return cases over (case, realisation); unchanged if some are no realisation, or one is there twice."""
+    drawn = parameters.get(REALISATION)
+    if drawn is None or drawn.dtype.kind != "i":
+        return flat
+    (rows, row), (columns, column) = (np.unique(one, return_inverse=True) for one in (flat["case"].values, drawn))
+    place = np.full((len(rows), len(columns)), -1)
+    place[row, column] = np.arange(len(drawn))
+    if np.count_nonzero(place >= 0) < len(drawn):
+        return flat
+    flat = flat.drop_vars("case")
+    spread = {name: _spread(one, place) for name, one in flat.variables.items() if "case" in one.dims}
+    for key in parameters:
+        name = identifier(key)
+        if key not in (REALISATION, *DRAWN):
+            spread[name] = flat.variables[name][place.max(axis=1)]
+        elif key in DRAWN and (spread[name].values == spread[name].values[:1]).all():  # each case has the same seeds
+            spread[name] = spread[name][0]
+    attributes = {
+        "long_name": "realisation",
+        "comment": "number of another patch of the same roughness; 0: the measured surface itself",
+    }
+    spread |= {REALISATION: xr.Variable(REALISATION, columns, attributes), "case": xr.Variable("case", rows)}
+    coords = {name: one for name, one in spread.items() if name in flat.coords or name in (REALISATION, "case")}
+    known = flat.drop_vars(spread, errors="ignore")
+    return known.assign({name: one for name, one in spread.items() if name not in coords}).assign_coords(coords)
+
+
+def _spread(variable: xr.Variable, place: NDArray[np.intp]) -> xr.Variable:
+    """Return a variable over (case, realisation, ...) from one over (case, ...); missing where there is no case."""
+    data = np.stack([variable[np.maximum(row, 0)].data for row in place])  # of Dask arrays: a Dask array
+    if (place < 0).any():
+        missing = "" if variable.dtype.kind == "U" else np.nan
+        known = (place >= 0).reshape(*place.shape, *(1,) * (data.ndim - 2))
+        data = (np if isinstance(data, np.ndarray) else import_module("dask.array")).where(known, data, missing)
+    return xr.Variable(("case", REALISATION, *variable.dims[1:]), data, variable.attrs)
