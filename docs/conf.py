@@ -4,7 +4,7 @@ import importlib.metadata
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # study_keys.py
+sys.path.insert(0, str(Path(__file__).parent))  # page_tables.py, study_keys.py
 
 project = "roughvisc"
 author = "The roughvisc developers"
@@ -58,24 +58,13 @@ copyright = author
 
 
 def _with_tables(app, docname, source):
-    """Insert the tables of variables and of the keys of study files."""
-    from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
+    """Insert the tables that come from the package."""
+    import page_tables
+    import study_keys
 
-    rows = ["| variable | over | unit | meaning |", "|---|---|---|---|"]
-    for name, one in VARIABLES.items():
-        over = [
-            "steps" if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims
-        ]
-        meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
-        if name == "status":
-            meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
-        rows.append(f"| `{name}` | {', '.join(over) or '-'} | {one.units or '-'} | {meaning} |")
-    if docname == "nomenclature":
-        source[0] = source[0].replace("VARIABLES_TABLE", "\n".join(rows))
+    source[0] = page_tables.filled(source[0])
     if docname == "study-files":
-        from study_keys import filled
-
-        source[0] = filled(source[0])
+        source[0] = study_keys.filled(source[0])
 
 
 def setup(app):

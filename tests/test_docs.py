@@ -141,6 +141,21 @@ def test_gallery__is_what_its_script_writes(monkeypatch):
     assert make_gallery.page() == (DOCS / "gallery.md").read_text(encoding="utf-8"), "run docs/make_gallery.py"
 
 
+def test_tables__of_variables_and_limits_replace_their_marks(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import page_tables
+
+    for page, mark, names in [
+        ("nomenclature.md", "VARIABLES_TABLE", ("contact_area", "stated_error")),
+        ("howto/audit.md", "LIMITS_TABLE", ("adhesion", "border")),
+    ]:
+        before = (DOCS / page).read_text(encoding="utf-8")
+        after = page_tables.filled(before)
+        assert mark in before
+        assert mark not in after
+        assert all(f"\n| `{name}`" in after for name in names)
+
+
 def test_python_files__that_pages_name_are_there():
     for page in PAGES:
         for name in re.findall(r"`([\w./-]+/[\w-]+\.py)`", page.read_text(encoding="utf-8")):

@@ -1,7 +1,6 @@
 """Checks of the assumptions of the model, compared with closed forms and with runs that model what was left out."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,12 +50,6 @@ def test_limits__ascend_and_have_a_source():
         assert limit.source
         numbers = (0, limit.doubtful, limit.broken, math.nan)
         assert [Finding(name, number, "", limit).verdict for number in numbers] == list(VERDICTS)
-
-
-def test_page__has_the_table_of_the_program():
-    page = (Path(__file__).parents[3] / "docs" / "howto" / "audit.md").read_text(encoding="utf-8")
-    for name, one in LIMITS.items():
-        assert f"| `{name}`: {one.assumption} | {one.number} | {one.doubtful:g} | {one.broken:g} |" in page
 
 
 def test_limits_of_adhesion__are_contact_areas_of_jkr():
