@@ -61,7 +61,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     Missing points are filled as by :func:`fill` first. A coarser grid keeps the wavelengths longer than two of its
     cells, and their slopes. Means over its cells would damp wavelengths of up to ten cells and alias shorter ones: on
     cells twice as long the error of the contact area would be 1.2 to 1.8 times as large, and that of mean gap and
-    approach 2 to 100 times (docs/howto/big-scans.md).
+    approach 2 to 100 times.
 
     Along each axis of :math:`n` cells the Fourier transform :math:`h_k` gives, at the centres of :math:`m` cells,
 
