@@ -1,4 +1,4 @@
-"""The matrix of installations, run by hand before a release; prints a table for docs/releasing.md.
+"""The matrix of installations, run by hand before a release; prints a table.
 
 Wheel and source archive are built here, and each is installed in an environment of its own. There, in an empty folder,
 the example is written and run, as somebody does who has nothing but the archive; then a part of the tests runs against

@@ -1,4 +1,4 @@
-"""The tables of keys on the page on study files, from signatures and docstrings.
+"""Tables of the keys of study files, from signatures and docstrings.
 
 ``python study_keys.py`` prints the page ``study-files.md`` with its marks ``STUDY_KEYS name`` replaced by the tables.
 """
@@ -23,7 +23,7 @@ from roughvisc.topography.synthesis import RECIPES
 HEAD = ("key", "unit", "default", "meaning")
 #: Functions whose docstrings describe the arguments of others.
 _DESCRIBED_BY = {Settings: rv.simulate, SteadySliding: rv.friction, Numerics: Numerics}
-#: Keys that are no arguments of a function: unit, default, meaning.
+#: Keys that are not arguments of a function: unit, default, meaning.
 _FILE = ("", "none", "a CSV file with columns in place of the lists, relative to the study")
 _COLUMN_UNIT = ("", "that of the heading", "unit of the column, if its heading has none")
 _RECIPE = ("", "required", "the recipe: " + ", ".join(f"`{name}`" for name in RECIPES))
@@ -194,12 +194,17 @@ def described(function):
 
 
 def meaning(function, argument):
-    """Meaning of an argument, in Markdown; of a step without one: what the function does."""
+    """Return the meaning of an argument in Markdown: its first sentence, and those of its values and default.
+
+    The meaning of a step without an argument is the summary of its function. The reference has the whole docstrings.
+    """
     if argument == "time_step":
         function = Numerics
     text = described(function).get(argument, "") if argument else ""
     if not text:
         text = inspect.getdoc(function).partition("\n")[0]
+    first, *others = re.split(r"(?<=[.])\s+(?=[A-Z\"`])", text)
+    text = " ".join([first, *(one for one in others if re.match(r'"|`|True|False|Default', one))])
     text = re.sub(r":math:`([^`]*)`", r"$\1$", text)
     text = re.sub(r":\w+:`~?([^`]*)`", lambda one: f"`{one[1].rpartition('.')[2]}`", text)
     text = text.replace("``", "`")

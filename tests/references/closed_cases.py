@@ -285,9 +285,8 @@ CASES: dict[str, tuple[str, Callable[[int], Rows]]] = {
 }
 
 
-if (
-    __name__ == "__main__"
-):  # `PYTHONPATH=tests python -m references.closed_cases` prints the table of docs/verification.md
+# `PYTHONPATH=tests python -m references.closed_cases` prints the errors of docs/verification.md, with their bounds
+if __name__ == "__main__":
     for title, compare in CASES.values():
         for row, (what, error, expected) in enumerate(compare(129)):
             print(f"| {'' if row else title} | {what} | {error:.1e} | {expected:.1e} |")
