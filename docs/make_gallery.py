@@ -19,7 +19,7 @@ from roughvisc.study.case import Case
 
 HERE = Path(__file__).parent
 WORKFLOWS = HERE.parent / "workflows"
-#: study -> figures drawn of it: of each case's result, or of all cases
+#: study -> its figures, drawn from the result of a case or from all cases
 FIGURES = {
     "quickstart": {
         "maps": lambda ds: rv.plot.maps(ds, fields=["pressure"]),

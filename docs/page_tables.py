@@ -19,7 +19,7 @@ def variables():
 
 
 def limits():
-    """Return the table of the limits of an audit, with what they mean and their source."""
+    """Return the table of the limits of an audit, with their meaning and source."""
     lines = [
         "| assumption | number | doubtful, broken from | meaning | source |",
         "|---|---|---|---|---|",

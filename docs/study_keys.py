@@ -194,7 +194,7 @@ def described(function):
 
 
 def meaning(function, argument):
-    """Return the meaning of an argument in Markdown: its first sentence, and those of its values and default.
+    """Return the meaning of an argument in Markdown: its first sentence, and the sentences on its values and default.
 
     The meaning of a step without an argument is the summary of its function. The reference has the whole docstrings.
     """
