@@ -20,6 +20,8 @@ from roughvisc.variables import AXES, ERRORS, ROW, ROWS, STEP, VARIABLES, axis_o
 if TYPE_CHECKING:
     import xarray as xr
 
+    from roughvisc.variables import Variable
+
 #: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
 _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
 #: Group of the steps in a result's file, and its title.
@@ -38,7 +40,7 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def label(dataset: xr.Dataset) -> xr.Dataset:
+def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) -> xr.Dataset:
     """Return a Dataset with the declared dtype and attributes on every variable.
 
     Parameters
@@ -46,6 +48,8 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
     dataset : xarray.Dataset
         Holds declared variables only, and coordinates of any name: what was varied in a case. Extra leading dimensions
         (``case``) are allowed.
+    variables : mapping
+        Declarations by name.
 
     Raises
     ------
@@ -62,9 +66,9 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
         dataset = dataset.where(dataset[axis].notnull())
     rows, attributes, converted = (*AXES, ROW, STEP), {}, {}
     for name, variable in dataset.variables.items():
-        declared = VARIABLES.get(str(name))
+        declared = variables.get(str(name))
         if declared is None and name not in dataset.coords:
-            raise KeyError(f"variable {name!r} is not declared in roughvisc.variables")
+            raise KeyError(f"variable {name!r} is not declared")
         wanted = declared.dims if declared else variable.dims
         found = variable.dims[variable.ndim - len(wanted) :]
         fits = all(dim in rows if one in (ROW, STEP) else dim == one for dim, one in zip(found, wanted, strict=False))
