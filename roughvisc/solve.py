@@ -251,8 +251,10 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
         dataset[name] = (axis, "x", "y"), field
-    origin = {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)} | origin
+    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)}
+    for name in _ORIGIN:
+        if name in height.attrs:
+            dataset["height"].attrs[name] = height.attrs[name]
     if "filled" in height.coords:
         dataset["filled"] = ("x", "y"), height["filled"].values
     dataset.attrs = {

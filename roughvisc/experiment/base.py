@@ -60,29 +60,6 @@ class Problem:
         return replace(self, settings=replace(self.settings, boundary=found))
 
 
-def facts_of(body: Body, end: float, time_scale: float) -> dict[str, Any]:
-    """Return the facts that an audit needs beside the variables: attributes of a result, unless its case states them.
-
-    Parameters
-    ----------
-    body : Body
-        The body under the surface.
-    end : float
-        Time at which the creep ends. [s]
-    time_scale : float
-        Shortest time in which the load or the approach changes; infinite in a steady state. [s]
-    """
-    material = body.material
-    poisson = {} if material.stands_for else {"poisson": material.poisson}
-    return {
-        **body.attributes(),
-        "compliance_at_once": float(material.contact_compliance(0.0)),
-        "compliance_at_end": float(material.contact_compliance(end)),
-        **poisson,
-        "time_scale": time_scale,
-    }
-
-
 @dataclass(frozen=True)
 class Row:
     """Result of an experiment at one position of its axis.

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
-from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows, facts_of
+from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
 from roughvisc.experiment.kept_times import kept_times, memory_options
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
@@ -21,7 +21,7 @@ from roughvisc.experiment.stated import area_error, error_columns, length_of, me
 from roughvisc.experiment.warnings import loading_warnings
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
-from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.contact.neighbours import contact_area
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.layer_memory import check_convergence
@@ -225,12 +225,9 @@ class LoadingRows(Rows):
         # goes on. Where the material itself ends, at an absent cell or at the border of a scan in free space, the edge
         # of the contact is known, and the count exact. A cell at a mirror neighbours its own image: no edge either.
         free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not is_whole
-        count = int(np.count_nonzero(contact))
-        counted = count * grid.cell_area
-        strip = staircase(contact, free, grid.cell_area, grid.boundary == "periodic", before=goes_on, beyond=goes_on)
-        area = max(counted - strip, 0.0)
+        counted, area = contact_area(contact, free, grid.cell_area, grid.boundary == "periodic", goes_on, goes_on)
 
-        is_full = is_whole and count == np.count_nonzero(profile.present)
+        is_full = is_whole and np.count_nonzero(contact) == np.count_nonzero(profile.present)
         status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
         if is_whole:
             mean_gap = float(np.mean(gap, where=profile.present))
@@ -292,7 +289,7 @@ class LoadingRows(Rows):
         for subject, text in warnings.items():
             if text and subject not in ("accuracy", "tolerance", "material"):
                 log.warning("%s", text)
-        attributes = facts_of(body, self.end, scene.program.time_scale)
+        attributes = body.facts(self.end) | {"time_scale": scene.program.time_scale}
         if body.separates:  # of what was pressed, a series or not; of layers those of the top one
             attributes["compliance_at_once"] = scene.memory.compliance(0.0)
             attributes["compliance_at_end"] = scene.memory.compliance(self.end)

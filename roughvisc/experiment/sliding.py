@@ -15,7 +15,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.base import Experiment, Problem, Row, Rows, facts_of
+from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
 from roughvisc.experiment.profile import Profile
@@ -31,7 +31,7 @@ from roughvisc.experiment.warnings import (
 )
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.neighbours import faces_between, staircase
+from roughvisc.mechanics.contact.neighbours import contact_area, faces_between
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.program import DIRECTIONS, Direction, one_of
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
@@ -193,9 +193,7 @@ class SlidingGrid:
 
     def areas(self, contact: NDArray[np.bool_]) -> tuple[float, float]:
         """Return the area of cells in contact, counted and corrected for the grid. [m2]"""
-        cell = self.spacing[0] * self.spacing[1]
-        counted = np.count_nonzero(contact) * cell
-        return counted, max(counted - staircase(contact, ~contact, cell, True), 0.0)
+        return contact_area(contact, ~contact, self.spacing[0] * self.spacing[1], True)
 
     def opening(self, found: SteadyState) -> Array:
         """Return the gap of a steady state. [m]"""
@@ -300,12 +298,11 @@ class SlidingRows(Rows):
         for note in filter(None, warnings.values()):
             log.warning("%s", note)
         stated = {"speeds": speeds_warning(dataset), "material": table_warning(self._body.materials)}
-        attributes = facts_of(self.problem.body, longest / min(self._curve.speeds), math.inf) | {
-            "direction": self._curve.direction,
-            "warnings": warnings_text(stated | warnings),
-        }
-        stated_attributes = {name: value for name, value in attributes.items() if value != ""}
-        return dataset.drop_vars("creep_left").assign_attrs(stated_attributes)
+        attributes = self.problem.body.facts(longest / min(self._curve.speeds))
+        attributes |= {"time_scale": math.inf, "direction": self._curve.direction}
+        if text := warnings_text(stated | warnings):
+            attributes["warnings"] = text
+        return dataset.drop_vars("creep_left").assign_attrs(attributes)
 
 
 def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:

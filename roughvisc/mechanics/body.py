@@ -292,9 +292,20 @@ class Body:
         """
         return self.kernel.transfer(qx, qy), complex_compliance(self.material, frequency)
 
-    def attributes(self) -> dict[str, Any]:
-        """Return the attributes of a result that describe the body beside its material: names and values."""
-        return self.kernel.described()
+    def facts(self, end: float) -> dict[str, Any]:
+        """Return what an audit needs to know of the body: attributes of a result, unless its case states them.
+
+        Parameters
+        ----------
+        end : float
+            Time at which the creep ends. [s]
+        """
+        facts = self.kernel.described()
+        facts["compliance_at_once"] = float(self.material.contact_compliance(0.0))
+        facts["compliance_at_end"] = float(self.material.contact_compliance(end))
+        if not self.material.stands_for:
+            facts["poisson"] = self.material.poisson
+        return facts
 
 
 def body_of(material: Any) -> Body:

@@ -534,9 +534,9 @@ class LayeredBody(Body):
         found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, shear)
         return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
 
-    def attributes(self) -> dict[str, Any]:
-        """Return the body in words."""
-        return {"kernel": repr(self)}
+    def facts(self, end: float) -> dict[str, Any]:
+        """Return the compliances of the top layer [1/Pa], and the body in words."""
+        return super().facts(end) | {"kernel": repr(self)}
 
 
 @quantities(thickness="m")

@@ -9,7 +9,7 @@ import xarray as xr
 from roughvisc.experiment.coarser import coarser
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.contact.neighbours import staircase
+from roughvisc.mechanics.contact.neighbours import contact_area
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.models import zener
 from roughvisc.study.first_study import (
@@ -62,8 +62,8 @@ def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTA
     def touching(pressure: float, compliance: float) -> float:
         load = share * pressure * profile.area * compliance / grid.cell_area
         pressed = solve_contact(grid, profile.gap, load=load, tolerance=_TOLERANCE, present=present).pressure > 0
-        beyond = staircase(pressed, present & ~pressed, grid.cell_area, found.boundary == "periodic")
-        return max(float(pressed.sum()) * grid.cell_area - beyond, 0.0) / profile.area
+        free, periodic = present & ~pressed, found.boundary == "periodic"
+        return contact_area(pressed, free, grid.cell_area, periodic)[1] / profile.area
 
     guess = pressure = pressure_for(contact, 1 / late, found.rms_slope) or _ON_FLAT
     for _ in range(_PRESSES if found.rms_slope > 0 else 0):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from roughvisc.mechanics.grid import Boundary
 
-Array = NDArray[np.float64]
+Array = Any  # a float or an array
 Mask = NDArray[np.bool_]
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
@@ -54,13 +55,17 @@ def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = Fals
     for own, other in ((contact, free), (contact.T, free.T)):
         below = other[-1] if periodic else before
         above = other[0] if periodic else beyond
-        pairs = (own[1:], other[:-1]), (own[:-1], other[1:]), (own[0], below), (own[-1], above)
-        count += sum(int(np.count_nonzero(cells & beside)) for cells, beside in pairs)
+        for cells, beside in (own[1:], other[:-1]), (own[:-1], other[1:]), (own[0], below), (own[-1], above):
+            count += int(np.count_nonzero(cells & beside))
     return count
 
 
-def staircase(contact: Mask, free: Mask, cell_area: float, periodic: bool, **outside: bool) -> float:
-    """Area by which counting cells is too large: a part of the perimeter's strip. [m2]
+def contact_area(
+    contact: Mask, free: Mask, cell_area: float, periodic: bool, before: bool = False, beyond: bool = False
+) -> tuple[float, float]:
+    """Return the area of the cells in contact, counted and corrected for the grid. [m2]
+
+    The count is too large by a part of the strip along the perimeter.
 
     Parameters
     ----------
@@ -68,27 +73,28 @@ def staircase(contact: Mask, free: Mask, cell_area: float, periodic: bool, **out
         Cells in contact, and cells out of it where the material goes on.
     cell_area : float
         [m2]
-    periodic, outside
+    periodic, before, beyond
         As :func:`neighbours` has them.
     """
-    faces = faces_between(contact, free, periodic, **outside)
+    counted = int(np.count_nonzero(contact)) * cell_area
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    return PERIMETER_CORRECTION * cell_area * faces
+    strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, periodic, before, beyond)
+    return counted, max(counted - strip, 0.0)
 
 
-def area_bounds(counted: ArrayLike, area: ArrayLike, inside: ArrayLike, outside: ArrayLike) -> tuple[Array, Array]:
+def area_bounds(counted: Array, area: Array, inside: Array, outside: Array) -> tuple[Array, Array]:
     """Bounds on a contact area where it is uncertain of some cells whether they are in contact. [m2]
 
     Parameters
     ----------
-    counted, area : array_like
-        Contact area, counted and less :func:`staircase`. [m2]
-    inside, outside : array_like
+    counted, area : float or ndarray
+        Contact area, counted and corrected, see :func:`contact_area`. [m2]
+    inside, outside : float or ndarray
         Area of the uncertain cells in contact, and of those out of it. [m2]
 
     Returns
     -------
-    lower, upper : ndarray
+    lower, upper : float or ndarray
         `area` lies between them. [m2]
 
     Notes
@@ -103,6 +109,5 @@ def area_bounds(counted: ArrayLike, area: ArrayLike, inside: ArrayLike, outside:
     >>> round(float(lower), 3), round(float(upper), 3)
     (7.648, 9.676)
     """
-    counted, area, inside, outside = (np.asarray(one, dtype=float) for one in (counted, area, inside, outside))
     most = 1 + 4 * PERIMETER_CORRECTION
     return np.maximum(area - most * inside, 0.0), np.minimum(area + most * outside, counted + outside)

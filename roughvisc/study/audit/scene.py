@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.experiment.base import facts_of
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables.histories import history
 from roughvisc.study.audit.limits import AuditInputs
@@ -229,7 +228,7 @@ class Scene:
             return self.dataset.attrs
         experiment = self.case.experiment
         time_scale = experiment.program.time_scale if isinstance(experiment, Loading) else math.inf
-        return facts_of(self.case.body, self.creep_time, time_scale) | self.dataset.attrs
+        return self.case.body.facts(self.creep_time) | {"time_scale": time_scale} | self.dataset.attrs
 
     @property
     def late(self) -> float:
