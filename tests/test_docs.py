@@ -87,7 +87,8 @@ def run_python(codes, folder):
     script = folder / "script.py"
     strict = ["import warnings", 'warnings.simplefilter("error", UserWarning)']
     strict.append('warnings.filterwarnings("ignore", ".*above the tolerance")')  # examples have few cells
-    script.write_text("\n".join([*strict, *codes]))
+    tests = 'for name in [one for one in globals() if one.startswith("test_")]: globals()[name]()'
+    script.write_text("\n".join([*strict, *codes, tests]))
     setting = {"MPLBACKEND": "agg", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, script], cwd=folder, env=os.environ | setting, capture_output=True, text=True
