@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.settings import OPEN_BOUNDARY, OVER_TIME, Settings, known_boundary
+from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.topography.borders import boundary_of
 from roughvisc.topography.grid import spacing
 
@@ -173,7 +173,4 @@ class Experiment(ABC):
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that have no meaning here: their names, their values, and what is expected."""
-        for name in OVER_TIME if self.axis != "time" else ():
-            found = getattr(settings, name)
-            if found != getattr(Settings, name):
-                yield name, found, f"a result over {self.axis} has none: expected the usual"
+        yield from ()

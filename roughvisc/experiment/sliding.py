@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -36,7 +35,7 @@ from roughvisc.mechanics.grid import Boundary
 from roughvisc.mechanics.program import DIRECTIONS, Direction, one_of
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
-from roughvisc.settings import Settings
+from roughvisc.settings import OVER_TIME, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
 from roughvisc.units import Quantity, quantities, unit_for
@@ -139,15 +138,14 @@ class SteadySliding(Experiment):
             yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
         if settings.missing != "refuse":
             yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
-        yield from super().unsupported(settings)
+        for name in OVER_TIME:
+            found = getattr(settings, name)
+            if found != getattr(Settings, name):
+                yield name, found, "a result over speed has none: expected the usual"
 
     def progress(self, done: float, end: float) -> str:
         """The number of speeds that are found."""
         return f"speed {done:.0f} of {end:.0f}"
-
-    def force(self, area: float) -> float:
-        """Load on a surface of an area [m2]. [N]"""
-        return float(self.load) if self.load is not None else float(self.pressure or 0.0) * area
 
 
 @dataclass(frozen=True)
@@ -215,55 +213,53 @@ class SlidingRows(Rows):
 
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
         self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
-        self._profile = Profile(problem.height, "refuse")
-        shape = (self._profile.gap.shape[0], self._profile.gap.shape[1])
-        require_memory(shape, partial(curve_bytes, problem.settings))
-        if not self._profile.present.all():  # a punch has absent cells by its recipe
+        profile = Profile(problem.height, "refuse")
+        require_memory((profile.gap.shape[0], profile.gap.shape[1]), partial(curve_bytes, problem.settings))
+        if not profile.all_present:  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
-        self.problem, self.end = replace(problem, height=self._profile.height), float(len(curve.speeds))
-        self._force = curve.force(self._profile.area)
-        self._grid = SlidingGrid.of(self._profile.gap, self._profile.spacing, curve.direction)
-        self._coarser: list[SlidingGrid] = []
+        self.problem, self.end, self._profile = replace(problem, height=profile.height), len(curve.speeds), profile
+        self._force = float(curve.load) if curve.load is not None else float(curve.pressure or 0.0) * profile.area
+        #: The cells, and up to two grids of longer ones for the error of the grid.
+        self._grids = [SlidingGrid.of(profile.gap, profile.spacing, curve.direction)]
         if problem.settings.grid_error:
-            twice, four_times = self._grid.coarser(2.0), self._grid.coarser(4.0)
-            finer_first = (self._grid, twice, four_times)
-            self._coarser = [few for many, few in pairwise(finer_first) if few.gap.shape != many.gap.shape]
-            if not self._coarser:
-                log.warning("no grid error: %d x %d cells cannot be coarsened", *self._grid.gap.shape)
+            for factor in (2.0, 4.0):
+                few = self._grids[0].coarser(factor)
+                if few.gap.shape != self._grids[-1].gap.shape:
+                    self._grids.append(few)
+            if len(self._grids) == 1:
+                log.warning("no grid error: %d x %d cells cannot be coarsened", *profile.gap.shape)
 
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
-        grid, tolerance = self._grid, self._settings.tolerance
+        grid, tolerance = self._grids[0], self._settings.tolerance
         for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
             speed = self._curve.speeds[number]
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once a speed: a table takes a fit
-            sliding = Sliding(law, grid.gap.shape, grid.spacing, speed)
-            found = steady_state(sliding, grid.gap, self._force, tolerance=tolerance)
+            slides, states = [], []
+            for cells in self._grids:
+                slides.append(Sliding(law, cells.gap.shape, cells.spacing, speed))
+                states.append(steady_state(slides[-1], cells.gap, self._force, tolerance=tolerance))
+            found, creep = states[0], 0.0
             row, fields = self._row(found)
-            row["friction_force_across"] = sliding.force(found.pressure, axis=1)
+            row["friction_force_across"] = slides[0].force(found.pressure, axis=1)
             if self._settings.grid_error:
-                states = [found]
-                for few in self._coarser:
-                    coarse = Sliding(law, few.gap.shape, few.spacing, speed)
-                    states.append(steady_state(coarse, few.gap, self._force, tolerance=tolerance))
-                row |= grid_errors([grid, *self._coarser], states)
-            creep = 0.0
+                row |= grid_errors(self._grids, states)
             if not found.converged:
                 row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
                 fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
             elif stands_alone(self._profile.height, found.pressure, 0):
                 for one in law.materials:
-                    crept, most = (float(one.contact_compliance(age)) for age in (grid.period / speed, np.inf))
-                    creep = max(creep, unrecovered(crept, most))
-            row["convolutions"] = sliding.convolutions
+                    crept = float(one.contact_compliance(grid.period / speed))
+                    creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
+            row["convolutions"] = slides[0].convolutions
             row["creep_left"] = creep  # where the next contact comes
             yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the numbers of a state, and its fields in the frame of the surface."""
         force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
-        counted, contact_area = self._grid.areas(found.pressure > 0)
-        gap = self._grid.opening(found)
+        counted, contact_area = self._grids[0].areas(found.pressure > 0)
+        gap = self._grids[0].opening(found)
         whole = "full_contact" if (found.pressure > 0).all() else "converged"
         row = {
             "force": force,
@@ -293,7 +289,7 @@ class SlidingRows(Rows):
         warnings = {
             "slope": slope_warning(height, "periodic", np.inf),
             "border": border_warning(height, xr.Dataset()),
-            "wake": wake_warning(left, self._grid.period),
+            "wake": wake_warning(left, self._grids[0].period),
         }
         for note in filter(None, warnings.values()):
             log.warning("%s", note)

@@ -38,7 +38,6 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.solver import largest
 from roughvisc.mechanics.grid import namespace, threads_of, transforms
 
 Array = Any  # an array of NumPy or CuPy
@@ -178,7 +177,7 @@ class Sliding:
     def full_contact(self, displacement: Array) -> Array:
         """Return the pressure of a displacement in full contact, in single precision for a preconditioner. [Pa]"""
         symbol, unit = self._stiffness
-        most = largest(abs(displacement)) or 1.0  # single precision underflows
+        most = float(abs(displacement).max()) or 1.0  # single precision underflows
         found = self._convolved((displacement / most).astype(np.float32), symbol)
         return found.astype(float) * (most * unit)
 
@@ -314,9 +313,9 @@ class _NewtonSystem:
         self._scale = 1 / xp.sqrt(both)
         self._inside = sliding.self_influence / both
         self._outside = (1 - self._inside**2) / both
-        punch = self._inverse(xp.ones_like(both))
         #: Pressure that the preconditioner gives for a uniform displacement, scaled to a sum of 1.
-        self._punch = punch / float(punch.sum())
+        self._punch = self._inverse(xp.ones_like(both))
+        self._punch /= float(self._punch.sum())
 
     def solve(
         self, right: Array, enough: float, relative: float = _LOOSEST, start: Array | None = None
@@ -434,7 +433,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
 def _longest(values: Array, step: Array) -> float:
     """Return the largest fraction of a step, at most 1, after which positive values are not negative."""
     shrinking = namespace(step).flatnonzero(step < 0)
-    return min(1.0, -largest(values.take(shrinking) / step.take(shrinking), -math.inf))
+    return min(1.0, float((values.take(shrinking) / -step.take(shrinking)).min())) if shrinking.size else 1.0
 
 
 def _friction_and_errors(sliding: Sliding, pressure: Array, correction: Array) -> tuple[float, float, float]:
@@ -443,6 +442,7 @@ def _friction_and_errors(sliding: Sliding, pressure: Array, correction: Array) -
     The correction changes the force by twice its sum over the slope, to first order.
     """
     slope = sliding.slope(pressure)
-    force, change = (-float((field * slope).sum()) * sliding.cell_area for field in (pressure, 2 * correction))
+    force = -float((pressure * slope).sum()) * sliding.cell_area
+    change = -float((2 * correction * slope).sum()) * sliding.cell_area
     pressure_error = _CAUTION * float(abs(correction).sum() / pressure.sum())
     return force, pressure_error, _CAUTION * abs(change) / abs(force + change) if change else 0.0
