@@ -190,23 +190,11 @@ def test_step_load__maxwell_pressure_by_the_printed_integral():
         assert float(press.pressure(r, t)) == pytest.approx(printed, rel=1e-8)
 
 
-def test_kelvin_voigt_step__pressure_carries_the_force_and_ends_as_hertz():
-    material = materials.kelvin_voigt(2.0, 3.0, poisson=0.4)
-    press = references.kelvin_voigt_step(0.5, material, 0.7)
-    for t in (1e-6, 0.1, 5.0):
-        assert force_of(lambda r, t=t: press.pressure(r, t), float(press.radius(t))) == pytest.approx(0.7, rel=3e-8)
-    late = cf.hertz(0.5, 2 * 2.0 / (1 - 0.4), 0.7)
-    assert float(press.radius(1e3)) == pytest.approx(late.radius, rel=1e-12)
-    np.testing.assert_allclose(press.pressure(0.1, 1e3), late.pressure(0.1), rtol=1e-12)
-
-
 def test_forms__refuse_impossible_input():
     with pytest.raises(InputError, match="force"):
         cf.hertz(1.0, 1.0, -1.0)
     with pytest.raises(InputError, match="waves"):
         cf.full_contact_pressure(1.0, 1.0, 1.0, waves=3)
-    with pytest.raises(InputError, match="Kelvin-Voigt"):
-        references.kelvin_voigt_step(1.0, materials.maxwell(1.0, 1.0), 1.0)
 
 
 class PowerLaw:
@@ -243,22 +231,6 @@ def test_hereditary_integral__equals_quadrature():
         )
 
 
-@pytest.mark.parametrize("exponent", [0.1, 0.5, 0.8])
-def test_power_law_ramp__pressure_carries_the_load(exponent):
-    press = references.power_law_ramp(0.7, 3.0, 0.2, exponent)
-    for t in (1e-3, 2.0):
-        radius = float(press.radius(t))
-        assert force_of(lambda r, t=t: press.pressure(r, t), radius) == pytest.approx(3.0 * t, rel=1e-8)
-
-
-def test_power_law_ramp__pressure_is_uniform_for_a_square_root():
-    # a ~ t^(1/2) and E ~ t^(-1/2): int (t - s)^(-1/2) (s - t_r)^(-1/2) ds = pi, whatever r
-    press = references.power_law_ramp(0.7, 3.0, 0.2, 0.5)
-    radius = float(press.radius(2.0))
-    expected = 6.0 / (np.pi * radius**2)
-    np.testing.assert_allclose(press.pressure(np.array([0, 0.1, 0.5, 0.99]) * radius, 2.0), expected, rtol=1e-10)
-
-
 def test_lee_radok__of_a_sphere_is_that_of_any_indenter():
     """The same integral, and the elastic contact of the compliance then."""
     program = Program().load(0.2, over=0.0).load(0.5, over=1.5).hold(1.0)
@@ -274,12 +246,8 @@ def test_lee_radok__of_a_sphere_is_that_of_any_indenter():
             cf.lee_radok(0.7, ZENER, wrong)
 
 
-def test_lee_radok__agrees_with_the_special_cases():
-    law = PowerLaw(0.0, 0.2, 0.4)
+def test_lee_radok__of_a_step_is_that_of_a_step_load():
     times = np.array([0.1, 1.0, 2.0])
-    ramp = growing_contact.lee_radok(Paraboloid(0.7), law, Program().load(6.0, over=2.0))
-    special = references.power_law_ramp(0.7, 3.0, 0.2, 0.4)
-    np.testing.assert_allclose(ramp.radius(times), special.radius(times), rtol=1e-14)
     step = growing_contact.lee_radok(SPHERE, ZENER, Program().load(0.3, over=0.0).hold(2.0))
     np.testing.assert_allclose(
         step.approach(times), growing_contact.lee_radok_step(1.0, ZENER, 0.3).approach(times), rtol=1e-14
@@ -293,7 +261,6 @@ def triangle():
     return references.ting(SPHERE, ZENER, TRIANGLE)
 
 
-@pytest.mark.thorough
 @pytest.mark.thorough
 def test_ting__triangle_on_zener_has_the_known_values(triangle):
     # from an independent program with tabulated memory integrals
@@ -319,35 +286,7 @@ def test_ting__pressure_carries_the_load(triangle, t):
     assert force_of(lambda r: triangle.pressure(r, t), *radii, levels=16) == pytest.approx(load, rel=1e-9)
 
 
-@pytest.mark.thorough
-def test_ting__growth_is_lee_radok(triangle):
-    growth = growing_contact.lee_radok(SPHERE, ZENER, Program().load(1.0, over=1.0))
-    times = np.linspace(0.01, 1.0, 7)
-    np.testing.assert_allclose(triangle.radius(times), growth.radius(times), rtol=1e-11)
-    np.testing.assert_allclose(triangle.approach(times[:-1]), growth.approach(times[:-1]), rtol=1e-11)
-
-
-@pytest.mark.thorough
-def test_ting__step_is_lee_radok():
-    material = STEP["two modes and flow"]
-    contact = references.ting(SPHERE, material, Program().load(0.7, over=0.0).hold(2.0))
-    press = growing_contact.lee_radok_step(1.0, material, 0.7)
-    r = np.array([0.0, 0.2, 0.5, 0.9, 0.99]) * float(press.radius(1.3))
-    np.testing.assert_allclose(contact.pressure(r, 1.3), press.pressure(r, 1.3), rtol=1e-9)
-
-
-@pytest.mark.thorough
-def test_ting__pressure_under_the_apex_of_a_cone_is_infinite():
-    program = Program().load(1.0, over=1.0).load(0.0, over=1.0)
-    contact = references.ting(Cone(0.2), ZENER, program)
-    times = np.array([0.5, 1.5, 2.0])
-    assert contact.pressure(0.0, times).tolist() == [np.inf, np.inf, 0.0]
-    near = contact.pressure(np.geomspace(1e-2, 1e-8, 7) * contact.radius(0.5), 0.5)
-    assert np.diff(near) == pytest.approx(np.full(6, np.diff(near)[-1]), rel=1e-3)  # it grows as the logarithm
-
-
-REDUCED = {
-    **{name: STEP[name] for name in ("maxwell", "zener", "zener stiff", "zener nu", "two modes and flow")},
+OTHER_LAWS = {
     "kelvin-voigt": materials.kelvin_voigt(1.0, 1.0),
     "power law": PowerLaw(0.0, 0.25, 0.5),
     "glassy power law": PowerLaw(0.1, 0.25, 0.5),
@@ -355,63 +294,27 @@ REDUCED = {
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", REDUCED)
-@pytest.mark.parametrize(
-    "indenter", [SPHERE, pytest.param(Cone(0.3), marks=pytest.mark.thorough)], ids=["sphere", "cone"]
-)
-def test_reduced_contact__growth_is_lee_radok(name, indenter):
-    times = [0.1, 1.0, 10.0]
-    step = Program().load(1.0, over=0.0).hold(10.0)
-    ramp = Program().load(10.0, over=10.0)
+@pytest.mark.parametrize("name", OTHER_LAWS)
+def test_reduced_contact__growth_is_lee_radok(name):
+    times, material = [0.1, 1.0, 10.0], OTHER_LAWS[name]
     tolerance = 3e-5 if name == "kelvin-voigt" else 1e-5
-    for program in (step, ramp):
-        exact = growing_contact.lee_radok(indenter, REDUCED[name], program)
-        found = references.reduced_contact(indenter, REDUCED[name], program, times, steps=60, elements=2000)
+    for program in (Program().load(1.0, over=0.0).hold(10.0), Program().load(10.0, over=10.0)):
+        exact = growing_contact.lee_radok(SPHERE, material, program)
+        found = references.reduced_contact(SPHERE, material, program, times, steps=60, elements=2000)
         np.testing.assert_allclose(found.radius, exact.radius(times), rtol=tolerance)
         np.testing.assert_allclose(found.approach, exact.approach(times), rtol=tolerance)
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    "name",
-    [
-        "zener",
-        pytest.param("maxwell", marks=pytest.mark.thorough),
-        pytest.param("zener stiff", marks=pytest.mark.thorough),
-    ],
-)
+@pytest.mark.parametrize("name", ["zener", "maxwell", "zener stiff"])
 @pytest.mark.parametrize("indenter", [SPHERE, Cone(0.3)], ids=["sphere", "cone"])
 def test_reduced_contact__single_maximum_is_ting(name, indenter):
     times = [0.5, 1.2, 1.7, 1.9]
-    exact = references.ting(indenter, REDUCED[name], TRIANGLE)
-    found = references.reduced_contact(indenter, REDUCED[name], TRIANGLE, times)
+    exact = references.ting(indenter, STEP[name], TRIANGLE)
+    found = references.reduced_contact(indenter, STEP[name], TRIANGLE, times)
     np.testing.assert_allclose(found.radius, exact.radius(times), rtol=1e-5)
     np.testing.assert_allclose(found.approach, exact.approach(times), rtol=4e-7)
     assert found.error < 3e-5
-
-
-@pytest.mark.thorough
-@pytest.mark.thorough
-@pytest.mark.parametrize(("name", "t"), [("zener", 1.7), ("zener stiff", 1.2)])
-def test_reduced_contact__converges_with_the_square_of_the_step(name, t):
-    exact = float(references.ting(SPHERE, REDUCED[name], TRIANGLE).approach(t))
-    passes = [
-        references.reduced_contact(SPHERE, REDUCED[name], TRIANGLE, [t], steps=n, refinements=1) for n in (40, 80, 160)
-    ]
-    errors = np.abs(np.array([float(found.approach[0]) for found in passes]) - exact)
-    orders = np.log2(errors[:-1] / errors[1:])
-    assert np.all(orders > 1.7), orders
-
-
-@pytest.mark.thorough
-@pytest.mark.thorough
-def test_reduced_contact__dent_recovers_as_ting_says():
-    program = TRIANGLE.hold(2.0)
-    exact = references.ting(SPHERE, ZENER, program)
-    times = [2.2, 3.0, 4.0]
-    found = references.reduced_contact(SPHERE, ZENER, program, times)
-    np.testing.assert_allclose(found.approach, exact.approach(times), rtol=1e-6)
-    np.testing.assert_array_equal(found.radius, 0)
 
 
 @pytest.mark.thorough
@@ -424,17 +327,6 @@ def test_reduced_contact__held_approach_relaxes_with_the_modulus():
     np.testing.assert_allclose(found.radius, found.radius[0], rtol=1e-6)
     work = 0.4 * 0.7 * found.approach[0]  # int W d(approach) = 2/5 W approach of an elastic sphere
     np.testing.assert_allclose(found.work, work, rtol=1e-5)
-
-
-@pytest.mark.thorough
-def test_reduced_contact__approach_at_constant_speed_on_a_cone():
-    # a ~ t and an elastic force ~ a^2, so that W = int E(t - s) d(k s^2)
-    cone, speed = Cone(0.3), 0.2
-    relaxation = growing_contact.ContactRelaxation.of(ZENER)
-    found = references.reduced_contact(cone, ZENER, Program().approach(speed * 2, over=2.0), [0.5, 1.0, 2.0])
-    k = float(cone.scaled_force(cone.radius_at_approach(speed)))
-    force = [quad(lambda s, t=t: relaxation(t - s) * 2 * k * s, 0, t)[0] for t in found.times]
-    np.testing.assert_allclose(found.force, force, rtol=1e-6)
 
 
 @pytest.mark.thorough
@@ -460,27 +352,6 @@ def test_reduced_contact__kelvin_voigt_under_approach():
     dashpots = np.array([1, 1, 0, 0]) * 2 * radius * viscosity * speed
     np.testing.assert_allclose(found.radius, radius, rtol=1e-5)
     np.testing.assert_allclose(found.force, modulus * SPHERE.scaled_force(radius) + dashpots, rtol=1e-5)
-
-
-@pytest.mark.thorough
-def test_reduced_contact__units_are_neutral():
-    length, pressure = 1e-6, 3e7
-    program = Program().load(pressure * length**2, over=1.0).load(0.0, over=1.0).hold(0.1)
-    material = materials.zener(pressure, 0.5 * pressure, 0.5 * pressure)
-    small = references.reduced_contact(Paraboloid(length), material, program, [0.5, 1.5], steps=30, elements=500)
-    plain = references.reduced_contact(SPHERE, ZENER, TRIANGLE.hold(0.1), [0.5, 1.5], steps=30, elements=500)
-    np.testing.assert_allclose(small.radius / length, plain.radius, rtol=1e-9)
-    np.testing.assert_allclose(small.approach / length, plain.approach, rtol=1e-9)
-    np.testing.assert_allclose(small.work / (pressure * length**3), plain.work, rtol=1e-9)
-
-
-@pytest.mark.thorough
-@pytest.mark.thorough
-def test_reduced_contact__reload_after_long_rest_is_the_first_loading():
-    program = TRIANGLE.hold(200.0) + TRIANGLE
-    found = references.reduced_contact(SPHERE, ZENER, program, [0.5, 1.5, 202.5, 203.5])
-    np.testing.assert_allclose(found.radius[2:], found.radius[:2], rtol=2e-5)
-    np.testing.assert_allclose(found.approach[2:], found.approach[:2], rtol=2e-6)
 
 
 def test_punch__approach_undoes_force():

@@ -11,11 +11,9 @@ from layered import (
     elastic_factor,
     inverted,
     laplace_compliance,
-    layered_compliance,
     relaxation_of_wave,
 )
 from references import ElasticLayer, OnSheet, PunchOnSheet, full_contact_wave
-from references import sheet as sheet_module
 from references.growing_contact import StepLoad
 from references.indenters import Cone, Paraboloid
 from references.layer import layer_complement, layer_factor
@@ -166,30 +164,6 @@ def test_contact__on_thin_and_thick_layers_tends_to_that_on_one_material(ratio):
         assert 0.6 < math.log2(abs(one / other)) < 1.1, name
 
 
-@pytest.mark.parametrize("ratio", [0.01, 0.3, 100.0])
-@pytest.mark.parametrize("wide", [0.1, 1.0, pytest.param(10.0, marks=pytest.mark.thorough)])
-def test_fredholm__converges_as_gauss_quadrature_does(ratio, wide, monkeypatch):
-    """Faster than any power of the number of nodes, and 1e-10 with those of the package."""
-
-    def solved(nodes, more, in_panel):
-        monkeypatch.setattr(sheet_module, "_NODES", nodes)
-        monkeypatch.setattr(sheet_module, "_NODES_PER_THICKNESS", more)
-        monkeypatch.setattr(sheet_module, "_IN_PANEL", in_panel)
-        for cached in (sheet_module._smooth, sheet_module._flat):
-            cached.cache_clear()
-        layer = ElasticLayer(1.0, 0.5, 0.3, ratio)
-        ball = OnSheet(Paraboloid(10.0), layer)
-        return np.array([ball.scaled_force(wide), ball.reduced(wide), PunchOnSheet(wide, layer).scaled_stiffness])
-
-    settings = (sheet_module._NODES, sheet_module._NODES_PER_THICKNESS, sheet_module._IN_PANEL)
-    exact = solved(80, 24, 32)
-    rough, half, whole = (np.abs(solved(*at) / exact - 1).max() for at in ((5, 3, 4), (10, 6, 8), settings))
-    assert whole < 1e-10
-    assert half < max(1e-2 * rough, 1e-10)
-    for cached in (sheet_module._smooth, sheet_module._flat):
-        cached.cache_clear()
-
-
 @pytest.mark.parametrize("ratio", [0.02, 5.0, 100.0])
 @pytest.mark.parametrize("radius", [0.2, 2.5])
 def test_pressure__carries_the_force_and_displaces(ratio, radius):
@@ -216,16 +190,6 @@ def test_inversion__knows_a_pair():
     t = np.array([0.01, 1.0, 30.0])
     np.testing.assert_allclose(inverted(lambda s: 1 / (s * (1 + s * 0.4)), t), -np.expm1(-t / 0.4), rtol=1e-8)
     np.testing.assert_allclose(inverted(lambda s: s**-1.3, t), t**0.3 / math.gamma(1.3), rtol=1e-8)
-
-
-@pytest.mark.parametrize("x", [0.01, 1.0, 10.0])
-def test_inversion__agrees_with_that_of_mpmath(x):
-    def transform(s):
-        return mp.mpmathify(complex(layered_compliance(x, complex(s), SOFT, STIFF, 1.0) / complex(s)))
-
-    for t in (0.02, 0.5, 5.0):
-        exact = float(mp.invertlaplace(transform, t, method="talbot", degree=18))
-        assert float(creep_of_wave(x, SOFT, STIFF, 1.0, t)) == pytest.approx(exact, rel=1e-8)
 
 
 def test_creep_and_relaxation__of_a_wave_on_one_material():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import references
 from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, displaced, scene
 
 import roughvisc as rv
@@ -18,33 +17,6 @@ def final(steps):
 
 
 TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
-
-
-@pytest.mark.parametrize(
-    "program", [STEP_LOAD, pytest.param(TRIANGLE, marks=pytest.mark.thorough)], ids=["step", "triangle"]
-)
-@pytest.mark.parametrize(
-    "name",
-    [
-        "zener",
-        pytest.param("maxwell", marks=pytest.mark.thorough),
-        pytest.param("two_branches", marks=pytest.mark.thorough),
-    ],
-)
-def test_fixed_steps__converge_at_second_order(name, program):
-    def result(step):
-        shown = final(march(scene(MATERIALS[name], program, time_step=step, tolerance=1e-10))).point
-        return shown.pressure / shown.pressure.sum(), shown.approach
-
-    counts = np.array([10, 20, 40])
-    exact_pressure, exact_approach = result(1 / 320)
-    found = [result(1 / n) for n in counts]
-    errors = {"pressure": [np.abs(p - exact_pressure).sum() for p, _ in found]}
-    if program is TRIANGLE:  # while contact grows under constant load the approach is exact for any steps
-        errors["approach"] = [abs(a - exact_approach) for _, a in found]
-    for quantity, sizes in errors.items():
-        order = -np.polyfit(np.log(counts), np.log(sizes), 1)[0]
-        assert 1.7 < order < 2.6, f"{quantity}: order {order:.2f}, errors {sizes}"
 
 
 @pytest.mark.parametrize("name", MATERIALS)
@@ -88,13 +60,6 @@ def test_march__goes_on_from_any_state_bit_for_bit():
         assert resumed[-1].state.convolutions == whole[-1].state.convolutions
 
 
-def test_times__are_landed_on_exactly():
-    times = (0.1, 1 / 3, 0.99999, 2.0)
-    found = [s.point.time for s in march(scene(MATERIALS["zener"], STEP_LOAD, times=times, tolerance=1e-2))]
-    assert set(times) <= set(found)
-    assert found == sorted(found)
-
-
 def test_jump__shows_the_right_hand_state():
     program = rv.Program().load(0.01, over=0.5).load(0.04, over=0).hold(0.5).load(0.02, over=0)
     steps = list(march(scene(MATERIALS["zener"], program, tolerance=1e-2)))
@@ -103,16 +68,6 @@ def test_jump__shows_the_right_hand_state():
     assert at_jump[0].point.force == 0.04
     assert steps[-1].point.force == 0.02
     assert steps[-1].point.time == 1.0
-
-
-def test_elastic__remembers_nothing_and_steps_to_events_only():
-    program = rv.Program().load(0.03, over=1.0).hold(1.0).load(0.01, over=1.0)
-    material = rv.elastic(1.0)
-    steps = list(march(scene(material, program, times=(0.5, 2.5))))
-    assert [s.point.time for s in steps] == [0.0, 0.5, 1.0, 2.0, 2.5, 3.0]
-    exact = closed_forms.hertz(UNIT_RADIUS, 4.0, 0.02)
-    assert steps[4].point.approach == pytest.approx(exact.approach, rel=2e-3)
-    assert steps[1].state.fine.history.modes.size == 0
 
 
 def test_zero_load__opens_the_contact_and_the_dent_recovers():
@@ -148,23 +103,13 @@ def test_approach__opens_and_closes_when_the_dent_has_recovered():
         assert np.min(settings.gap + displaced(settings, at[time])) - level > -5e-5 * level
 
 
-def test_hold_of_approach__relaxes_the_load():
-    """Load then constant approach: at constant contact area force relaxes with the relaxation modulus."""
-    material = MATERIALS["zener"]
-    program = rv.Program().load(0.05, over=0).hold(40.0, control="approach")
-    steps = list(march(scene(material, program, tolerance=1e-3, times=(0.0, 40.0))))
-    first, last = steps[0].point, steps[-1].point
-    assert last.approach == first.approach
-    assert last.force / first.force == pytest.approx(0.5, rel=1e-3)  # both moduli alike
-
-
 @pytest.mark.parametrize("material", [rv.kelvin_voigt(1.0, 1.0)], ids=["kelvin_voigt"])
 def test_no_instantaneous_compliance__refuses_a_jump_of_approach_only(material):
     with pytest.raises(rv.InputError, match=r"the approach jumps to 0\.01 m"):
         list(march(scene(material, rv.Program().approach(0.01, over=0).hold(1.0))))
     steps = list(march(scene(material, STEP_LOAD, tolerance=1e-2, times=(0.0, 2.0))))
     assert steps[0].point.force == 0  # the left-hand state
-    exact = references.kelvin_voigt_step(UNIT_RADIUS, material, 0.05)
+    exact = closed_forms.lee_radok(UNIT_RADIUS, material, 0.05)
     assert steps[-1].point.approach == pytest.approx(float(exact.approach(2.0)), rel=1e-2)
 
 

@@ -27,7 +27,6 @@ from scipy.special import ive, kve
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number as positive
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.units import Quantity, quantities
 
 # exp of minus that is nothing.
 _NEGLIGIBLE = 40.0
@@ -55,19 +54,18 @@ class SlidingCylinder:
     friction_coefficient: float
 
 
-@quantities(radius="m", load="N/m", speed="m/s")
-def sliding_cylinder(radius: Quantity, material: Prony, load: Quantity, speed: Quantity) -> SlidingCylinder:
+def sliding_cylinder(radius: float, material: Prony, load: float, speed: float) -> SlidingCylinder:
     r"""Steady sliding or rolling of a rigid cylinder, without shear.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Of the cylinder. [m]
     material : Prony
         A solid with one retardation time and an instantaneous compliance.
-    load : float or str
+    load : float
         Per length of the cylinder. [N/m]
-    speed : float or str
+    speed : float
         [m/s]
 
     Returns

@@ -12,7 +12,6 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program
-from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -22,19 +21,18 @@ def _control(program: Program, control: str) -> None:
         raise InputError(f"expected a program of {control}")
 
 
-@quantities(radius="m", t="s")
-def punch_approach(radius: Quantity, material: Material, program: Program, t: ArrayLike) -> Array:
+def punch_approach(radius: float, material: Material, program: Program, t: ArrayLike) -> Array:
     r"""Approach of a flat round punch under a history of load, which never falls to zero once it acts.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Radius ``a`` of the punch. [m]
     material : Material
         The half-space.
     program : Program
         Ramps, holds and jumps of load.
-    t : array_like of float or str
+    t : array_like of float
         Times. [s]
 
     Returns
@@ -52,19 +50,18 @@ def punch_approach(radius: Quantity, material: Material, program: Program, t: Ar
     return hereditary_integral(material.contact_compliance, material.contact_integral, program, t) / (2 * radius)
 
 
-@quantities(radius="m", t="s")
-def punch_force(radius: Quantity, material: Prony, program: Program, t: ArrayLike) -> Array:
+def punch_force(radius: float, material: Prony, program: Program, t: ArrayLike) -> Array:
     r"""Force on a flat round punch under a history of approach, as long as it stays in contact.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Radius ``a`` of the punch. [m]
     material : Prony
         Exponential series with an instantaneous compliance.
     program : Program
         Ramps, holds and jumps of approach.
-    t : array_like of float or str
+    t : array_like of float
         Times. [s]
 
     Returns
@@ -81,19 +78,18 @@ def punch_force(radius: Quantity, material: Prony, program: Program, t: ArrayLik
     return 2 * radius * hereditary_integral(relaxation, relaxation.integral, program, t)
 
 
-@quantities(radius="m", amplitude="m", period="s")
-def punch_dissipation(radius: Quantity, material: Prony, amplitude: Quantity, period: Quantity) -> float:
+def punch_dissipation(radius: float, material: Prony, amplitude: float, period: float) -> float:
     r"""Energy lost in a settled cycle of a flat round punch that stays in contact.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Radius ``a`` of the punch. [m]
     material : Prony
         Exponential series with an instantaneous compliance.
-    amplitude : float or str
+    amplitude : float
         Amplitude ``d`` of the approach, a sine about any mean. [m]
-    period : float or str
+    period : float
         Period. [s]
 
     Returns
@@ -104,19 +100,18 @@ def punch_dissipation(radius: Quantity, material: Prony, amplitude: Quantity, pe
     return 2 * np.pi * radius * ContactRelaxation.of(material).loss(2 * np.pi / period) * amplitude**2
 
 
-@quantities(amplitude="m", wavenumber="rad/m", t="s")
-def full_contact_wave(amplitude: Quantity, wavenumber: Quantity, material: Prony, t: ArrayLike) -> Array:
+def full_contact_wave(amplitude: float, wavenumber: float, material: Prony, t: ArrayLike) -> Array:
     r"""Amplitude of the pressure that keeps a wave flat after a jump to full contact.
 
     Parameters
     ----------
-    amplitude : float or str
+    amplitude : float
         Of the profile, a cosine. [m]
-    wavenumber : float or str
+    wavenumber : float
         Length of the wave vector, ``2 pi / wavelength``. [rad/m]
     material : Prony
         Exponential series with an instantaneous compliance.
-    t : array_like of float or str
+    t : array_like of float
         Times since then. [s]
 
     Returns

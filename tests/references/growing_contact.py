@@ -14,7 +14,6 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program
-from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -137,17 +136,16 @@ class StepLoad(Growing):
         return np.where(r < self.radius(t), relaxation(t - entry) * final + memory, 0.0)
 
 
-@quantities(sphere_radius="m", force="N")
-def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity) -> StepLoad:
+def lee_radok_step(sphere_radius: float, material: Material, force: float) -> StepLoad:
     r"""A sphere on a viscoelastic half-space under a step load (Lee and Radok).
 
     Parameters
     ----------
-    sphere_radius : float or str
+    sphere_radius : float
         Radius of curvature ``R``. [m]
     material : Material
         The half-space; the pressure needs an exponential series with an instantaneous compliance.
-    force : float or str
+    force : float
         The load ``W``. [N]
 
     Returns
@@ -184,7 +182,6 @@ def lee_radok_step(sphere_radius: Quantity, material: Material, force: Quantity)
     return StepLoad(Paraboloid(sphere_radius), material, force)
 
 
-@quantities(t="s")
 def hereditary_integral(
     kernel: Callable[[Array], Array], antiderivative: Callable[[Array], Array], program: Program, t: ArrayLike
 ) -> Array:
@@ -196,7 +193,7 @@ def hereditary_integral(
         A function of time and its integral from zero, such as ``contact_compliance`` and ``contact_integral``.
     program : Program
         All of load or all of approach; no cycles.
-    t : array_like of float or str
+    t : array_like of float
         Times; at a jump, the state after it. [s]
 
     Returns

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -65,18 +64,17 @@ def positive(name: str, value: float, unit: str) -> None:
         raise InputError(f"{name} is {value!r}: expected a positive number [{unit}]")
 
 
-@quantities(radius="m")
 @dataclass(frozen=True)
 class Paraboloid:
     """Paraboloid ``f = r^2 / (2 R)``, the small-slope form of a sphere.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Radius of curvature ``R``. [m]
     """
 
-    radius: Quantity
+    radius: float
 
     def __post_init__(self) -> None:
         positive("radius", self.radius, "m")
@@ -167,31 +165,3 @@ class Cone:
             ratio = np.where(out > 0, a / out, 1.0)
         outside = a * np.arcsin(ratio) - out + np.sqrt((out - a) * (out + a))
         return np.asarray(self.slope * np.where(r <= a, np.pi / 2 * a - r, outside))
-
-
-@quantities(r="m", radius="m", force="N")
-def punch_pressure(r: ArrayLike, radius: ArrayLike, force: ArrayLike) -> Array:
-    """Pressure under a flat round punch, ``W / (2 pi a sqrt(a^2 - r^2))``: no modulus in it.
-
-    Parameters
-    ----------
-    r : array_like of float or str
-        Distance from the axis. [m]
-    radius : array_like of float or str
-        ``a`` of the punch. [m]
-    force : array_like of float or str
-        ``W``. [N]
-
-    Returns
-    -------
-    ndarray
-        Zero outside, infinite at the edge. [Pa]
-
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.34).
-    """
-    r, radius = places(r, radius)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inside = np.asarray(force) / (2 * np.pi * radius * np.sqrt(np.maximum((radius - r) * (radius + r), 0.0)))
-        return np.asarray(np.where(r <= radius, inside, 0.0))

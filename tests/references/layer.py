@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number as positive
-from roughvisc.units import Quantity, quantities
 
 # Below this, sinh(2x) - 2x and cosh(2x) - 1 - 2x^2 come from their series.
 _SERIES_BELOW = 0.5
@@ -28,14 +27,13 @@ _SERIES_BELOW = 0.5
 _ENDLESS = 400.0
 
 
-@quantities(thickness="m")
 @dataclass(frozen=True)
 class ElasticLayer:
     r"""A layer bonded to a half-space of another material, for the elastic closed forms.
 
     Parameters
     ----------
-    thickness : float or str
+    thickness : float
         [m]
     poisson, base_poisson : float
         Poisson's ratio of the layer and of the half-space, from 0 to 1/2.
@@ -63,7 +61,7 @@ class ElasticLayer:
     1.0
     """
 
-    thickness: Quantity
+    thickness: float
     poisson: float
     base_poisson: float
     modulus_ratio: float

@@ -30,7 +30,6 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
 from roughvisc.mechanics.program import Program, Segment
-from roughvisc.units import quantities
 
 Array = NDArray[np.float64]
 
@@ -251,7 +250,6 @@ def _pass(
     resolution: tuple[int, int, int],
     outermost: float,
     stiff: bool,
-    exponentials: bool,
     strict: bool = True,
 ) -> tuple[Array, float]:
     """Radius, approach, force and work at the times, and the largest radius, at one resolution."""
@@ -263,8 +261,7 @@ def _pass(
     ]
     total = sum(len(mesh) for mesh in meshes)
     memory: Exponentials | AllForces
-    if exponentials:
-        assert isinstance(material, Prony)
+    if isinstance(material, Prony):
         memory = Exponentials(material, elements + total, stiff=stiff)
     else:
         memory = AllForces(material, elements + total, total)
@@ -304,7 +301,6 @@ def _growing_row(run: Callable[..., tuple[Array, float]], outermost: float) -> t
     raise ConvergenceError("the contact radius grows beyond all bounds")
 
 
-@quantities(times="s")
 def reduced_contact(
     indenter: Indenter,
     material: Material,
@@ -314,7 +310,6 @@ def reduced_contact(
     steps: int = 100,
     refinements: int = 3,
     elements: int = 4000,
-    exponentials: bool = True,
 ) -> ContactHistory:
     r"""Contact of a sphere or a cone with a viscoelastic half-space through any history.
 
@@ -326,7 +321,7 @@ def reduced_contact(
         Anything with ``contact_compliance(t)`` and ``contact_integral(t)``.
     program : Program
         Loads and approaches, with ramps, jumps, holds, cycles and changes of control.
-    times : array_like of float or str, optional
+    times : array_like of float, optional
         Ascending instants to keep, stepped onto exactly; the corners of the program if not given. [s]
     steps : int
         Steps for each segment of the program, and for each period of a cycle, at the coarsest resolution.
@@ -334,8 +329,6 @@ def reduced_contact(
         Resolutions in time, each twice as fine as the one before: two for extrapolation, three for an error as well.
     elements : int
         Elements between the axis and the largest contact radius, to which every edge of the contact is added.
-    exponentials : bool
-        False treats an exponential series like any other compliance, by the sum over all past forces.
 
     Returns
     -------
@@ -389,14 +382,13 @@ def reduced_contact(
         raise InputError("the program slides, and the indenter is taken to stay where it is: expected no slide")
     if refinements < 1:
         raise InputError(f"refinements is {refinements!r}: expected at least 1")
-    exponentials = exponentials and isinstance(material, Prony)
     coarse = [
         _instants_of(segment, start, instants, steps, 1, _fastest_change(material))
         for segment, start in zip(program.segments, corners, strict=False)
     ]
     stiff = _rings(material, coarse)
     outermost = _outermost(indenter, material, program)
-    run = partial(_pass, indenter, material, program, instants, stiff=stiff, exponentials=exponentials)
+    run = partial(_pass, indenter, material, program, instants, stiff=stiff)
     # a coarse pass shows how far the contact really goes
     coarsest = max(20, steps // 4), 1, 400
     (_, largest), outermost = _growing_row(partial(run, resolution=coarsest, strict=False), outermost)

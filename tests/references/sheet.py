@@ -22,11 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from references.indenters import Indenter, places, positive, punch_pressure
+from references.indenters import Indenter, places, positive
 from references.layer import ElasticLayer
 from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import SHORTEST_WAVE, Sheet, complement, panels
-from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -132,14 +131,13 @@ class OnSheet:
         return np.array(found)[back].reshape(value.shape)
 
 
-@quantities(radius="m")
 @dataclass(frozen=True)
 class PunchOnSheet:
     """A flat round punch on a sheet or a layer.
 
     Parameters
     ----------
-    radius : float or str
+    radius : float
         Radius ``a`` of the punch. [m]
     sheet : Sheet or ElasticLayer
         What it is pressed on.
@@ -151,7 +149,7 @@ class PunchOnSheet:
     0.002002
     """
 
-    radius: Quantity
+    radius: float
     sheet: Sheet | ElasticLayer
 
     def __post_init__(self) -> None:
@@ -161,14 +159,6 @@ class PunchOnSheet:
     def scaled_stiffness(self) -> float:
         """Force over approach and contact modulus; ``2 a`` on a half-space. [m]"""
         return self._contact.force * self.sheet.thickness
-
-    def pressure(self, r: ArrayLike, force: float) -> Array:
-        """Pressure under a force, the same at all times on a viscoelastic sheet; infinite at the edge. [Pa]"""
-        at, contact = np.abs(np.asarray(r, dtype=float)), self._contact
-        # phi(a) is that of a punch on a half-space; what it is less within, the smooth rest
-        edge = float(contact.potential_at(np.array([contact.radius]))[0])
-        of_edge = punch_pressure(at, self.radius, math.pi * edge * contact.radius)
-        return np.asarray(force / contact.force * (of_edge + contact.added_pressure(at / self.sheet.thickness)))
 
     @property
     def _contact(self) -> _Contact:

@@ -16,7 +16,6 @@ from references.quadrature import bisect, integrate
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.program import Program
-from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
@@ -226,8 +225,7 @@ def _creep_rate(material: Prony, t: Array) -> Array:
     return np.asarray(0.5 * (1 - material.poisson) * rate)
 
 
-@quantities(end="s")
-def ting(indenter: Indenter, material: Prony, force: Program | Function, end: Quantity | None = None) -> SingleMaximum:
+def ting(indenter: Indenter, material: Prony, force: Program | Function, end: float | None = None) -> SingleMaximum:
     r"""Contact under a load that makes it grow to one maximum and then shrink (Ting, Graham).
 
     Parameters
@@ -239,7 +237,7 @@ def ting(indenter: Indenter, material: Prony, force: Program | Function, end: Qu
     force : Program or callable
         Ramps, holds and jumps of load; or a smooth function of an array of times, which starts at zero or at a
         jump. [N]
-    end : float or str, optional
+    end : float, optional
         Where a function of time ends. [s]
 
     Returns
