@@ -5,12 +5,10 @@ import io
 import numpy as np
 import pytest
 import xarray as xr
-from scan_files import CELL, card, file_card, tilted, write_sdf, write_x3p
+from scan_files import CELL, card, file_card, tilted, write_x3p
 
-import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography.backend import RoughviscBackend
-from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
 
 
@@ -33,20 +31,6 @@ def test_engine__takes_the_options_of_open_scan(tmp_path):
     for wrong in (tmp_path / "scan.npy", io.BytesIO(b"x")):
         with pytest.raises(InputError):
             xr.open_dataarray(wrong, engine=RoughviscBackend)
-
-
-def test_engine__opens_many_scans_and_aligns_none_silently(tmp_path):
-    write_x3p(tmp_path / "0.x3p")
-    write_sdf(tmp_path / "1.sdf", 2 * tilted())
-    options = {"engine": RoughviscBackend, "combine": "nested", "concat_dim": "scan", "join": "exact"}
-    options |= {"coords": "minimal", "compat": "override"}
-    ds = xr.open_mfdataset(sorted(tmp_path.glob("*.*")), **options)
-    np.testing.assert_array_equal(ds.height[1], 2 * tilted())
-    pytest.importorskip("x3pio").write(tmp_path / "2.x3p", tilted().T, x_scale=CELL[0] * 1.0001, y_scale=CELL[1])
-    with pytest.raises(ValueError, match="exact"):
-        xr.open_mfdataset(sorted(tmp_path.glob("*.x3p")), **options)
-    with pytest.raises(InputError):
-        rv.combine(from_array(tilted(), CELL), from_array(tilted(), (CELL[0] * 1.0001, CELL[1])))
 
 
 def test_card__refuses_options_that_belong_in_it(tmp_path):

@@ -70,27 +70,6 @@ def test_boundary__of_what_was_changed_has_to_be_said(height):
     assert boundary_of(height) is None
 
 
-@pytest.mark.parametrize(
-    ("steps", "made", "expected"),
-    [
-        ({}, "free", "free"),
-        ({}, None, None),
-        ({"level": False, "realisation": False}, "periodic", "periodic"),
-        ({"level": 0}, "free", None),
-        ({"level": 1}, "periodic", None),
-        ({"realisation": 2}, None, "periodic"),
-        ({"realisation": 2, "level": 1}, "free", "periodic"),
-        ({"crop": {}, "realisation": 2, "resample": 8}, None, "periodic"),
-        ({"resample": 8}, "free", None),
-        ({"resample": 8}, "periodic", "periodic"),
-        ({"resample": 8}, None, None),
-        ({"level": 1, "realisation": 1}, "free", "periodic"),
-    ],
-)
-def test_boundary_after__trusts_nothing_but_an_untouched_recipe_and_surrogates(steps, made, expected):
-    assert boundary_after(steps, made) == expected
-
-
 @pytest.mark.parametrize("height", [ROUGH, WAVES])
 def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
     values = {"rotate90": 1, "invert": True, "shortest_wave": 4e-4, "resample": [12, 10]}

@@ -69,25 +69,6 @@ def test_step__notes_what_it_did_and_leaves_its_input_alone(step):
     done.to_netcdf()  # attributes that can be written
 
 
-@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
-def test_step__does_not_care_for_the_order_of_dimensions_or_the_unit(step):
-    h = rough(missing=0.02)
-    xr.testing.assert_allclose(step(h.transpose("y", "x")), step(h), atol=1e-18)
-
-
-@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
-def test_step__refuses_what_is_no_grid(step):
-    for wrong in (
-        np.zeros((5, 5)),
-        xr.DataArray(np.zeros((5, 5)), dims=("a", "b")),
-        xr.DataArray(np.zeros((5, 5)), dims=("x", "y")),
-        rough().assign_coords(x=np.arange(45.0) ** 2),
-        rough().isel(x=[3]),
-    ):
-        with pytest.raises(InputError):
-            step(wrong)
-
-
 @pytest.mark.parametrize(
     ("step", "named"),
     [

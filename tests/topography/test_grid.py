@@ -70,6 +70,9 @@ REFUSED = {
     "no height": lambda: xr.Dataset({"z": H}),
     "frames": lambda: H.expand_dims("time"),
     "an array": lambda: H.values,
+    "other dimensions": lambda: H.rename(x="a", y="b"),
+    "no coordinates": lambda: H.drop_vars(("x", "y")),
+    "uneven": lambda: H.assign_coords(x=np.arange(12.0) ** 2),
 }
 
 

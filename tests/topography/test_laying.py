@@ -64,15 +64,6 @@ def test_combine__on_one_grid_is_the_same_however_it_is_aligned():
     assert both.x[0] == a.x[2]
 
 
-def test_combine__a_spike_turned_over_lies_on_the_other_side():
-    first, heights = rv.from_array(np.zeros((8, 5)), spacing=1e-6), np.zeros((8, 5))
-    heights[1, 3] = 1e-6
-    spike = rv.from_array(heights, spacing=1e-6)
-    for flip, place in ((None, (1, 3)), ("x", (6, 3)), ("y", (1, 1))):
-        both = rv.combine(first, spike, flip, align="centre").values
-        assert np.unravel_index(both.argmax(), both.shape) == place
-
-
 def test_combine__points_missing_or_filled_in_the_second_are_so_in_the_sum():
     first, heights = rv.from_array(np.zeros((4, 5)), spacing=2e-6), np.ones((8, 10)) * 1e-7
     heights[0:2, 0] = heights[2, 2] = np.nan  # half of a cell of the first, and a quarter of one

@@ -148,14 +148,6 @@ def test_index__that_pandas_writes_is_no_height(header, index, suffix, tmp_path)
         open_scan(path, unit="um")
 
 
-@real
-def test_index__of_the_shared_file():
-    with pytest.warns(UserWarning, match="index"):
-        h = open_scan(SCANS / "misread" / "pandas_default.csv", unit="um", spacing="1.5625 um")
-    assert h.shape == (128, 128)
-    assert not np.isnan(h).any()
-
-
 @pytest.mark.parametrize("corner", ["", "0"])
 def test_index__of_lengths_is_the_spacing(corner, tmp_path):
     x, y = 0.5 * np.arange(24), 0.25 * np.arange(20)
@@ -211,17 +203,6 @@ def test_no_data__of_two_kinds_is_missing(tmp_path):
         h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
     assert len(said) == 2
     np.testing.assert_allclose(h, 1e-6 * np.where(np.abs(z) > 9, np.nan, z).T, rtol=1e-12)
-
-
-def test_no_data__is_said_by_the_command_in_one_line(tmp_path, monkeypatch):
-    z = ROUGH.copy()
-    z[3:5, 4:9] = -9999
-    np.savetxt(tmp_path / "m.csv", z, delimiter=",")
-    monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(main, ["scan", "m.csv", "--unit", "um", "--spacing", "1 um"], catch_exceptions=False)
-    assert done.exit_code == 0
-    (said,) = done.stderr.splitlines()
-    assert said.startswith("Warning: m.csv: 10 points have the height -9999")
 
 
 def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):
@@ -313,14 +294,6 @@ def test_points__of_oblique_rows_are_a_lattice_up_to_a_hundredth(oblique, is_lat
             np.testing.assert_allclose(found[1], steps, rtol=1e-5)  # jitter times the angle
 
 
-@real
-def test_points__of_the_shared_file():
-    h = open_scan(SCANS / "misread" / "jj_1e-06.xyz", unit="um")
-    assert h.shape == (60, 40)
-    assert not np.isnan(h).any()
-    np.testing.assert_allclose(spacing(h), 2e-6, rtol=1e-7)
-
-
 def test_points__absent_from_the_lattice_are_missing(tmp_path):
     some = points()[:1100]
     np.savetxt(tmp_path / "p.xyz", some, header="x y z", comments="")
@@ -370,11 +343,6 @@ def test_points__two_at_one_node_are_no_lattice(tmp_path):
     assert open_scan(tmp_path / "p.xyz", unit="um", grid="6 um").shape == (13, 15)
 
 
-def test_lattice__of_random_points_or_beyond_a_hundredth_of_a_step_is_none():
-    assert lattice(np.random.default_rng(2).random((5000, 3))) is None
-    assert lattice(points(jitter=0.03)) is None
-
-
 def test_grid__is_refused_for_a_map(tmp_path):
     np.save(tmp_path / "m.npy", ROUGH)
     with refused("grid"):
@@ -401,9 +369,3 @@ def test_table__of_force_curves_is_no_map(tmp_path):
         open_scan(tmp_path / "fd.csv", unit="um", spacing="1 um")
     np.save(tmp_path / "narrow.npy", table)
     assert open_scan(tmp_path / "narrow.npy", unit="um", spacing=CELL).shape == (4, 300)
-
-
-def test_auto__says_that_no_reader_knows_the_content(tmp_path):
-    (tmp_path / "a.bin").write_text("This is a letter, and no scan.\n" * 9)
-    with pytest.raises(Exception, match="no reader knows"):
-        open_scan(tmp_path / "a.bin", format="auto")

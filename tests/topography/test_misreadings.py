@@ -133,14 +133,6 @@ def test_several_heights__the_chosen_one_is_named_and_the_others_listed(tmp_path
         assert wrong in refusal(tmp_path / "scan.nc", channel=wrong)
 
 
-def test_points__are_placed_by_their_coordinates_in_any_order(tmp_path):
-    assert "expected unit" in refusal(write_xyz(tmp_path / "scan.xyz"))
-    for shuffled in (False, True):
-        h = open_scan(write_xyz(tmp_path / "scan.xyz", shuffled=shuffled), unit="m")
-        np.testing.assert_allclose(h, tilted(missing=False), rtol=1e-8)
-        np.testing.assert_allclose(spacing(h), CELL, rtol=1e-6)
-
-
 def test_points__have_heights_in_a_unit_of_their_own(tmp_path):
     """x and y in mm, heights in um, as profilometers export them; the lines are shuffled."""
     path = write_xyz(tmp_path / "scan.xyz", 1e3 * tilted(missing=False))
@@ -250,29 +242,72 @@ def test_too_wide__is_refused_and_spacing_mends_it(kind, width, tmp_path):
     np.testing.assert_allclose(spacing(open_scan(path, spacing=CELL)), CELL)
 
 
-def test_profile__in_a_grid_file_is_refused(tmp_path):
-    h = from_array(tilted(), CELL)
-    h.isel(y=[0]).to_netcdf(tmp_path / "scan.nc")
-    refusal(tmp_path / "scan.nc")
-    h.isel(y=0).to_netcdf(tmp_path / "line.nc")
-    assert "no areal height" in refusal(tmp_path / "line.nc")
+# -- profiles, damage -------------------------------------------------------------------------------------------------
 
 
-# -- damage ------------------------------------------------------------------------------------------------------------
+def write_sdf_text(path):
+    return write_sdf(path, format=pytest.importorskip("sdfio").FileFormat.ASCII)
 
 
-def write_nc4(path):
+def write_nc(path):
     from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", encoding={"height": {"zlib": True}})
     return path
 
 
-WRITTEN = {"nc": write_nc4, "h5": write_nc4, "xyz": write_xyz, "csv": write_xyz, "asc": write_text, "dat": write_text}
+def write_nc3(path):
+    from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", format="NETCDF3_CLASSIC")
+    return path
 
 
-@pytest.mark.parametrize("suffix", WRITTEN)
-def test_damage__of_further_kinds(suffix, tmp_path):
-    path = WRITTEN[suffix](tmp_path / f"scan.{suffix}")
-    survive(path, path.read_bytes(), **({"unit": "m"} if WRITTEN[suffix] is write_xyz else {}))
+def write_npy(path):
+    np.save(path, tilted())
+    return path
+
+
+def write_x3p_profile(path):
+    pytest.importorskip("x3pio").write(path, tilted()[:, 0], x_scale=1e-6)
+    return path
+
+
+def write_sdf_profile(path):
+    return write_sdf(path, tilted()[:, :1])
+
+
+def write_text_profile(path):
+    path.write_text("0 1\n1 2\n2 5\n3 2\n")
+    return path
+
+
+def write_nc_profile(path):
+    from_array(tilted(), CELL).isel(y=[0]).to_netcdf(path)
+    return path
+
+
+@pytest.mark.parametrize("write", [write_x3p_profile, write_sdf_profile, write_text_profile, write_nc_profile])
+def test_profile__is_refused(write, tmp_path):
+    suffix = {"text": "txt"}.get(write.__name__.split("_")[1], write.__name__.split("_")[1])
+    refusal(write(tmp_path / f"profile.{suffix}"), **({"unit": "um"} if suffix == "txt" else {}))
+
+
+WRITERS = {
+    "x3p": write_x3p,
+    "sdf": write_sdf,
+    "sdf text": write_sdf_text,
+    "nc": write_nc,
+    "nc classic": write_nc3,
+    "npy": write_npy,
+    "txt": write_text,
+    "asc": write_text,
+    "xyz": write_xyz,
+    "csv": write_xyz,
+}
+OPTIONS = {"npy": {"unit": "m", "spacing": CELL}, "xyz": {"unit": "m"}, "csv": {"unit": "m"}}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_damaged_file__gives_heights_or_is_refused(kind, tmp_path):
+    path = WRITERS[kind](tmp_path / f"scan.{kind.split()[0]}")
+    survive(path, path.read_bytes(), **OPTIONS.get(kind, {}))
 
 
 def forged_x3p(tmp_path):
@@ -302,11 +337,17 @@ def forged_nc(tmp_path):
     return tmp_path / "forged.nc"
 
 
-@pytest.mark.parametrize("forge", [forged_x3p, forged_sdf, forged_nc])
+def forged_npy(tmp_path):
+    path = write_npy(tmp_path / "forged.npy")
+    path.write_bytes(path.read_bytes().replace(b"(13, 9), }" + b" " * 12, b"(9999999, 9999999), } "))
+    return path
+
+
+@pytest.mark.parametrize("forge", [forged_x3p, forged_sdf, forged_nc, forged_npy])
 def test_forged_header__allocates_nothing(forge, tmp_path):
     path = forge(tmp_path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    refusal(path, **({"spacing": CELL} if forge is forged_nc else {}))
+    refusal(path, **{"forged.nc": {"spacing": CELL}, "forged.npy": OPTIONS["npy"]}.get(path.name, {}))
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert grown * (1 if sys.platform == "darwin" else 1024) < 3e8
 

@@ -53,11 +53,6 @@ def test_parameters__differences_converge_at_second_order(name):
     assert np.log(errors[0] / errors[1]) / np.log(51 / 25) == pytest.approx(2, abs=0.1)
 
 
-@pytest.mark.parametrize("periodic", [False, True])
-def test_rms_slope__is_that_of_the_parameters(periodic):
-    assert rms_slope(ROUGH, periodic) == float(parameters(ROUGH, periodic)["Sdq"])
-
-
 def test_rms_slope__of_what_is_near_the_highest_point():
     """A roof of slope 0.1 on walls of slope 2, at the top of a plane."""
     x = np.arange(40) * 1.0
@@ -125,13 +120,6 @@ def test_psd__is_the_two_dimensional_density():
     assert float((spectrum["psd"] * spectrum["modes"]).sum() / (ring["psd"] * ring["modes"])) == pytest.approx(
         1, rel=1e-9
     )
-
-
-def test_psd__has_the_slope_of_the_hurst_exponent():
-    h = self_affine(1e-3, (128, 127), hurst=0.6, rms_slope=0.1, seed=0)
-    spectrum = psd(h).sel(wavevector=slice(3e4, 3e5))
-    fitted = np.polyfit(np.log(spectrum["wavevector"]), np.log(spectrum["psd"]), 1)
-    assert fitted[0] == pytest.approx(-2 - 2 * 0.6, abs=0.05)
 
 
 def test_psd__agrees_with_surface_topography():

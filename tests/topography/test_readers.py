@@ -19,14 +19,11 @@ from scan_files import (
     refusal,
     survive,
     tilted,
-    write_sdf,
-    write_text,
     write_x3p,
 )
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.topography import conditioning, synthesis
 from roughvisc.topography.formats import Channel, ScanFile, add_format, registry
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.readers import from_array, list_channels, supported_formats
@@ -106,26 +103,6 @@ def test_real_scan__is_detected_by_content(name, tmp_path):
 # -- round trips and orientation ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("suffix", "write"), [("x3p", write_x3p), ("sdf", write_sdf)])
-def test_round_trip__keeps_every_height_in_its_place(suffix, write, tmp_path):
-    h = open_scan(write(tmp_path / f"scan.{suffix}"))
-    np.testing.assert_array_equal(h, tilted())
-    np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
-    np.testing.assert_allclose(h.x, (np.arange(13) + 0.5) * 2e-6, rtol=1e-12)
-    assert h.attrs["format"] == suffix
-
-
-@pytest.mark.parametrize("order", [("x", "y"), ("y", "x")])
-def test_netcdf__keeps_coordinates_and_attributes(order, tmp_path):
-    h = conditioning.fill(from_array(tilted(), CELL)).isel(x=slice(2, None))
-    h.transpose(*order).to_netcdf(tmp_path / "scan.nc")
-    again = open_scan(tmp_path / "scan.nc")
-    xr.testing.assert_equal(again, h)
-    assert again["filled"].dtype == bool
-    assert again.attrs["history"].startswith(h.attrs["history"])
-    assert again.attrs["fill_method"] == "harmonic"
-
-
 def test_netcdf__units_are_converted_and_descending_axes_turned(tmp_path):
     h = from_array(tilted(), CELL)
     micro = (h * 1e9).assign_coords(x=h.x * 1e6, y=h.y * 1e3)[::-1].assign_attrs(units="nm")
@@ -188,16 +165,6 @@ def test_refusal__of_what_only_poses_as_a_scan(suffix, content, tmp_path):
     refusal(path)
 
 
-def test_refusal__profile(tmp_path):
-    x3pio = pytest.importorskip("x3pio")
-    x3pio.write(tmp_path / "p.x3p", tilted()[:, 0], x_scale=1e-6)
-    assert "profile" in refusal(tmp_path / "p.x3p")
-    write_sdf(tmp_path / "p.sdf", tilted()[:, :1])
-    assert "profile" in refusal(tmp_path / "p.sdf")
-    (tmp_path / "p.txt").write_text("0 1\n1 2\n2 5\n3 2\n")
-    assert "profile" in refusal(tmp_path / "p.txt", unit="um")
-
-
 def test_refusal__all_points_are_missing(tmp_path):
     from_array(tilted(), CELL).copy(data=np.full(SHAPE, np.nan)).to_netcdf(tmp_path / "scan.nc")
     assert "all 117 points are missing" in refusal(tmp_path / "scan.nc")
@@ -249,43 +216,11 @@ def test_from_array__labels_and_refuses():
 # -- damaged files -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["x3p", "sdf binary", "sdf text", "txt", "nc", "npy"])
-def test_damage__of_files_that_we_write(kind, tmp_path):
-    path = tmp_path / f"scan.{kind.split()[0]}"
-    if kind == "x3p":
-        write_x3p(path)
-    elif kind.startswith("sdf"):
-        sdfio = pytest.importorskip("sdfio")
-        write_sdf(path, format=sdfio.FileFormat.BINARY if "binary" in kind else sdfio.FileFormat.ASCII)
-    elif kind == "txt":
-        write_text(path)
-    elif kind == "nc":
-        from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", format="NETCDF3_CLASSIC")
-    else:
-        np.save(path, tilted())
-    survive(path, path.read_bytes(), **({"unit": "m", "spacing": CELL} if kind == "npy" else {}))
-
-
 @real
 @pytest.mark.parametrize("name", [n for n in TABLE if n != "gwyddion-export-english.txt"] + ["nms-1.nms", "xyz-2.txt"])
 def test_damage__of_real_scans(name, tmp_path):
     options = {"nms-1.nms": {"spacing": 1e-6}, "xyz-2.txt": {"unit": "um"}}.get(name, {})
     survive(tmp_path / name, (SCANS / name).read_bytes(), **options)
-
-
-@pytest.mark.parametrize("kind", ["x3p", "npy"])
-def test_damage__forged_header_allocates_nothing(kind, tmp_path):
-    path = tmp_path / f"forged.{kind}"
-    if kind == "npy":
-        np.save(path, tilted())
-        path.write_bytes(path.read_bytes().replace(b"(13, 9), }" + b" " * 12, b"(9999999, 9999999), } "))
-    else:
-        with zipfile.ZipFile(write_x3p(tmp_path / "good.x3p")) as source, zipfile.ZipFile(path, "w") as target:
-            for name in source.namelist():
-                content = source.read(name)
-                target.writestr(name, content.replace(b"<SizeX>13<", b"<SizeX>1300000000<"))
-    message = refusal(path, **({"unit": "m", "spacing": CELL} if kind == "npy" else {}))
-    assert "damaged" in message
 
 
 # -- surface cards -----------------------------------------------------------------------------------------------------
@@ -294,27 +229,11 @@ def test_damage__forged_header_allocates_nothing(kind, tmp_path):
 BALL = 'generate = "sphere"\nradius = 1\nsize = 1e-6\nshape = 4\n'
 
 
-def test_card__of_a_file_gives_the_scan_as_conditioned(tmp_path):
-    path = file_card(tmp_path, "fill = true\nlevel = true\nresample = [6, 4]\n")
-    h = open_scan(path)
-    scan = open_scan(tmp_path / "scan.x3p")
-    expected = conditioning.resample(conditioning.fill(conditioning.level(scan)), (6, 4))
-    xr.testing.assert_identical(h.drop_attrs(), expected.drop_attrs())
-    assert h.attrs["history"] == expected.attrs["history"]
-    assert (h.attrs["title"], h.attrs["licence"], h.attrs["source"]) == ("T", "CC0", "S")
-    h.to_netcdf()
-
-
 def test_card__of_a_file_checks_its_checksum(tmp_path):
     message = refusal(file_card(tmp_path, sha="0" * 64))
     assert hashlib.sha256((tmp_path / "scan.x3p").read_bytes()).hexdigest() in message
     xr.testing.assert_equal(open_scan(card(tmp_path, 'file = "scan.x3p"')), open_scan(tmp_path / "scan.x3p"))
     assert "file" in refusal(card(tmp_path, 'file = "other.x3p"'))
-
-
-def test_card__of_a_recipe_reads_units(tmp_path):
-    h = open_scan(card(tmp_path, 'generate = "sphere"\nradius = "10 um"\nsize = ["4 um", 3e-6]\nshape = [5, 4]\n'))
-    xr.testing.assert_equal(h, synthesis.sphere(1e-5, (4e-6, 3e-6), (5, 4)))
 
 
 @pytest.mark.parametrize(

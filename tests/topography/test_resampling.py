@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from strategies import examples, shapes
 
 import roughvisc as rv
-from roughvisc.experiment.coarser import coarser
-from roughvisc.topography.borders import border_mismatch, is_mirrored, is_periodic
+from roughvisc.topography.borders import is_mirrored, is_periodic
 
 SIZE = (1e-3, 0.8e-3)
 #: Waves of a surface: numbers over the sides, amplitude [m] and phase; none shorter than a seventh of a side.
@@ -65,57 +64,6 @@ def test_resample__a_mirrored_surface_stays_its_own_mirror_image():
         assert is_mirrored(found.values)
         quarter = rv.resample(half, [n // 2 for n in shape], periodic=False)  # cosines: the mirror images are in them
         np.testing.assert_allclose(found, rv.mirror(quarter), rtol=0, atol=1e-12 * float(abs(half).max()))
-
-
-def test_resample__no_step_at_the_seam_of_its_own_making():
-    """The waves themselves say how much opposite borders differ; beside a spline, which does not know of the seam."""
-    few, fine = sum_of_waves((18, 17)), sum_of_waves((54, 85))
-    across = [border_mismatch(h).of_neighbours for h in (fine, rv.resample(few, fine.shape, periodic=True))]
-    np.testing.assert_allclose(*across, rtol=1e-9)
-    assert border_mismatch(rv.resample(few, fine.shape, periodic=False)).jumps
-
-
-RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
-
-
-def test_resample__friction_of_a_refined_surface_is_that_of_the_same_waves_on_the_finer_grid():
-    few, fine = rv.resample(sum_of_waves((18, 16)), (36, 40), periodic=True), sum_of_waves((36, 40))
-    asked = {"pressure": 4e4, "speeds": 0.3, "tolerance": 1e-4, "progress": False}
-    found, exact = (rv.friction(h, RUBBER, **asked) for h in (few, fine))
-    for name in ("friction_coefficient", "contact_area"):
-        np.testing.assert_allclose(found[name], exact[name], rtol=1e-4)  # the tolerance
-
-
-def test_resample__leak_under_a_refined_surface_is_that_under_the_same_waves_on_the_finer_grid():
-    few, fine = rv.resample(sum_of_waves((18, 16)), (36, 40), periodic=True), sum_of_waves((36, 40))
-    program = rv.Program().pressure(1e4, over=0)
-    leaks = []
-    for h in (few, fine):
-        ds = rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", progress=False, tolerance=1e-6)
-        leaks.append(rv.observables.leakage(ds, viscosity=1e-3, pressure_drop=1e5).leak_rate.values)
-    assert leaks[0] == pytest.approx(leaks[1], rel=1e-6)
-    assert leaks[0] > 0
-
-
-def test_coarser__changes_the_area_less_than_block_means_do():
-    """The surfaces that `grid_error` presses under periodic boundaries; what it states holds the error of the area."""
-    asked = {"boundary": "periodic", "progress": False, "fields": ("pressure",)}
-    fine = rv.self_affine(SIZE, (60, 48), hurst=0.8, rms_slope=0.1, rolloff=4e-4, shortcut=SIZE[0] / 15, seed=0)
-    half = coarser(
-        rv.from_array(fine.values, [side / n for side, n in zip(SIZE, fine.shape, strict=True)]), 2, "periodic"
-    )
-    means = half.copy(data=fine.values.reshape(30, 2, 24, 2).mean((1, 3)))
-    finest = rv.resample(fine, (180, 144))
-    changes = []
-    for pressure in (1e4, 2e4, 4e4, 8e4):
-        program = rv.Program().pressure(pressure, over=0)
-        grids = [rv.simulate(h, rv.elastic(1e6), program, **asked) for h in (half, means, finest)]
-        found = rv.simulate(fine, rv.elastic(1e6), program, grid_error=True, **asked)
-        areas = [float(ds.contact_area[-1]) for ds in (found, *grids)]
-        changes.append([abs(area / areas[0] - 1) for area in areas[1:]])
-        assert float(found.grid_error_area[-1]) > abs(1 - areas[0] / areas[3])
-    waves, blocks, _ = np.mean(changes, axis=0)
-    assert waves < 0.7 * blocks
 
 
 MADE = {
