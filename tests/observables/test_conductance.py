@@ -95,14 +95,6 @@ def test_stiffness__is_what_a_small_increment_of_load_meets():
     assert float(found["incremental_stiffness"][0]) == pytest.approx(2 * 12e6 * modulus.radius, rel=2e-2)
 
 
-def test_stiffness__is_in_proportion_to_the_modulus(ball):
-    found = incremental_stiffness(ball, contact_modulus="12 MPa")
-    np.testing.assert_allclose(found["incremental_stiffness"], 12e6 * found["frozen_stiffness"])
-    np.testing.assert_allclose(found["incremental_stiffness_error"], 12e6 * found["frozen_stiffness_error"])
-    with refused("contact_modulus", 0):
-        incremental_stiffness(ball, contact_modulus=0)
-
-
 def test_sheet__is_pressed_as_one_and_conducts_as_a_half_space():
     ds = pressed(rv.sheet(rv.elastic(1e6, 0.3), 2e-4, "slipping"), 0.002, cells=31)
     contact = ds["pressure"].values[0] > 0
@@ -133,12 +125,3 @@ def test_no_contact_and_full_contact(boundary):
     assert (found.isel(time=0).to_array() == 0).all()
     square = math.pi * 0.36678742 * 8e-6 if boundary == "free" else math.inf
     assert float(found["thermal_conductance"][1]) == pytest.approx(square, rel=2e-3)
-
-
-def test_punch__is_corrected_and_no_worse_for_its_staircase():
-    height = rv.flat_punch(5e-4, 1.2e-3, (48, 47))
-    contact = height.notnull().astype(float).drop_attrs()
-    ds = xr.Dataset({"pressure": contact.expand_dims(time=[0.0]), "height": height}, attrs={"boundary": "free"})
-    found = float(conductance(ds, (1, 1))["thermal_conductance"][0])
-    area = float(contact.sum()) * (1.2e-3 / 48) * (1.2e-3 / 47)
-    assert found == pytest.approx(2 * math.sqrt(area / math.pi), rel=1e-3)

@@ -85,13 +85,6 @@ def test_sides__meet_where_the_border_is_periodic():
         leakage(free, sides="periodic")
 
 
-def test_mirrored_surface__leaks_as_the_part_that_was_measured():
-    part = 1e-6 * (0.1 + np.random.default_rng(3).random((7, 6)))
-    whole = np.block([[part, part[:, ::-1]], [part[::-1], part[::-1, ::-1]]])
-    found = leakage(result(whole, boundary="periodic"))
-    assert_allclose(found.transmissivity.item(), leakage(result(part)).transmissivity.item(), rtol=1e-12, atol=0)
-
-
 def test_frames__on_dask_are_tasks_of_their_own():
     frames = [1e-6 * np.random.default_rng(seed).random((5, 4)) for seed in range(6)]
     ds = xr.concat([result(*frames[:3]), result(*frames[3:])], dim="case")

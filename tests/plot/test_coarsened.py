@@ -8,7 +8,6 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.plot.maps import frame_of
-from roughvisc.study.storage import netcdf
 
 SHAPE, CELL = (50, 37), (2e-6, 3e-6)
 
@@ -40,24 +39,6 @@ def coarse(monkeypatch):
     monkeypatch.setattr(sys.modules["roughvisc.plot.maps"], "MOST_CELLS", 16)
 
 
-@pytest.fixture
-def stored(tmp_path, monkeypatch):
-    """The result in a file of small chunks, and the shapes that are read of it."""
-    monkeypatch.setattr(netcdf, "_MANY_CELLS", 100)
-    monkeypatch.setattr(netcdf, "_CHUNK_OF_MANY", (1, 8, 8))
-    path, shapes = netcdf.write_result(result(displacement=True), tmp_path / "result.nc"), []
-    read = netcdf._Field._read
-
-    def told(self, key):
-        found = read(self, key)
-        shapes.append(found.shape)
-        return found
-
-    monkeypatch.setattr(netcdf._Field, "_read", told)
-    with netcdf.open_result(path) as dataset:
-        yield dataset, shapes
-
-
 def test_present__keeps_the_extremes_of_every_block(coarse):
     ds = result(displacement=True)
     ds["height"][:4, :4] = ds["height"][6, 7] = np.nan
@@ -82,21 +63,3 @@ def test_maps__show_a_lone_spot_and_say_so(coarse):
     assert "4 × 4" in told
     assert "largest pressure" in told
     assert "smallest gap" in told
-
-
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_observables__of_a_file_are_those_in_memory_and_read_a_frame_at_a_time(stored, boundary):
-    opened, shapes = stored
-    opened.attrs["boundary"] = boundary
-    loaded = opened.copy(deep=True).load()
-    shapes.clear()
-    for name in ("clusters", "distribution"):
-        observe = getattr(rv.observables, name)
-        xr.testing.assert_allclose(observe(opened).compute(), observe(loaded), rtol=1e-13)
-        xr.testing.assert_allclose(observe(loaded.chunk(time=1)).compute(), observe(loaded), rtol=1e-13)
-    areas = rv.observables.cluster_areas(opened)
-    xr.testing.assert_identical(areas, rv.observables.cluster_areas(loaded))
-    contact = rv.observables.contact(opened)
-    assert contact.chunks
-    assert max(int(np.prod(shape)) for shape in shapes) == SHAPE[0] * SHAPE[1], "a frame"
-    xr.testing.assert_equal(contact.compute(), rv.observables.contact(loaded))

@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_rgba
-from PIL import Image
 from support import lines
 
 import roughvisc as rv
 from roughvisc.labels import label
-from roughvisc.plot import style
-from roughvisc.plot.save import figures_of
 
 SPEEDS = np.array([2e-3, 2e-5, 2e-4])
 
@@ -41,14 +37,6 @@ def test_friction__draws_both_in_the_order_of_the_speed():
         assert ax.get_ylim()[1] > max(expected)
     assert left.get_xlabel() == "Speed [mm/s]"
     assert left.get_xscale() == "log"
-
-
-def test_friction__leaves_out_a_speed_that_is_not_solved():
-    missing = curve()
-    missing["friction_coefficient"][0] = np.nan
-    (left, _) = rv.plot.friction(missing).axes
-    assert np.isfinite(lines(left)["Friction coefficient"].get_ydata()).tolist() == [True, True, False]
-    assert left.get_ylim()[1] > 0.2
 
 
 def test_friction__draws_the_theory():
@@ -85,24 +73,17 @@ def sliding(direction="x"):
     return found.assign_attrs(direction=direction)
 
 
-@pytest.mark.parametrize(("direction", "arrow"), [("x", "→"), ("-x", "←"), ("y", "↑"), ("-y", "↓")])
-def test_maps_of_friction__are_of_low_peak_and_high_speed_with_the_motion(direction, arrow):
-    figure = rv.plot.maps(sliding(direction))
-    panels = [ax for ax in figure.axes if ax.images]
-    assert [ax.get_title(loc="left").partition("  ")[2] for ax in panels] == [
-        f"{arrow} V = 20 µm/s\nµ = 0.01",
-        f"{arrow} V = 200 µm/s\nµ = 0.2",
-        f"{arrow} V = 2 mm/s\nµ = 0.1",
-    ]
+def test_maps_of_friction__are_in_the_order_of_the_speed():
+    panels = [ax for ax in rv.plot.maps(sliding()).axes if ax.images]
     drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in panels]
-    assert [int((one > 0).sum()) for one in drawn] == [12, 8, 4], "in the order of the speed"
-    assert panels[0].images[0].get_array().shape == (4, 8), "x to the right"
+    assert [int((one > 0).sum()) for one in drawn] == [12, 8, 4]
+    assert drawn[0].shape == (4, 8), "x to the right"
 
 
 def test_maps_of_friction__at_speeds_that_are_asked_for():
     figure = rv.plot.maps(sliding(), ["1.5 mm/s", 3e-5])
-    titles = [ax.get_title(loc="left").split("\n")[0] for ax in figure.axes if ax.images]
-    assert [title.partition("  ")[2] for title in titles] == ["→ V = 2 mm/s", "→ V = 20 µm/s"]
+    drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in figure.axes if ax.images]
+    assert [int((one > 0).sum()) for one in drawn] == [4, 12]
     for speeds in ([], [1.0] * 25):
         with pytest.raises(rv.InputError, match="1 to 24"):
             rv.plot.maps(sliding(), speeds)
@@ -149,24 +130,6 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
 
     assert drawn(several()) == ["sweep-friction.png", "sweep-area.png", "sweep-master.png"]
     assert drawn(several((1.0, 1.0))) == ["sweep-friction.png", "sweep-area.png"]
-
-
-def test_figures_of_a_curve__have_no_history():
-    """Force and pressure are the same at all speeds."""
-    drawn = [name for name, *_ in figures_of(sliding().assign(force=("speed", np.ones(3))))]
-    assert drawn == ["friction", "maps", "surface"]
-
-
-def test_animate__goes_from_low_to_high_speed(tmp_path):
-    """The contact of 12, 8 and 4 cells shrinks, and with it the colour of cells without contact grows."""
-    free = []
-    with Image.open(rv.plot.animate(sliding(), tmp_path / "film.gif")) as film:
-        for frame in range(film.n_frames):
-            film.seek(frame)
-            pixels = np.asarray(film.convert("RGB")).reshape(-1, 3) / 255
-            free.append(np.count_nonzero(np.abs(pixels - to_rgba(style.NO_CONTACT)[:3]).max(axis=1) < 0.03))
-    assert len(free) == 3
-    assert free[0] < free[1] < free[2], "though the rows are not in this order"
 
 
 #: A stroke, a stop and a stroke back, in micrometres; what is pressed on before is not drawn.

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 
 from roughvisc import plot
-from roughvisc.plot.sweep import swept_keys
 
 LOADS = np.array([0.01, 0.02, 0.04])
 TIMES = np.array([0.1, 1.0, 10.0])
@@ -67,27 +66,6 @@ def test_figures__draw_the_mean_the_band_and_the_scan_itself(draw):
     assert ax.get_ylim()[1] > corners[:, 1].max()
 
 
-def test_figures__of_generated_surfaces_have_no_scan_and_seeds_are_no_parameter():
-    ds = patches(1, surface_seed=("realisation", np.arange(7, 12), {"long_name": "surface.seed"}))
-    figure = plot.history(ds)
-    band = max(one.get_paths()[0].vertices[:, 1].max() for one in figure.axes[0].collections)
-    assert figure.axes[0].get_ylim()[1] > band
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert "mean of 5 realisations" in told
-    assert "measured scan" not in told
-    assert [key.dotted for key in swept_keys(ds)] == ["program.0.load"]
-
-
-def test_sweep__the_band_of_a_point_alone_is_a_bar():
-    hurst = ("case", [0.6, 0.6, 0.8], {"long_name": "surface.hurst"})
-    (ax,) = plot.sweep(patches(surface_hurst=hurst), times=-1, along="program.0.load").axes
-    (bar,) = [one for one in ax.collections if isinstance(one, LineCollection)]
-    low, high = interval(FACTORS[1:])
-    ((_, bottom), (_, top)) = bar.get_segments()[0]
-    assert top / bottom == pytest.approx(high / low)
-    assert sum(isinstance(one, PolyCollection) for one in ax.collections) == 1
-
-
 def test_sweep__a_realisation_that_is_missing_does_not_count():
     ds = patches(1)
     hole = (ds["program_0_load"] == LOADS[1]) & (ds["realisation"] == 3)
@@ -98,13 +76,3 @@ def test_sweep__a_realisation_that_is_missing_does_not_count():
     unit = 1e12 if "µm²" in ax.get_ylabel() else 1e6
     at_end = band[band[:, 0] == band[:, 0].max()]
     assert at_end[:, 1].min() == pytest.approx(3e-7 * LOADS[1] * low * unit)
-
-
-def test_history__of_realisations_with_other_times_is_interpolated_to_common_places():
-    times = np.array([[0.0, 1.0, 2.0], [0.0, 0.5, 2.0]])
-    area = xr.Variable(("case", "row"), 1e-8 * times * [[1], [2]], {"units": "m^2"})
-    coords = {"time": (("case", "row"), times), "rows": ("case", [3, 3]), "realisation": ("case", [1, 2])}
-    (ax,) = plot.history(xr.Dataset({"contact_area": area}, coords)).axes
-    (line,) = ax.lines
-    np.testing.assert_allclose(line.get_xdata(), [0, 0.5, 1, 2])
-    np.testing.assert_allclose(line.get_ydata() / line.get_ydata()[-1], np.array([0, 0.5, 1, 2]) / 2)

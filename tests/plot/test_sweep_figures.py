@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc import plot
 from roughvisc.errors import InputError
 from roughvisc.plot.save import results_of_sweep
-from roughvisc.plot.sweep import sweep_figures, swept_keys
+from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.execution.run import run_case
 
 LOADS = [0.01, 0.02, 0.04]
@@ -99,12 +99,6 @@ def test_sweep__of_two_parameters_as_a_family_of_lines():
             np.testing.assert_allclose(line.get_ydata(), share * power * np.array(LOADS) ** 0.9)
 
 
-def test_sweep__what_follows_from_another_parameter_takes_no_axis():
-    ds = stacked({"program.0.load": LOADS, "solve.tolerance": [1e-2, 1e-3, 1e-4], "surface.seed": [1, 1, 1]}, by_load)
-    assert [key.dotted for key in swept_keys(ds)] == ["program.0.load"]
-    assert plot.sweep(ds).axes[0].get_xlabel() == "Load [mN]"
-
-
 def test_sweep__refuses_what_cannot_be_drawn():
     ds = stacked(SWEEPS["loads"])
     for options in (
@@ -134,11 +128,6 @@ def test_history_of_a_sweep__a_line_each_with_a_legend_or_a_bar():
     assert not figure.legends
     assert figure.axes[1].get_yscale() == "log"
     assert figure.axes[1].get_ylabel() == "Load [mN]"
-
-
-def test_sweep_figures__leave_out_what_is_alike_in_all_cases():
-    ds = stacked(SWEEPS["two"], by_load)
-    assert [name for name, _, _ in sweep_figures(ds)] == ["area", "histories"], "the force is that of no parameter"
 
 
 def test_sweep__of_surfaces_of_several_sizes_is_in_parts_of_them():
@@ -216,22 +205,3 @@ def test_files__of_a_folder(folder, tmp_path):
     assert [path.name for path in written] == ["sweep-area.png", "sweep-histories.png", "sweep-approach.png"]
     assert sorted(tmp_path.iterdir()) == sorted(written)
     assert results_of_sweep(tmp_path) is None
-
-
-@pytest.mark.thorough
-def test_command__draws_the_sweep_of_a_folder(folder, tmp_path, coarse_pictures):
-    from click.testing import CliRunner
-
-    from roughvisc.cli import main
-
-    done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path)])
-    assert done.exit_code == 0
-    assert done.output == f"3 figures: {tmp_path}\n"
-    done = CliRunner().invoke(main, ["plot", str(folder), "--out", str(tmp_path), "--all"])
-    assert done.exit_code == 0
-    assert done.output.endswith(f"figures: {tmp_path}\n")
-    assert len(list(tmp_path.glob("sweep-*.png"))) == 3
-    names = {path.name for path in tmp_path.glob("*-history.png")}
-    assert len(names) == 6
-    assert "load_5mN-hold_0.2s-history.png" in names
-    assert (tmp_path / "sweep-area.png").stat().st_size > 5000

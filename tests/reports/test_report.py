@@ -15,8 +15,6 @@ from roughvisc.reports.report import report
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import write_result
-from roughvisc.study.storage.results_table import to_table
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
@@ -103,16 +101,6 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
         report([ds])
 
 
-@pytest.mark.thorough
-def test_page__has_figures_of_every_case_and_of_the_sweep(page):
-    titles = re.findall(r"<figcaption>(.*?)</figcaption>", page)
-    captions = ("Pressure and gap between the bodies.", "Histories; dots mark the kept times.")
-    assert [titles.count(one) for one in captions] == [3, 3]
-    assert sum(one.startswith("Section through the contact") for one in titles) == 3
-    assert "Contact area against the swept settings." in titles
-    assert page.count('src="data:image/png;base64,') == len(titles)
-
-
 def test_page__holds_the_study_that_gives_the_result_again(page, folder, tmp_path):
     found = [html.unescape(one) for one in re.findall(r"<pre>(title = .*?)</pre>", page, re.S)]
     assert len(found) == 3
@@ -121,17 +109,6 @@ def test_page__holds_the_study_that_gives_the_result_again(page, folder, tmp_pat
         study.write_text(text)
         (case,) = read_cases(study)
         assert (folder / f"{case.key}.nc").exists()
-
-
-@pytest.mark.thorough
-def test_page__of_many_cases_has_figures_of_some_and_all_in_its_table(tmp_path):
-    for number in range(9):
-        ds = made.one_frame().drop_vars(["height", "gap", "displacement"])
-        ds.attrs["case"] = json.dumps({"title": "Many", "varied": {"surface.seed": number}})
-        write_result(ds, tmp_path / f"{number:016x}.nc")
-    text = report(tmp_path).read_text()
-    assert len(re.findall(r"<tr><td>\d</td>", text)) == 9
-    assert "Figures of 6 of 9 cases are shown" in text
 
 
 @pytest.mark.thorough
