@@ -1,13 +1,9 @@
 """``boundary="auto"``: as the surface was made, and a question where it was not."""
 
-import numpy as np
 import pytest
 import xarray as xr
-from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.grid import Grid
-from roughvisc.settings import Settings, known_boundary
 
 PRESS = rv.Program().pressure(1e3, over=0)
 STEEL = rv.elastic(1e6)
@@ -36,32 +32,3 @@ def test_auto__with_an_accepted_edge_is_free(caplog):
 def test_friction__is_periodic_whatever_slides():
     ds = rv.friction(SCAN, rv.zener(1e6, 1e6, 1e5), pressure=1e3, speeds=[1e-3], progress=False)
     assert ds.attrs["boundary"] == "periodic"
-
-
-@pytest.mark.parametrize(
-    ("stated", "edge", "only", "made", "expected"),
-    [
-        ("auto", "error", None, "free", "free"),
-        ("auto", "error", None, None, None),
-        ("auto", "accept", None, "periodic", "free"),
-        ("auto", "accept", "periodic", "free", "periodic"),
-        ("auto", "error", "periodic", None, "periodic"),
-        ("free", "error", "periodic", "periodic", "free"),
-        ("periodic", "accept", None, "free", "periodic"),
-    ],
-)
-def test_known_boundary__takes_what_is_said_then_the_experiment_then_the_edge_then_the_surface(
-    stated, edge, only, made, expected
-):
-    assert known_boundary(Settings(boundary=stated, edge=edge), only, lambda: made) == expected
-
-
-def test_auto__is_no_boundary_of_a_grid():
-    with refused("boundary", "auto"):
-        Grid((4, 4), (1.0, 1.0), "auto")
-
-
-def test_auto__of_a_moved_grid_of_waves_is_periodic_still():
-    moved = ROUGH.assign_coords(x=ROUGH.x + 1.0)
-    assert pressed(moved).attrs["boundary"] == "periodic"
-    assert np.isfinite(pressed(moved).pressure).all()

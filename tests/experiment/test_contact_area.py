@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import boundaries, examples, of_whole_runs, surfaces
+from strategies import boundaries, of_whole_runs, surfaces
 
 import roughvisc as rv
 from roughvisc.mechanics import closed_forms, stepping
-from roughvisc.mechanics.contact.neighbours import area_bounds
 from roughvisc.topography.grid import nominal_area
 
 SHAPE, SIZE, APEX = (35, 32), (1.6, 1.5), (0.81, 0.735)
@@ -70,12 +69,6 @@ def test_interval__is_narrow_and_shrinks_with_the_steps(pulled):
     assert undecided[0.025].sum() <= 0.3 * undecided[0.1].sum()
 
 
-def test_elastic__leaves_no_cell_in_doubt_on_account_of_the_steps(monkeypatch):
-    monkeypatch.setattr(stepping, "SOLVER_SHARE", 1e-4)  # nor on account of the solver
-    ds = pressed(rv.elastic(1.0), rv.Program().load(0.03, over=1.0).load(0.003, over=1.0), times=TIMES)
-    assert (ds.contact_area_error == 0).all()
-
-
 def test_interval__holds_what_the_contact_solver_leaves_in_doubt():
     scan = rv.self_affine((1.0, 1.1), (40, 44), hurst=0.8, rms_slope=0.2, shortcut=0.1, seed=10)
     loads = {"boundary": "periodic", "times": [1.0], "fields": (), "progress": False}
@@ -123,33 +116,6 @@ def test_area_of_a_hertzian_circle__converges_faster_than_the_count():
     assert area > 1.3
     assert 0.9 < count < 1.2
     assert fine[0] < fine[1] / 4
-
-
-def by_hand(contact, periodic):
-    """Cells in contact, and these less 0.088 for each face to a cell out of contact."""
-    (nx, ny), faces = contact.shape, 0
-    for i, j in np.argwhere(contact):
-        for k, m in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
-            if periodic or (0 <= k < nx and 0 <= m < ny):
-                faces += not contact[k % nx, m % ny]
-    return np.count_nonzero(contact), np.count_nonzero(contact) - 0.088 * faces
-
-
-@examples(60)
-@given(st.integers(0, 2**32 - 1), st.booleans(), st.floats(0, 1), st.sampled_from([0.03, 0.1, 0.5]))
-def test_bounds__hold_the_area_whichever_cells_in_doubt_touch(seed, periodic, part, doubted):
-    rng = np.random.default_rng(seed)
-    contact, doubtful = rng.random((7, 6)) < part, rng.random((7, 6)) < doubted
-    lower, upper = area_bounds(
-        *by_hand(contact, periodic), np.count_nonzero(contact & doubtful), np.count_nonzero(~contact & doubtful)
-    )
-    for other in (
-        contact & ~doubtful,
-        contact | doubtful,
-        np.where(rng.random((7, 6)) < 0.5, contact ^ doubtful, contact),
-    ):
-        assert lower - 1e-9 <= by_hand(other, periodic)[1] <= upper + 1e-9
-    assert upper <= contact.size, "no more than there is"
 
 
 @of_whole_runs

@@ -8,7 +8,6 @@ import pytest
 from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.mechanics import steady_sliding
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
@@ -51,18 +50,6 @@ def test_dataset__agrees_with_itself(curve):
     assert (curve.contact_area < curve.contact_area_counted).all()
 
 
-def test_area__shrinks_as_the_material_stiffens(curve):
-    ordered = curve.sortby("speed")
-    assert (np.diff(ordered.contact_area) < 0).all()
-
-
-def test_load_and_pressure__are_the_same(curve):
-    same = rv.friction(ROUGH, RUBBER, load=2e4 * 0.8e-6, speeds=[0.2, 2e-3, 20.0])
-    np.testing.assert_allclose(
-        same.friction_coefficient, curve.friction_coefficient, rtol=1e-11
-    )  # the loads differ by rounding
-
-
 def test_directions__are_those_of_a_turned_surface():
     """Whichever the direction, as along x of the surface turned by so many right angles."""
     one = {"pressure": 2e4, "speeds": 0.2, "fields": ("pressure",)}
@@ -97,11 +84,6 @@ def test_force_across__is_to_the_left_of_the_motion(direction, across):
     assert (found.friction_force > 0).all()
 
 
-def test_temperature__shifts_the_speed(curve):
-    warm = rv.friction(ROUGH, rv.shift(RUBBER, 0.01), pressure=2e4, speeds=20.0)
-    assert float(warm.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
-
-
 def test_sheet__rubs_less_as_it_is_thinner(curve):
     thin = rv.friction(ROUGH, rv.sheet(RUBBER, 2e-5), pressure=2e4, speeds=0.2)
     assert (thin.attrs["thickness"], thin.attrs["base"]) == (2e-5, "bonded")
@@ -128,11 +110,6 @@ def test_measured_material__by_its_series(curve):
     found = rv.friction(ROUGH, table, **PRESS)
     # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
     np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
-
-
-def test_seam__is_told():
-    tilted = ROUGH.copy(data=ROUGH.values + 1e-4 * np.arange(40)[:, None] / 40)
-    assert "repeats with a step" in rv.friction(tilted, RUBBER, pressure=2e3, speeds=1e-2).attrs["warnings"]
 
 
 @pytest.mark.parametrize(
@@ -187,12 +164,6 @@ def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(mater
     assert float(ds.pressure[0].mean()) == pytest.approx(pressure, rel=1e-9)
     across = "y" if direction == "x" else "x"
     assert float((ds.pressure[0].max(across) - ds.pressure[0].min(across)).max()) == 0
-
-
-def test_endless_creep__is_refused_where_the_profile_changes_across_the_motion():
-    rough = rv.self_affine((1e-3, 1e-3), (15, 11), hurst=0.8, rms_slope=0.1, seed=1)
-    with pytest.raises(InputError, match="creeps without end"):
-        rv.friction(rough, rv.maxwell(1e6, 1e3), pressure=1e4, speeds=0.1, progress=False)
 
 
 def test_unsolved_speed__is_missing_and_the_others_stand(curve, monkeypatch):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.variables import VARIABLES
 
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
 SPEEDS = [1e-2, 0.1, 1.0]
@@ -58,32 +57,9 @@ def test_grid_error__bounds_the_true_one_of_slow_sliding(ratio, pressure, cells)
     assert 0.7 * true < float(found.grid_error_friction[0]) < 0.1
 
 
-def test_grid_error__falls_with_the_grid_and_is_labelled():
-    surface = {"hurst": 0.8, "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 2e-4, "seed": 1}
-    found = [
-        rv.friction(
-            rv.self_affine(1e-3, cells, **surface), RUBBER, pressure=5e4, speeds=0.1, grid_error=True, progress=False
-        )
-        for cells in (24, 96)
-    ]
-    for name in ("grid_error_friction", "grid_error_area"):
-        assert float(found[1][name][0]) < 0.5 * float(found[0][name][0])
-        assert found[0][name].attrs["long_name"] == VARIABLES[name].long_name
-
-
 def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():
     rough = rv.self_affine(1e-3, 24, hurst=0.8, rms_slope=0.1, seed=1)
     asked = {"pressure": 1e4, "speeds": 0.1, "grid_error": True, "progress": False}
     assert np.isnan(rv.friction(rough, rv.elastic(1e6), **asked).grid_error_friction).all()
     few = rv.from_array(1e-6 * np.array([[0.0, 1.0], [2.0, 0.5]]), 1e-3)
     assert np.isnan(rv.friction(few, RUBBER, **asked).grid_error_area).all()
-
-
-def test_grid_error__does_not_depend_on_the_number_of_rows_of_a_line_contact():
-    found = []
-    for rows in (1, 8):
-        wave = rv.wavy(1e-5, 1e-3, (1e-3, rows * 1e-5), (40, rows), waves=1)
-        found.append(rv.friction(wave, RUBBER, pressure=5e3, speeds=0.1, grid_error=True, progress=False))
-    assert 0.1 < float(found[0].contact_fraction[0]) < 0.9
-    for name in ("grid_error_friction", "grid_error_area", "grid_error_gap"):
-        np.testing.assert_allclose(found[1][name], found[0][name], rtol=1e-6)

@@ -2,15 +2,10 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from support import BALL, EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
+from support import EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment.coarser import block_means, coarser, pressure_distance
-from roughvisc.study.case import Case, read_study
-from roughvisc.topography.grid import cell_edges
-from roughvisc.topography.indenters import grown
 
 
 def pressed(shape, **settings):
@@ -68,11 +63,6 @@ def test_grid_error__of_the_gap_of_a_rough_surface_is_small():
     assert 5 * float(ds.grid_error_gap[0]) < float(ds.grid_error_approach[0])
 
 
-def test_grid_error__falls_with_the_grid():
-    coarse, fine = (float(pressed(n, fields=("pressure",)).grid_error.max()) for n in (32, 96))
-    assert coarse / fine > 3  # first order at least
-
-
 def test_grid_error__is_large_where_no_grid_sees_the_contact():
     """A ball on one cell and on four: all grids agree on the force there, and none on its shape."""
     for shape in (15, 16):
@@ -102,13 +92,6 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area[0]) / np.pi - 1)
 
 
-def test_grid_error__is_missing_unless_asked_for_and_leaves_the_rest_alone():
-    plain, asked = pressed((24, 21), grid_error=False), pressed((24, 21))
-    assert not {"grid_error", "grid_error_area"} & set(plain.variables)
-    xr.testing.assert_equal(plain.drop_vars("wall_time"), asked[list(plain.variables)].drop_vars("wall_time"))
-    assert "pressure" not in pressed((24, 21), fields=())
-
-
 def test_grid_error__is_missing_where_the_coarser_solve_fails():
     height = rv.sphere(RADIUS, SIZE, (24, 21)) * 1.0
     height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
@@ -117,64 +100,6 @@ def test_grid_error__is_missing_where_the_coarser_solve_fails():
     ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
     assert np.isnan(ds.grid_error).all()
     assert np.isnan(ds.grid_error_area).all()
-
-
-def test_grid_error__is_a_key_of_a_study_and_in_the_file(tmp_path):
-    file = tmp_path / "ball.toml"
-    file.write_text(BALL.replace("[keep]", "grid_error = true\n[keep]"))
-    case = read_study(file)
-    with rv.run(case, tmp_path / "out", progress=False) as ds:
-        assert (ds.grid_error > 0).all()
-        assert ds.grid_error.attrs["long_name"] == "grid error"
-    file.write_text(BALL)
-    assert read_study(file).key != case.key
-    assert Case.from_json(case.to_json()).key == case.key
-
-
-def test_coarser__makes_an_indenter_anew_and_keeps_missing_points():
-    ball = rv.sphere(RADIUS, SIZE, (31, 24))
-    few = coarser(ball, 2, "free")
-    assert few.shape == (17, 12)
-    assert grown(few) is not None
-    holed = rv.self_affine(SIZE, (30, 24), hurst=0.8, rms_slope=0.1, seed=2)
-    holed[:2, :2] = np.nan
-    for boundary in ("free", "periodic"):
-        found = coarser(holed, 2, boundary)
-        assert np.argwhere(np.isnan(found.values)).tolist() == [[0, 0]]
-
-
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_coarser__keeps_the_cosines_of_a_scan_or_its_waves_under_periodic_boundaries(boundary):
-    """Closed forms: one half wave along x has no step at mirror images, one whole wave none at the next period."""
-    number = {"free": 0.5, "periodic": 1.0}[boundary]
-
-    def wave(cells):
-        x = (np.arange(cells) + 0.5) / cells
-        return rv.from_array(1e-6 * np.cos(2 * np.pi * number * x)[:, None] * np.ones(cells), 1e-3 / cells)
-
-    xr.testing.assert_allclose(coarser(wave(30), 2, boundary), wave(15), rtol=1e-12, atol=1e-18)
-
-
-def test_block_means__conserve_the_force_on_any_grid():
-    field = np.random.default_rng(3).random((2, 7, 5))
-    cells = (np.linspace(0, 7, 8), np.linspace(0, 10, 6))
-    onto = (np.linspace(-1, 8, 4), np.linspace(0, 10, 4))
-    means = block_means(field, cells, onto)
-    area = np.diff(onto[0])[:, None] * np.diff(onto[1])
-    assert (means * area).sum((-2, -1)) == pytest.approx(field.sum((-2, -1)) * 1 * 2, rel=1e-12)
-    assert cell_edges(np.array([0.5, 1.5, 2.5])).tolist() == [0, 1, 2, 3]
-
-
-def test_pressure_distance__counts_what_lies_outside_the_other_grid():
-    def uniform(low, high, pressure):
-        centres = np.arange(low + 0.5, high)
-        shape = (1, len(centres), len(centres))
-        coords = {"time": [0.0], "x": centres, "y": centres}
-        return xr.Dataset({"pressure": (("time", "x", "y"), np.full(shape, pressure))}, coords=coords)
-
-    small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
-    assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]
-    assert pressure_distance(large, small).tolist() == [20.0]
 
 
 @pytest.mark.parametrize(("cells", "offset"), [(64, 0.5), (32, 0.45)])

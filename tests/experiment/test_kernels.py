@@ -1,6 +1,5 @@
 """A body other than a half-space: whatever is built for a case keeps its kernel."""
 
-import json
 import math
 from dataclasses import dataclass, replace
 
@@ -8,12 +7,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.body import HALF_SPACE, HalfSpace, Kernel
-from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.study.case import Case
-from roughvisc.study.study_file import material_of
 
 FIELDS = ("pressure", "gap", "displacement")
 #: What counts time, and what knows a closed form of the half-space.
@@ -95,47 +90,6 @@ def test_twice_the_kernel__is_half_the_modulus(path):
     assert "kernel" not in expected.attrs
 
 
-def refuse(*_):
-    raise AssertionError("the half-space was asked")
-
-
-@pytest.fixture
-def no_half_space(monkeypatch):
-    for name in ("influence", "transfer"):
-        monkeypatch.setattr(HalfSpace, name, refuse)
-
-
-def test_another_kernel__is_used_on_a_coarser_grid(no_half_space):
-    kernel, n = Screened(0.05), 256
-    x = np.arange(n) - n / 2
-    gap = (x[:, None] ** 2 + x**2) / 2000
-    body = Grid((n, n), (1.0, 1.0), kernel=kernel)
-    found = solve_contact(body, gap, load=200.0, tolerance=1e-7)
-    guessed = solve_contact(body, gap, load=200.0, tolerance=1e-7, start=np.ones((n, n)))
-    assert found.pressure == pytest.approx(guessed.pressure, abs=1e-5 * guessed.pressure.max())
-    assert body.on((9, 8)).kernel is kernel
-
-
-def case_on(kernel, monkeypatch, **settings):
-    monkeypatch.setattr(Case, "body", lambda self: rv.Body(material_of(self.tables["material"]), kernel))
-    stated = {
-        "surface": {"generate": "sphere", "radius": 1e-3, "size": 4e-4, "shape": 128},
-        "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
-        "program": [{"load": 1e-4, "over": 0.1}],
-        "solve": {"tolerance": 1e-2, **settings},
-        "keep": {"times": 2},
-    }
-    return Case.from_json(json.dumps(stated))
-
-
-def test_cases__keep_their_kernel(no_half_space, monkeypatch, tmp_path):
-    case = case_on(Screened(5e4), monkeypatch)
-    planned = rv.plan([case], tmp_path)
-    assert planned.attrs["refusal"] == ""
-    found = rv.run(case, tmp_path, progress=False)
-    assert found.attrs["kernel"] == repr(Screened(5e4))
-
-
 @pytest.mark.parametrize("path", ["free, window", "periodic, approach"])
 def test_another_kernel__gives_the_same_without_window(path):
     kernel = Screened(5e4)
@@ -146,13 +100,6 @@ def test_another_kernel__gives_the_same_without_window(path):
     for name in FIELDS:
         largest = np.nanmax(np.abs(slow[name].values))
         assert quick[name].values == pytest.approx(slow[name].values, abs=0.02 * largest, nan_ok=True), name
-
-
-def test_preconditioner__knows_the_mean():
-    body = Grid((12, 15), (1.0, 1.2), "periodic", kernel=Screened(0.3))
-    pressure = 1 + np.random.default_rng(1).random((12, 15))
-    back = body.inverse(body.displacement(pressure).astype(np.float32))
-    assert back == pytest.approx(pressure, rel=1e-5)
 
 
 def test_a_local_kernel__presses_springs():

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from layered_ball import POISSONS, RATIOS, WIDTHS, errors
+from layered_ball import POISSONS, errors
 from references import ElasticLayer, OnSheet, PunchOnSheet
 from references.growing_contact import StepLoad
 from references.indenters import Cone, Paraboloid
@@ -27,15 +27,6 @@ def pressed(height, body, program, **settings):
 @pytest.mark.parametrize("ratio", [0.01, 0.5, 100.0])
 def test_elastic_ball__agrees_with_the_integral_equation(ratio, wide, poissons):
     assert max(errors(ratio, wide, poissons, 129)) < 1e-3
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("cells", [128, 129])
-@pytest.mark.parametrize("poissons", [(0.5, 0.3), (0.3, 0.5), (0.0, 0.0), (0.5, 0.5)])
-@pytest.mark.parametrize("wide", [0.03, *WIDTHS, 30.0])
-@pytest.mark.parametrize("ratio", [0.001, *RATIOS])
-def test_elastic_ball__agrees_everywhere(ratio, wide, poissons, cells):
-    assert max(errors(ratio, wide, poissons, cells)) < 3e-3
 
 
 def test_cone_and_punch__agree_with_the_integral_equation():

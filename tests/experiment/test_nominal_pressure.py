@@ -4,27 +4,8 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.study.case import read_cases
 
 RUBBER = rv.elastic(shear_modulus=1e6)
-STUDY = """
-title = "wave"
-[surface]
-generate = "wavy"
-amplitude = "1 um"
-wavelength = "0.1 mm"
-size = ["0.2 mm", "0.1 mm"]
-shape = [24, 9]
-waves = 1
-[material]
-model = "elastic"
-shear_modulus = "1 MPa"
-[[program]]
-pressure = "20 kPa"
-over = 0
-[solve]
-boundary = "periodic"
-"""
 
 
 def test_pressure__is_the_load_over_the_whole_area():
@@ -51,20 +32,3 @@ def test_pressure__refers_to_the_surface_as_given_where_the_grid_grows():
     assert ds.sizes["x"] > 16
     assert float(ds.force[0]) == pytest.approx(0.2e6 * 1e-8)
     assert float(ds.nominal_pressure[0]) == pytest.approx(0.2e6)
-
-
-def test_grid_error__presses_coarser_grids_by_the_same_load():
-    wave = rv.wavy(1e-6, 1e-4, (1e-4, 1e-4), (25, 9), waves=1)
-    ds = [
-        rv.simulate(wave, RUBBER, program, boundary="periodic", times=[0], grid_error=True, progress=False)
-        for program in (rv.Program().pressure(3e4, over=0), rv.Program().load(3e4 * 1e-8, over=0))
-    ]
-    np.testing.assert_allclose(ds[0].grid_error, ds[1].grid_error, rtol=1e-6)
-
-
-def test_study__sweeps_over_surfaces_of_different_sizes(tmp_path):
-    study = tmp_path / "study.toml"
-    study.write_text(STUDY + '[sweep]\n"surface.size" = [["0.2 mm", "0.1 mm"], ["0.4 mm", "0.1 mm"]]')
-    results = [rv.run(case, tmp_path / "out", progress=False) for case in read_cases(study)]
-    assert [float(ds.nominal_pressure[-1]) for ds in results] == pytest.approx([2e4, 2e4])
-    assert [float(ds.force[-1]) for ds in results] == pytest.approx([2e4 * 2e-8, 2e4 * 4e-8])

@@ -112,18 +112,6 @@ def test_the_series__is_within_the_tolerance_between_its_samples(curve, shortest
     assert found.poisson == 0.4
 
 
-def test_no_compliance_at_once__has_a_series_too():
-    found, error = series(of(Stretched(glassy=0.0)), 1e-6, 10.0, 1e-4)
-    assert found.glassy == 0
-    assert error <= 1e-4
-
-
-@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
-def test_the_integral__is_found_from_the_compliance(curve):
-    t = np.array([[0.0, 1e-9, 1e-4], [0.3, 7.0, 1e6]])
-    assert of(curve).contact_integral(t) == pytest.approx(curve.contact_integral(t), rel=1e-11, abs=0)
-
-
 def test_a_creep_function__is_not_extrapolated():
     with pytest.raises(InputError, match=r"asked for at 2 s, and the table ends at 1 s"):
         pressed(rv.creep(lambda t: 1e-7 * (1 + t), longest=1.0))

@@ -13,11 +13,8 @@ from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
-from roughvisc.mechanics import grid as grids
-from roughvisc.study.case import read_cases, read_study, vary
+from roughvisc.study.case import read_cases
 from roughvisc.study.execution import cluster as side_module
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import open_result
 
 ROUGH = """
 title = "Rough"
@@ -135,15 +132,3 @@ def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatc
     assert found == [1], "beside other threads"
     with refused("threads", 0):
         threads_for(0)
-
-
-def test_bits__do_not_depend_on_the_threads(study, tmp_path, monkeypatch):
-    """With the grid counted as large: threads are in use."""
-    monkeypatch.setattr(grids, "THREADED_FROM", 1)
-    case = vary(read_study(study(ROUGH)), {"surface.shape": [72, 60], "keep.times": 3, "solve.tolerance": 1e-2})
-    found = []
-    for threads in (1, 2, 3):
-        path = run_case(case, tmp_path / str(threads), threads=threads)
-        with open_result(path) as ds:
-            found.append([ds.pressure.values.tobytes(), ds.gap.values.tobytes(), ds.approach.values.tobytes()])
-    assert found[0] == found[1] == found[2]

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from references.growing_contact import lee_radok_step
-from scipy import fft
 
 import roughvisc as rv
-from roughvisc import closed_forms
 from roughvisc.experiment import profile as domain
 from roughvisc.experiment.kept_times import kept_times
-from roughvisc.mechanics import grid as grids
 from roughvisc.variables import FIELDS, VARIABLES
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
@@ -51,11 +48,6 @@ def test_result__is_a_contact_state():
     assert ds.mean_gap.values == pytest.approx(ds.gap.mean(("x", "y")).values)
 
 
-def test_fields__not_asked_for_are_not_there():
-    ds = simulate(fields=())
-    assert not set(FIELDS) & set(ds.variables)
-
-
 @pytest.mark.parametrize(
     ("material", "duration"),
     [pytest.param(rv.maxwell(1e6, 1e6), 2.0, marks=pytest.mark.thorough), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
@@ -80,27 +72,6 @@ def test_seed_papers_validations__at_the_default_tolerance(material, duration):
     assert float(ds.time_error.max()) < 1e-3
     radii = np.sqrt(ds.contact_area.values / np.pi)
     assert radii == pytest.approx(exact.radius(times), rel=5e-3)
-
-
-def test_flat_punch__is_absent_outside_and_displaces_evenly():
-    radius, load = 1e-4, 1e-2
-    ds = simulate(rv.flat_punch(radius, size=3e-4, shape=(63, 64)), rv.elastic(1e6), rv.Program().load(load, over=0))
-    exact = closed_forms.flat_punch(radius, 4e6, load)
-    assert float(ds.approach[0]) == pytest.approx(exact.approach, rel=2e-2)
-    assert np.isnan(ds.gap.values[0, 0, 0])
-    assert ds.pressure.values[0, 0, 0] == 0
-
-
-def test_westergaard__wavy_surface_under_periodic_boundaries():
-    amplitude, wavelength, modulus = 1e-7, 1e-4, 4e6
-    surface = rv.wavy(amplitude, wavelength, size=(wavelength, 2e-6), shape=(257, 3), waves=1)
-    mean = 0.3 * np.pi * modulus * amplitude / wavelength
-    area = wavelength * 2e-6
-    ds = simulate(surface, rv.elastic(1e6), rv.Program().load(mean * area, over=0), boundary="periodic", tolerance=1e-6)
-    exact = closed_forms.westergaard(amplitude, wavelength, modulus, mean)
-    assert float(ds.contact_fraction[0]) == pytest.approx(exact.contact_fraction, abs=1.5 / 257)
-    expected = exact.pressure(ds.x.values)  # a crest is at x = 0
-    assert np.abs(ds.pressure.values[0, :, 1] - expected).sum() < 5e-3 * expected.sum()
 
 
 @pytest.mark.thorough
@@ -132,14 +103,6 @@ def test_recipe_that_no_longer_holds__does_not_grow():
     assert "recipe" in scaled.attrs
     with pytest.raises(rv.EdgeContactError):
         simulate(scaled, program=rv.Program().load(0.1, over=0), boundary="free")
-
-
-def test_work__is_that_of_the_force_on_the_approach():
-    """Hertz: two fifths of force times approach, for an elastic ramp."""
-    program = rv.Program().load(2e-3, over=1.0)
-    ds = simulate(BALL, rv.elastic(1e6), program, times=81, tolerance=1e-6)
-    assert float(ds.work[-1]) == pytest.approx(0.4 * float(ds.force[-1] * ds.approach[-1]), rel=1e-2)
-    assert (np.diff(ds.work) >= 0).all()
 
 
 def test_zero_load__is_open():
@@ -260,19 +223,6 @@ def test_part_of_the_surface__changes_nothing_but_cost(name, solved_on, monkeypa
 def test_contact_at_the_border_of_a_scan__is_refused():
     with pytest.raises(rv.EdgeContactError, match="151 x 133"):
         simulate(two_hills(), ZENER, rv.Program().load(3.0, over=0.5), boundary="free")
-
-
-def test_threads__change_no_bit(monkeypatch):
-    """Nor does the next run."""
-    monkeypatch.setattr(grids, "THREADED_FROM", 0)
-    rough = rv.self_affine((1e-4, 1.1e-4), (41, 45), hurst=0.8, rms_slope=0.1, shortcut=8e-6, seed=3)
-    found = []
-    for threads in (1, 2, 2):
-        with fft.set_workers(threads):
-            found.append(simulate(rough, program=rv.Program().load(1e-3, over=0.1), boundary="periodic", fields=FIELDS))
-    for ds in found[1:]:
-        for name in (*FIELDS, "approach", "work", "convolutions"):
-            assert ds[name].values.tobytes() == found[0][name].values.tobytes(), name
 
 
 def test_load_beyond_all_numbers__is_refused_before_anything_is_solved(solved_on):

@@ -2,12 +2,8 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.experiment.kept_times import spread_times
 
 RADIUS, LOAD = 1e-3, 1e-4
@@ -51,19 +47,6 @@ def test_histories__follow_the_closed_form(result):
         assert abs(approach - exact) < (1e-3 + 0.1 * (CELL**2 / (RADIUS * exact))) * exact
 
 
-def test_histories__where_every_step_is_kept_are_the_result():
-    ds = rv.simulate(BALL, RUBBER, PROGRAM, tolerance=1e-2, progress=False)
-    xr.testing.assert_equal(rv.observables.history(ds).force, ds.force)
-
-
-def test_histories__of_many_cases_ask_for_one():
-    both = xr.concat([rv.simulate(BALL, RUBBER, PROGRAM, times=1, tolerance=1e-2, progress=False)] * 2, "case")
-    with pytest.raises(InputError, match="choose one case first"):
-        rv.observables.history(both)
-    steps = rv.observables.history(both.isel(case=0))
-    assert steps.sizes["time"] > 1
-
-
 def test_force_of_a_whole_step__is_no_history():
     # no compliance at once: under given approach the force of an implicit step is not that at its end
     soft = rv.kelvin_voigt(1e6, 1e6)
@@ -71,35 +54,6 @@ def test_force_of_a_whole_step__is_no_history():
     ds = rv.simulate(BALL, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
     kept = set(ds.time.values)
     assert set(rv.observables.history(ds).time.values) - {0.0} <= kept
-
-
-@st.composite
-def programs(draw):
-    chain = rv.Program()
-    for _ in range(draw(st.integers(1, 6))):
-        duration = draw(st.floats(1e-3, 1e3))
-        kind = draw(st.sampled_from(["ramp", "hold", "jump", "cycle"]))
-        if kind == "ramp":
-            chain = chain.load(draw(st.floats(0.1, 1.0)), over=duration)
-        elif kind == "jump":
-            chain = chain.load(draw(st.floats(0.1, 1.0)), over=0)
-        elif kind == "hold" or not chain.segments or chain.segments[-1].end is None:
-            chain = chain.hold(duration)
-        else:
-            chain += rv.Program.cycle(chain.segments[-1].end, 0.05, duration, draw(st.integers(1, 5)))
-    return chain
-
-
-@given(programs(), st.integers(1, 300))
-def test_spread_times__are_as_many_as_asked_and_hold_the_corners(program, count):
-    times, corners = spread_times(program, count), np.unique(program.corners)
-    assert np.all(np.diff(times) > 0)
-    assert times[-1] == program.duration
-    assert times[0] >= 0
-    if count >= len(corners):
-        assert set(corners) <= set(times)
-    if program.duration > 0:
-        assert len(times) == count
 
 
 def test_spread_times__of_a_hold_lie_evenly_in_the_logarithm():

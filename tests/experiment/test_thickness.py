@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from references import OnSheet, PunchOnSheet, ting
 from references.growing_contact import StepLoad
-from references.indenters import Cone, Paraboloid
+from references.indenters import Paraboloid
 from scipy.interpolate import CubicSpline
 from support import refused
 
@@ -48,13 +48,6 @@ def test_creeping_sphere__agrees_with_the_integral_equation(poisson, base):
     ds = pressed(ball, rubber, rv.Program().load(2e-3, over=0).hold(2.0), base=base, times=times, fields=())
     np.testing.assert_allclose(ds.approach, exact.approach(times), rtol=1e-3)
     np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=2e-3)
-
-
-def test_cone__agrees_with_the_integral_equation():
-    exact, a = OnSheet(Cone(0.1), Sheet(THICKNESS)), 1.5 * THICKNESS
-    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
-    ds = pressed(rv.cone(0.1, 2.6 * a, 65), rv.elastic(1e6), load)
-    assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
 
 
 def orders(exact, thickness, cells=(33, 65, 129)):
@@ -121,17 +114,6 @@ def test_thick_sheet__tends_to_the_half_space(boundary):
     assert "thickness" not in endless.attrs
 
 
-def test_grid_that_grows__gives_the_same_contact():
-    """By a memory of pressures, which survives a change of grid, and by one of displacements."""
-    rubber, load = rv.zener(1e6, 3e5, 1e5), rv.Program().load(2e-3, over=0.1).hold(1.0).load(1e-3, over=0.1)
-    ball, small = rv.sphere(RADIUS, 3.4e-4, (51, 51)), rv.sphere(RADIUS, 1.4e-4, (21, 21))
-    one = pressed(ball, rubber, load, times=[0.1, 1.1, 1.2])
-    grown = pressed(small, rubber, load, times=[0.1, 1.1, 1.2])
-    assert grown.sizes["x"] > 21
-    np.testing.assert_allclose(grown.approach, one.approach, rtol=2e-3)
-    np.testing.assert_allclose(grown.force, one.force, rtol=2e-3)
-
-
 @pytest.mark.thorough
 def test_unloading__is_that_of_ting_on_a_sheet():
     """His solution asks of the body only that space and time separate; tables stand for the integral equation."""
@@ -146,14 +128,6 @@ def test_unloading__is_that_of_ting_on_a_sheet():
     ds = pressed(rv.sphere(RADIUS, 3.2e-4, 25), rubber, program, times=times, tolerance=5e-3)
     expected = ting(table, rubber, program).approach(times)
     np.testing.assert_allclose(ds.approach, expected, atol=5e-3 * expected.max())
-
-
-def test_grid_error__knows_the_base():
-    exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), THICKNESS
-    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
-    ds = pressed(rv.sphere(RADIUS, 2.6 * a, 32), rv.elastic(1e6), load, grid_error=True)
-    true = abs(float(ds.approach[0]) / float(exact.reduced(a)) - 1)
-    assert true < float(ds.grid_error[0]) < 0.1
 
 
 # --------------------------------------------------------------------------------------------------------------
@@ -198,18 +172,6 @@ def test_study__presses_the_sheet_that_it_states(case, tmp_path):
     same = pressed(case.height(), case.material, case.program, base="slipping", times=[0, 0.5])
     np.testing.assert_array_equal(ds.pressure, same.pressure)
     assert Case.from_json(ds.attrs["case"]).body == case.body
-
-
-def test_sweep__over_thickness_up_to_a_half_space(tmp_path):
-    path = tmp_path / "sweep.toml"
-    path.write_text(STUDY + '[sweep]\n"material.thickness" = ["50 um", "0.2 mm", inf]\n')
-    results = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
-    assert results["material_thickness"].values.tolist() == [5e-5, 2e-4, math.inf]
-    approach = results.approach.isel(time=-1).values.tolist()
-    assert approach == sorted(approach), "the thicker the softer"
-    assert len(set(approach)) == 3
-    again = rv.sweep(read_cases(path), out=tmp_path / "out", workers=0, progress=False)
-    assert again.approach.identical(results.approach)
 
 
 def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path):
