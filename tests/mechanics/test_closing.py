@@ -125,12 +125,6 @@ def test_load_that_is_zero_for_an_instant__is_no_gap_in_the_contact():
     assert at[2.001] == pytest.approx(1e-5)
 
 
-def test_no_load_throughout__stays_apart():
-    program = rv.Program().load(0.01, over=0).hold(1.0).load(0.0, over=0).hold(5.0).load(0.01, over=1.0)
-    steps = list(march(sphere(program, times=(6.0, 7.0))))
-    assert [s.point.force for s in steps if 1 <= s.point.time <= 6] == [0.0, 0.0]
-
-
 @pytest.mark.parametrize("lead", [0.0, 0.4])
 def test_contact_at_the_very_first_instant__is_not_put_off(lead):
     """From rest at first touch, or on the dot of an event: whatever goes in touches at once."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from strategies import examples, seeds, shapes
-from support import direct, refused
+from support import direct
 
 import roughvisc as rv
 from roughvisc.mechanics import grid as grids
@@ -82,15 +82,6 @@ def test_convolutions__are_symmetric_and_positive(shape, boundary, seed):
         assert np.sum(applied(a) * a) >= -precision * scale
 
 
-@BOUNDARIES
-def test_inverse__inverts_what_is_far_from_the_border(boundary):
-    x, y = np.indices((45, 64))
-    pressure = np.cos(2 * np.pi * 9 * x / 45) * np.exp(-(((x - 22) / 6.0) ** 2) - ((y - 32) / 6.0) ** 2)
-    grid = Grid((45, 64), (1.0, 1.0), boundary)
-    back = grid.inverse(grid.displacement(pressure))
-    assert np.linalg.norm(back - pressure) < (0.35 if boundary == "free" else 0.05) * np.linalg.norm(pressure)
-
-
 @pytest.fixture
 def in_small_blocks(monkeypatch):
     """Blocks and threads as on a large grid."""
@@ -117,11 +108,6 @@ def test_fields__do_not_depend_on_blocks_and_threads(boundary, kind, request):
             np.testing.assert_allclose(field, other, rtol=0, atol=precision * np.abs(field).max())
 
 
-def test_boundary__is_named_when_unknown():
-    with refused("boundary", "open"):
-        Grid((4, 4), (1.0, 1.0), "open")
-
-
 # ------------------------------------------------------------------------------------------- numbers of a grid
 
 
@@ -131,37 +117,6 @@ def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
     a, b = 1.3, 0.7
     expected = 2 / np.pi * (a * np.arcsinh(b / a) + b * np.arcsinh(a / b))
     assert Grid(shape, (a, b)).self_influence == pytest.approx(expected, rel=1e-12)
-
-
-@BOUNDARIES
-@pytest.mark.parametrize("shape", [(7, 6), (8, 5), (1, 4), (1, 1)])
-def test_self_influence__is_the_mean_displacement_of_a_cell_that_is_loaded_alone(boundary, shape):
-    grid = Grid(shape, (1.3, 0.7), boundary)
-    alone = np.eye(grid.size).reshape(-1, *shape)
-    expected = np.mean([np.sum(one * grid.displacement(one)) for one in alone])
-    assert grid.self_influence == pytest.approx(expected, rel=1e-12)
-
-
-@BOUNDARIES
-@pytest.mark.parametrize("shape", [(9, 14), (12, 7), (8, 10)])
-def test_multiply__by_the_symbol_is_the_convolution(shape, boundary):
-    grid = Grid(shape, (1.0, 2.0), boundary)
-    pressure = np.random.default_rng(4).random(shape)
-    displacement = grid.displacement(pressure)
-    response = grid.spectrum(pressure)
-    grid.multiply(response, grid.symbol_of(grid.kernel))
-    np.testing.assert_allclose(grid.field_of(response), displacement, rtol=0, atol=1e-13 * displacement.max())
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_turn__moves_a_periodic_field(axis):
-    grid, field = Grid((9, 8), (1.0, 1.0), "periodic"), np.random.default_rng(2).standard_normal((9, 8))
-    if axis == 1:
-        field -= (field * (-1.0) ** np.arange(8)).mean(axis=1, keepdims=True) * (-1.0) ** np.arange(8)
-    moved = grid.field_of(grid.spectrum(field) * grid.turn(3, axis))
-    np.testing.assert_allclose(moved, np.roll(field, -3, axis), atol=1e-14)
-    with pytest.raises(ValueError, match="periodic"):
-        Grid((9, 8), (1.0, 1.0), "mirror").turn(3, axis)
 
 
 # --------------------------------------------------------------------------------------------------- SciPy and ducc0

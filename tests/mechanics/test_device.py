@@ -10,7 +10,7 @@ import support
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.contact import solve_contact, solver
-from roughvisc.mechanics.grid import Grid, namespace
+from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import Layers, layer_series
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
@@ -209,18 +209,7 @@ def test_steady_sliding__is_the_same_on_a_device(xp, load):
     assert of_device.force(other.pressure, axis=1) == pytest.approx(of_host.force(found.pressure, axis=1), rel=1e-9)
 
 
-def test_steady_sliding_of_a_flat_surface__is_the_same_on_a_device(xp):
-    sliding = Sliding(Body(ZENER, HALF_SPACE), SHAPE, SPACING, 3.0, xp)
-    found = steady_state(sliding, xp.zeros(SHAPE), 2.0)
-    np.testing.assert_allclose(found.pressure.get(), 2.0 / sliding.cell_area / 414, rtol=1e-12)
-
-
 # ------------------------------------------------------------------------------------------------------- the stand-in
-
-
-def test_namespace__is_that_of_the_array(xp):
-    assert namespace(np.zeros(2)) is np
-    assert namespace(xp.zeros(2)) is xp
 
 
 @pytest.mark.parametrize(
@@ -251,17 +240,6 @@ def test_stand_in__refuses_plain_arrays_and_what_cupy_lacks(xp, mix):
     here = np.ones(3)
     with pytest.raises(TypeError):
         mix(xp, here, xp.asarray(here))
-
-
-def test_stand_in__becomes_a_number_if_it_is_one(xp):
-    several = xp.asarray([1.0, 2.0])
-    assert float(several.sum()) == 3.0
-    assert bool(several.any())
-    for kind in (float, int, bool):
-        with pytest.raises(ValueError, match="size 1"):
-            kind(several)
-    several.get()[:] = 0
-    assert float(several.max()) == 2.0, "a copy"
 
 
 @pytest.mark.parametrize("field", ["gap", "present", "history"])

@@ -92,14 +92,6 @@ def test_kernel__far_away_is_the_half_space_below():
     assert found == pytest.approx(0.7 / 0.5 * 0.02 * love_kernel((401, 1), (1.0, 1.0))[-1, 0], rel=1e-3)
 
 
-def test_kernel__of_equal_layers_is_equal():
-    one, same = (rv.layer(rv.elastic(2e6, poisson=0.3), "0.1 mm", on=rv.elastic(1e8)) for _ in range(2))
-    assert one == same
-    assert hash(one.kernel) == hash(same.kernel)
-    assert one.kernel != rv.layer(rv.elastic(2e6, poisson=0.3), "0.2 mm", on=rv.elastic(1e8)).kernel
-    assert one.separates
-
-
 def test_layer__lies_on_another_one():
     soft, hard, base = rv.elastic(1e6), rv.elastic(1e8), rv.elastic(1e7)
     both = rv.layer(soft, 1e-4, on=rv.layer(hard, 2e-4, on=base))
@@ -160,12 +152,3 @@ def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, tu
 def test_layer__refuses(wrong, expected):
     with pytest.raises(InputError, match=expected):
         wrong()
-
-
-def test_body__a_layer_far_thicker_than_the_surface_is_its_half_space_in_sliding():
-    rubber, height = rv.zener(3e6, 1e6, 1e5), rv.wavy(amplitude=1e-6, wavelength=1e-3, size=1e-3, shape=(33, 31))
-    thick = rv.layer(rubber, 1e-2, on=rv.elastic(1e3))
-    found, half_space = (
-        rv.friction(height, body, pressure=2e3, speeds=[0.01], tolerance=1e-5) for body in (thick, rv.Body(rubber))
-    )
-    np.testing.assert_allclose(found["friction_coefficient"], half_space["friction_coefficient"], rtol=1e-4)

@@ -87,15 +87,6 @@ def test_error__relaxes_faster_than_it_creeps():
     assert all(after < before for before, after in pairwise(left))
 
 
-def test_both_fields__are_the_same_recursion():
-    both, alone = Memory(SERIES["fluid"], 10.0, keeps_pressure=True), Memory(SERIES["fluid"], 10.0)
-    steps = [0.1, 0.4, 0.02]
-    found = both.displacement(history_after(both, steps, np.sin, "linear"))
-    expected = alone.displacement(history_after(alone, steps, np.sin, "linear"))
-    assert found.shape == (2, *SHAPE)
-    np.testing.assert_array_equal(found, np.concatenate([expected, expected]))
-
-
 def test_roll__moves_all_that_is_remembered():
     memory = Memory(SERIES["prony"], 10.0)
     history = history_after(memory, [0.1, 0.1], np.sin, "linear")

@@ -28,16 +28,6 @@ def test_series__is_its_own_memory(material, note):
     assert (choice.series_error, choice.note) == (0.0, note)
 
 
-@pytest.mark.parametrize("exponent", [0.2, 0.5, 0.8])
-def test_power_law__has_a_certified_series(exponent):
-    material = rv.power_law(0.1, 1.0, exponent)
-    choice = choose_memory(material, 10.0, 1e-3)
-    assert choice.series_error <= SERIES_SHARE * 1e-3
-    t = np.geomspace(1e-5, 10.0, 777)
-    off = choice.memory.series.contact_compliance(t) / material.contact_compliance(t) - 1
-    assert np.abs(off).max() <= 1.02 * choice.series_error
-
-
 @pytest.mark.parametrize("exponent", [0.1, 0.5])
 @pytest.mark.parametrize("glassy", [0.0, 0.01, 0.3])
 def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glassy):
@@ -74,29 +64,6 @@ def test_table_shorter_than_the_program__is_refused():
     material = rv.creep_table(tuple(ROWS), tuple(0.5 + ROWS**0.4))
     with pytest.raises(rv.InputError, match="the table ends at 10 s"):
         choose_memory(material, 11.0, 1e-3)
-
-
-@pytest.mark.parametrize(
-    "material",
-    [
-        rv.power_law(0.1, 1.0, 0.3, poisson=0.2),
-        rv.creep_table((0.0, 1.0, 2.0), (0.3, 1.0, 2.0)),
-        rv.pair(rv.power_law(0.1, 1.0, 0.3, poisson=0.3), rv.zener(1.0, 1.0, 1.0)),
-    ],
-    ids=lambda material: type(material).__name__,
-)
-def test_jumps_alone__ask_for_the_instantaneous_compliance_only(material):
-    choice = choose_memory(material, 0.0, 1e-3)
-    assert choice.series_error == 0
-    assert choice.note == "instantaneous compliance"
-    exact = float(material.contact_compliance(0.0))
-    assert choice.material.contact_compliance([0.0, 1.0]) == pytest.approx(exact, rel=1e-15)
-
-
-def test_jumps_alone__of_a_material_without_instantaneous_compliance_find_none():
-    choice = choose_memory(rv.power_law(0.0, 1.0, 0.3), 0.0, 1e-3)
-    assert choice.note == "no instantaneous compliance"
-    assert choice.material.contact_compliance(0.0) == 0
 
 
 def test_table_far_from_any_passive_material__is_warned_of():

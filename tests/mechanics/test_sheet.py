@@ -9,7 +9,6 @@ from references import OnSheet
 from references.indenters import Paraboloid
 from support import refused
 
-from roughvisc.errors import InputError
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
@@ -136,12 +135,6 @@ def test_ball_on_an_incompressible_sheet__agrees_with_the_integral_equation_on_l
         assert found.approach == pytest.approx(same.approach, rel=3e-3)
 
 
-def test_check_cells__refuses_more_than_fifty_thicknesses():
-    Sheet(1e-6).check_cells((5e-5, 2e-5))
-    with pytest.raises(InputError, match=r"thickness is 1e-06 m and a cell is 5.1e-05 m long, 51 times .* at most 50"):
-        Sheet(1e-6).check_cells((2e-5, 5.1e-5))
-
-
 @pytest.mark.parametrize(("base", "coefficient"), [("bonded", 1.7702), ("slipping", 1.16758)])
 def test_influence__near_the_load_on_a_thick_sheet_is_the_half_space_less_a_constant(base, coefficient):
     """At a Poisson's ratio of a half; first order in distance over thickness."""
@@ -159,16 +152,6 @@ def test_symbols__are_positive(base, poisson, side):
     assert free.min() >= -1e-12 * free.max()
     symbol = periodic_symbol(sheet, (31, 24), (side, 0.9 * side))
     assert (symbol.ravel()[1:] > 0).all()
-
-
-def test_influence__of_any_thickness_and_length_unit_is_the_same():
-    metres, microns = Sheet(3e-4, 0.4).influence((9, 7), (1e-4, 2e-4)), Sheet(300.0, 0.4).influence((9, 7), (100, 200))
-    np.testing.assert_allclose(metres * 1e6, microns, rtol=1e-12, atol=1e-12 * microns.max())
-
-
-def test_influence__of_a_slipping_sheet_does_not_depend_on_poisson():
-    one, other = (Sheet(1.0, nu, "slipping").influence((5, 4), (0.3, 0.2)) for nu in (0.1, 0.5))
-    np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(

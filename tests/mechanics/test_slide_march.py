@@ -206,11 +206,6 @@ def test_held_approach__keeps_it_and_finds_the_force():
     assert steps[-1].point.force > 1.05 * before.point.force, "the body has no time to give way"
 
 
-def test_elastic_body__has_no_friction():
-    found, steps = settled(rough((24, 20)), rv.elastic(1e6), 0.1, 2e-3, periods=0.5)
-    assert abs(force(found, steps[-1])) < 1e-12 * 2e-3
-
-
 def test_slow_slide__is_not_frozen_by_the_tolerance():
     """At a speed at which a cell changes the pressure by less than the tolerance."""
     forces = []
@@ -233,16 +228,6 @@ def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():
         np.testing.assert_array_equal(again[-1].point.history.modes, whole[-1].point.history.modes)
         assert again[-1].state.distance == whole[-1].state.distance
         assert again[-1].difference == whole[-1].difference
-
-
-def test_two_strokes_in_a_row__are_one():
-    material, height = rubber(), rough((20, 20))
-    one, two = (rv.Program().load(2e-3, over=0) for _ in range(2))
-    one, two = one.slide(0.5e-3, speed=0.1), two.slide(0.2e-3, speed=0.1).slide(0.3e-3, speed=0.1)
-    found = [scene(height, material, program, tolerance=1e-7) for program in (one, two)]
-    last = [list(march(one))[-1] for one in found]
-    np.testing.assert_allclose(last[1].point.pressure, last[0].point.pressure, atol=1e-5 * last[0].point.pressure.max())
-    assert last[1].state.distance == pytest.approx(0.5e-3, rel=1e-12)
 
 
 def test_slide__is_of_whole_cells():

@@ -139,25 +139,6 @@ def test_every_step_that_is_a_row__keeps_the_tolerance(what, surface):
     assert true_errors(scene, later, exact).max() <= TOLERANCE
 
 
-def test_going_on_from_any_state__states_the_same():
-    program = rv.Program().load(0.03, over=0.5).load(0.01, over=0).hold(0.5).hold(0.4, control="approach")
-    scene = sphere(MATERIALS["two_branches"], program, times=(0.2, 0.8, 1.3), tolerance=3e-2)
-    whole = list(march(scene))
-    assert len(whole) > 8
-    for cut, step in enumerate(whole):
-        if not step.is_end:
-            continue
-        resumed = list(march(scene, step.state))
-        assert len(resumed) == len(whole) - cut - 1
-        for one, other in zip(resumed, whole[cut + 1 :], strict=True):
-            assert np.array_equal(one.point.pressure, other.point.pressure)
-            assert (one.difference, one.state.work, one.point.approach) == (
-                other.difference,
-                other.state.work,
-                other.point.approach,
-            )
-
-
 def test_row_right_after_a_corner__is_judged():
     """The program of docs/howto/programs.md: pulled back from a hold, and asked a fifth of the way."""
     times = (0.1, 0.3, 0.5, 0.6)

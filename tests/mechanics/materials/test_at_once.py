@@ -43,14 +43,6 @@ def test_table__jumps_by_what_is_there_at_once(first):
     assert found == pytest.approx(2.0 * table.contact_compliance(times), rel=5e-3, abs=0)
 
 
-def test_table_with_little_at_once__can_jump():
-    """13 % of the compliance at once is an instantaneous compliance, however fast the rest comes."""
-    t = np.append(0.0, ROWS)
-    table = rv.creep_table(t, 0.13 - 0.87 * np.expm1(-((t / 1e-5) ** 0.5)))
-    _, ds = sunk(table, rv.Program().approach(1.0, over=0).hold(1.0), [0.0, 1.0])
-    assert ds.force.values[0] > 3 * ds.force.values[1] > 0
-
-
 @pytest.mark.parametrize("material", [rv.power_law(0.3, 1.0, 0.1), rv.power_law(0.0, 1.0, 0.5)], ids=str)
 def test_short_ramp_before_a_long_hold__is_resolved(material):
     """A ramp of 1 ms before a hold of 10 000 s: seven decades, both ends to be right."""
@@ -62,28 +54,6 @@ def test_short_ramp_before_a_long_hold__is_resolved(material):
     scale = references.punch_approach(1.0, rv.elastic(0.25), rv.Program().load(1.0, over=0), [0.0])
     assert found == pytest.approx(exact / scale, rel=1e-3, abs=0)
     assert ds.attrs["series_error"] <= 1e-4
-
-
-def test_sphere__follows_lee_and_radok_from_the_jump_on():
-    material, times = rv.power_law(0.3e-6, 1e-6, 0.1), [0.0, 1e-2, 10.0]
-    ball, settings = rv.sphere(1e-3, 2e-4, 65), {"fields": (), "progress": False}
-    elastic = rv.elastic(1e6)
-    press = rv.Program().load(5e-4, over=0)
-    at_once = rv.closed_forms.lee_radok(1e-3, elastic, 5e-4).approach(0.0)
-    grid = rv.simulate(ball, elastic, press, **settings).approach[-1] / at_once
-    ds = rv.simulate(ball, material, press.hold(10.0), times=times, **settings)
-    exact = rv.closed_forms.lee_radok(1e-3, material, 5e-4).approach(np.array(times)) * float(grid)
-    assert ds.approach.values == pytest.approx(exact, rel=1e-3, abs=0)
-
-
-def test_wide_table__takes_few_steps():
-    """60 rows from 1e-9 of the program on: with kinks between them they are not passive to a tenth of the tolerance."""
-    t = np.geomspace(1e-9, 1.0, 60)
-    table = rv.creep_table(t, 1e-6 * creep(t))
-    ball, program = rv.sphere(1e-3, 2e-4, 33), rv.Program().load(1e-4, over=0.1).hold(0.9)
-    ds = rv.simulate(ball, table, program, times=[0.1, 1.0], tolerance=1e-4, fields=(), progress=False)
-    assert ds.attrs["series_error"] <= 1e-5
-    assert int(ds.roughvisc.steps.sizes["step"]) < 600
 
 
 def test_noisy_table__dissipates():

@@ -68,13 +68,6 @@ def test_creep_table__is_the_same_material_whatever_the_tolerance():
         assert off(found[tolerance], found[1e-12].creep_compliance) <= tolerance
 
 
-def test_creep_table__has_about_the_least_largest_deviation():
-    """A jump from 1 to 3 between neighbouring rows: no ascending curve without it is nearer than half way, 50 %."""
-    times = np.array([0.0, 1.0, 1.0 + 1e-9, 1.0 + 2e-9])
-    material = rv.creep_table(times, (0.0, 1.0, 3.0, 3.0))
-    assert 0.5 <= material.misfit < 1.2
-
-
 #: creep -> its compliance at time zero
 BEGINNINGS = {
     "power": (lambda t: 2 + t**0.5, 2.0),
@@ -164,21 +157,6 @@ def test_noisy_table__ascends_within_the_noise(noise, exponent):
     assert (np.diff(sampled) >= -1e-15 * sampled[1:]).all()
 
 
-def test_creep_table__is_a_plain_value():
-    a, b = rv.creep_table([0, 1], [1, 2]), rv.creep_table(np.array([0.0, 1.0]), (1, 2))
-    assert a == b
-    assert hash(a) == hash(b)
-    assert a != rv.creep_table((0, 1), (1, 3))
-
-
-def test_creep_table__in_tension():
-    t, shear = (0.0, 1.0, 2.0), (1.0, 2.0, 3.0)
-    tensile = rv.creep_table(t, np.array(shear) / (2 * 1.3), kind="tensile", poisson=0.3)
-    exact = rv.creep_table(t, shear, poisson=0.3)
-    assert tensile.creep_compliance(t) == pytest.approx(exact.creep_compliance(t), rel=1e-6)
-    assert tensile.poisson == 0.3
-
-
 # --- relaxation and dynamic moduli ----------------------------------------------------------------------------------
 
 EQUILIBRIUM, MODULI, TIMES = 1e5, np.array([3e6, 2e6, 5e5]), np.array([2e-3, 0.07, 4.0])
@@ -228,41 +206,6 @@ def test_noisy_moduli__leave_the_creep_at_early_times(seed):
     assert distance(rv.dynamic_table(omega, *moduli, frequency_unit="rad/s", poisson=0.4)) < 0.03
 
 
-@pytest.mark.parametrize(("rows", "most"), [(12, 2e-3), (24, 1e-3)])
-def test_dynamic_table__of_few_rows_finds_few_terms(rows, most):
-    omega = np.geomspace(1e-2, 1e4, rows)
-    material = rv.dynamic_table(omega, *dynamic(omega), frequency_unit="rad/s", poisson=0.4)
-    assert distance(material) < most
-    assert len(material.times) <= 7
-
-
-def test_relaxation_table__in_tension():
-    t = np.geomspace(1e-4, 100.0, 60)
-    shear = rv.relaxation_table(t, relaxation(t), poisson=0.3)
-    tensile = rv.relaxation_table(t, 2.6 * relaxation(t), kind="tensile", poisson=0.3)
-    assert tensile.contact_compliance(SPAN) == pytest.approx(shear.contact_compliance(SPAN), rel=1e-6, abs=0)
-
-
-def test_relaxation_table__of_one_exponential_needs_few_terms():
-    t = np.geomspace(1e-3, 1e3, 50)
-    generator = np.random.default_rng(5)
-    noisy = (1 + np.exp(-t / 0.37)) * (1 + 0.01 * generator.standard_normal(50))
-    material = rv.relaxation_table(t, noisy)
-    assert len(material.times) <= 3
-    exact = rv.from_relaxation(1.0, (1.0,), (0.37,))
-    assert material.creep_compliance(t) == pytest.approx(exact.creep_compliance(t), rel=0.03, abs=0)
-
-
-@pytest.mark.parametrize(("noise", "most"), [(0.0, 24), (0.01, 18), (0.03, 18)])
-def test_relaxation_table__spends_few_terms(noise, most):
-    """A wide spectrum over 8 decades: some two terms a decade, each of them a field to remember."""
-    t = np.geomspace(1e-4, 1e4, 100)
-    exact = 1e5 + 1e6 * t**-0.3
-    material = rv.relaxation_table(t, exact * (1 + noise * np.random.default_rng(1).standard_normal(100)))
-    assert len(material.times) <= most
-    assert modulus(material, t) == pytest.approx(exact, rel=max(2 * noise, 1e-3))
-
-
 WIDE = {
     "power": lambda t: 1e5 + 1e6 * t**-0.3,
     "stretched": lambda t: 1e5 + 2e6 * np.exp(-((t / 0.1) ** 0.4)),
@@ -279,17 +222,6 @@ def test_relaxation_table__follows_a_wide_spectrum_between_few_rows(name, rows, 
     assert np.abs(modulus(material, between) / WIDE[name](between) - 1).max() <= most
 
 
-def test_relaxation_table__says_where_rows_are_missing():
-    t = np.array([1e-3, 1e-2, 1.0, 10.0])
-    assert "no row between 10 ms and 1 s, more than a decade" in rv.relaxation_table(t, relaxation(t)).note
-
-
-def test_relaxation_table__of_an_elastic_material_is_elastic():
-    material = rv.relaxation_table([0.0, 1.0, 2.0], [2.0, 2.0, 2.0])
-    assert material.times == ()
-    assert material.glassy == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize(("unit", "factor"), [("rad/s", 1.0), ("Hz", 2 * np.pi)])
 def test_dynamic_table__finds_the_creep(unit, factor):
     omega = np.geomspace(1e-2, 1e4, 60)
@@ -298,6 +230,22 @@ def test_dynamic_table__finds_the_creep(unit, factor):
     assert stated_misfit(material) < 0.02
     assert material.note.startswith(f"{len(material.times) + 1} terms fitted to 60 rows")
     assert material.note.endswith("frequencies 0.01 to 10000 rad/s")
+
+
+def test_tables__in_tension_are_those_in_shear():
+    """Young's modulus is ``2 (1 + poisson)`` times the shear modulus."""
+    t, omega = np.geomspace(1e-3, 10.0, 40), np.geomspace(1e-2, 1e4, 60)
+    tension, unit = {"kind": "tensile", "poisson": 0.3}, {"frequency_unit": "rad/s"}
+    creep, moduli, (storage, loss) = EXACT.creep_compliance(t), relaxation(t), dynamic(omega)
+    for shear, tensile in (
+        (rv.creep_table(t, creep, poisson=0.3), rv.creep_table(t, creep / 2.6, **tension)),
+        (rv.relaxation_table(t, moduli, poisson=0.3), rv.relaxation_table(t, 2.6 * moduli, **tension)),
+        (
+            rv.dynamic_table(omega, storage, loss, poisson=0.3, **unit),
+            rv.dynamic_table(omega, 2.6 * storage, 2.6 * loss, **unit, **tension),
+        ),
+    ):
+        assert tensile.contact_compliance(t) == pytest.approx(shear.contact_compliance(t), rel=1e-6, abs=0)
 
 
 def test_dynamic_table__shift_factors_make_a_master_curve():
@@ -312,21 +260,6 @@ def test_dynamic_table__shift_factors_make_a_master_curve():
     assert material.note.endswith("frequencies 0.01 to 10000 rad/s")
     same = rv.dynamic_table(window, *dynamic(window * 10), frequency_unit="rad/s", shift_factors=10.0, poisson=0.4)
     assert same == rv.dynamic_table(window * 10, *dynamic(window * 10), frequency_unit="rad/s", poisson=0.4)
-
-
-def test_dynamic_table__in_tension():
-    omega = np.geomspace(1e-2, 1e4, 60)
-    shear = rv.dynamic_table(omega, *dynamic(omega), frequency_unit="rad/s", poisson=0.4)
-    storage, loss = dynamic(omega)
-    tensile = rv.dynamic_table(omega, 2.8 * storage, 2.8 * loss, frequency_unit="rad/s", kind="tensile", poisson=0.4)
-    assert tensile.contact_compliance(SPAN) == pytest.approx(shear.contact_compliance(SPAN), rel=1e-6, abs=0)
-
-
-def test_dynamic_table__fits_the_loss_as_well():
-    """Storage moduli alone leave the loss open; a loss that contradicts them shows in the misfit."""
-    omega = np.geomspace(1e-2, 1e4, 60)
-    storage, loss = dynamic(omega)
-    assert stated_misfit(rv.dynamic_table(omega, storage, 3 * loss, frequency_unit="rad/s")) > 0.3
 
 
 @pytest.mark.parametrize(
@@ -350,14 +283,6 @@ def test_dynamic_table__fits_the_loss_as_well():
 def test_bad_input__is_named(make, message):
     with pytest.raises(InputError, match=message):
         make()
-
-
-def test_many_rows__are_fitted_as_few_are():
-    """Thousands of rows of one curve, taken linearly in time, are the curve."""
-    t = np.linspace(1e-2, 10.0, 3001)
-    assert off(rv.creep_table(t, CREEP["stretched"](t)), CREEP["stretched"], t) < 1e-4
-    material = rv.relaxation_table(t, WIDE["stretched"](t))
-    assert np.abs(modulus(material, t) / WIDE["stretched"](t) - 1).max() < 2e-3
 
 
 # --- several temperatures -------------------------------------------------------------------------------------------

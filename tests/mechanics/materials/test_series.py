@@ -101,14 +101,6 @@ def test_series__of_a_series_is_itself():
     assert series(material, 1e-3, 1.0, 1e-9) == (material, 0.0)
 
 
-def test_series__of_one_exponential_between_the_times_offered():
-    material = rv.creep(lambda t: 1 - np.expm1(-t / 0.37))
-    found, error = series(material, 1e-3, 1e3, 1e-3)
-    assert error <= 1e-3
-    assert len(found.times) <= 4
-    assert found.times[0] == pytest.approx(0.37, rel=0.2, abs=0)
-
-
 def table(**keys):
     t = np.geomspace(1e-3, 1e3, 60)
     return rv.creep_table(t, CURVES["logarithm"](t), **keys)
@@ -137,15 +129,6 @@ def test_series__of_a_pair_is_the_sum(factors):
     _, alone = series(bodies[0], 1e-3, 1e3, 1e-2)
     _, hidden = series(rv.pair(bodies[0], rv.elastic(1e-6)), 1e-3, 1e3, 1e-2)
     assert hidden < 1e-3 * alone
-
-
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-9])
-def test_series__of_a_table_has_its_poisson_ratio(tolerance):
-    t = np.geomspace(1e-3, 1e2, 30)
-    table = rv.creep_table(t, 1e-6 + 1e-6 * t**0.3, poisson=0.2)
-    found, error = series(table, 1e-3, 1e2, tolerance)
-    assert error <= tolerance
-    assert true_error(table, found, 1e-3, 1e2) <= 1.05 * error + 1e-12
 
 
 @pytest.mark.parametrize(

@@ -72,13 +72,6 @@ def test_channel__cells_in_series(length):
     assert_allclose(flow(gap, CELL).conductance, series(gap), rtol=1e-13, atol=0)
 
 
-def test_channels__in_parallel_add_up():
-    gap = random_gap((30, 9), open_part=1.0)
-    gap[:, 1::2] = 0.0
-    expected = sum(series(gap[:, row]) for row in range(0, 9, 2))
-    assert_allclose(flow(gap, CELL).conductance, expected, rtol=1e-13, atol=0)
-
-
 @pytest.mark.parametrize("wrap", [False, True])
 def test_gap_along_the_flow__is_the_harmonic_mean_of_its_cube(wrap):
     profile = 1e-6 * (0.1 + np.random.default_rng(1).random(31))
@@ -139,26 +132,6 @@ def test_fluxes__carry_the_same_through_every_section(wrap):
     assert not across[gap == 0].any()
 
 
-def test_fluxes__of_a_plane_gap_are_those_of_poiseuille():
-    gap = np.full((6, 4), 2e-6)
-    along, across = fluxes(gap, CELL, flow(gap, CELL).pressure)
-    assert_allclose(along, (2e-6) ** 3 / 12 / (6 * CELL[0]), rtol=1e-12, atol=0)
-    assert np.abs(across).max() < 1e-12 * along.max()
-
-
-def test_fluxes__turn_with_the_channel():
-    gap = np.zeros((3, 4))
-    gap[0, 0] = gap[1, 0] = gap[1, 1] = gap[1, 2] = gap[2, 2] = 1e-6
-    found = flow(gap, CELL)
-    along, across = fluxes(gap, CELL, found.pressure)
-    expected = np.zeros((3, 4))
-    expected[1, :3] = found.conductance / CELL[0] * np.array([0.5, 1.0, 0.5])  # half of a corner's faces carry it
-    assert_allclose(across, expected, rtol=1e-12, atol=0)
-    expected[:] = 0.0
-    expected[[0, 2], [0, 2]], expected[1, [0, 2]] = found.conductance / CELL[1], found.conductance / CELL[1] / 2
-    assert_allclose(along, expected, rtol=1e-12, atol=0)
-
-
 def unlike_its_inverse(cells):
     """Gap on a unit square whose cube, turned by a right angle, is one over itself; the flow through it is bent."""
     wave = np.cos(2 * np.pi * (np.arange(cells) + 0.5) / cells)
@@ -175,16 +148,6 @@ def test_rate__second_order_on_a_gap_whose_conductance_duality_gives():
     rates = np.log2(np.divide(errors[:-1], errors[1:]))
     assert errors[-1] < 1e-3
     assert np.all(rates > 1.9)
-
-
-def test_rate__second_order_on_a_wedge():
-    """Gap ``1 + x``: the integral of its inverse cube is 3/8."""
-    errors = []
-    for cells in (10, 20, 40):
-        x = (np.arange(cells) + 0.5) / cells
-        found = flow(np.repeat(1 + x[:, None], 3, axis=1), (1 / cells, 1 / 3))
-        errors.append(abs(12 * found.conductance * 3 / 8 - 1))
-    assert np.all(np.abs(np.log2(np.divide(errors[:-1], errors[1:])) - 2) < 0.05)
 
 
 @given(seed=st.integers(0, 2**31), wrap=st.booleans(), noise=st.floats(1e-6, 1.0))
@@ -231,13 +194,6 @@ def test_lengths__in_any_unit():
     gap = random_gap((14, 11), seed=2)
     metres, nanometres = flow(gap, CELL), flow(gap * 1e9, (CELL[0] * 1e9, CELL[1] * 1e9))
     assert_allclose(nanometres.conductance, metres.conductance * 1e27, rtol=1e-12, atol=0)
-
-
-def test_flow__is_the_same_from_either_side():
-    gap = random_gap((15, 12), seed=4, open_part=0.85)
-    there, back = flow(gap, CELL), flow(gap[::-1, ::-1], CELL)
-    assert_allclose(there.conductance, back.conductance, rtol=1e-12, atol=0)
-    assert np.allclose(there.pressure, 1 - back.pressure[::-1, ::-1], atol=1e-12, equal_nan=True)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

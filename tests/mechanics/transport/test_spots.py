@@ -53,14 +53,6 @@ def test_square__is_its_capacity(cells, off):
     assert within(outlined(np.ones((cells, 2 * cells), dtype=bool), (1 / cells, 0.5 / cells)), SQUARE) < off
 
 
-@pytest.mark.parametrize("angle", [7, 20, 45])
-def test_square__at_an_angle(angle):
-    x, cosine, sine = np.arange(60) - 29.4, math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    along, across = (np.abs(a * x[:, None] + b * x) for a, b in ((cosine, sine), (-sine, cosine)))
-    spots = (along < 18.3) & (across < 18.3)
-    assert within(outlined(spots), SQUARE * math.sqrt(spots.sum())) < 2e-3
-
-
 def test_correction__has_the_order_of_a_corner():
     """Less than 2, which is that of a smooth outline's second term; more than 1, which is that of no correction."""
     off = [abs(outlined(np.ones((n, n), dtype=bool), (1 / n, 1 / n)).stiffness / SQUARE - 1) for n in (8, 16, 32)]
@@ -88,13 +80,6 @@ def test_two_far_spots__add_but_for_what_each_displaces_the_other(apart):
     both[: len(spot)], both[apart:] = spot, spot
     one, found = outlined(spot).stiffness, outlined(both).stiffness
     assert found == pytest.approx(1 / (1 / (2 * one) + 1 / (2 * math.pi * apart)), rel=5e-4 * (40 / apart) ** 3)
-
-
-def test_periods__side_by_side_are_one_another():
-    spots = rough_gap((18, 15), seed=2) < 2.0
-    one, four = (frozen_contact(s, (1.0, 0.9), "periodic") for s in (spots, np.tile(spots, (2, 2))))
-    assert four.stiffness == pytest.approx(4 * one.stiffness, rel=1e-5)
-    assert 2 * one.error < four.error < 4 * one.error, "what faces err by at random adds up as a root"
 
 
 def hertz(cells, radius, centre, boundary="free"):

@@ -66,15 +66,3 @@ def test_cells_that_nothing_joins__in_one_row(no_factors):
     cell = (1e-9, 1e-3)
     expected = np.sum(gap**3 / 12) * cell[1] / cell[0]
     assert_allclose(flow(gap, cell).conductance, expected, rtol=1e-12, atol=0)
-
-
-def test_neighbours_with_decades_between_them__are_left_to_factors(monkeypatch):
-    source = np.random.default_rng(7)
-    gap = np.where(source.random((70, 66)) < 0.8, 1e-6 * 10 ** (-5 * source.random((70, 66))), 0.0)
-    calls = []
-    monkeypatch.setattr(solvers, "factors", lambda matrix: calls.append(matrix) or FACTORS(matrix))
-    monkeypatch.setattr(solvers, "_LARGE", 0)
-    found = flow(gap, CELL)
-    assert len(calls) == 1
-    assert 0 < found.lower <= found.upper <= found.lower * (1 + 1e-9)
-    assert_allclose(found.conductance, by_factors(gap).conductance, rtol=1e-9, atol=0)
