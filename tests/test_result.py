@@ -94,12 +94,6 @@ def test_steps__hold_every_accepted_step_and_the_rows_among_them(ball, stored):
             np.testing.assert_array_equal(steps[name].values[at], ds[name].values)
 
 
-def test_steps__if_each_is_a_row_are_the_rows():
-    every = rv.simulate(BALL, RUBBER, PROGRAM, progress=False)
-    assert every.roughvisc.steps.sizes["step"] >= every.sizes["time"] > 10
-    assert set(every.time.values) <= set(every.roughvisc.steps.time.values)
-
-
 @pytest.mark.parametrize(
     "select",
     [
@@ -140,14 +134,6 @@ def test_concat__keeps_every_variable_of_both(ball, heavier):
         xr.testing.assert_equal(both.isel(load=number), one)
 
 
-def test_new_times__keep_every_variable(ball):
-    shifted = ball.assign_coords(time=ball.time * 1e3)
-    between = ball.interp(time=[0.1, 0.2])
-    assert set(shifted.variables) == set(between.variables) == set(ball.variables)
-    np.testing.assert_array_equal(shifted.stated_error, ball.stated_error)
-    assert np.isfinite(between.stated_error).all()
-
-
 @pytest.mark.parametrize("experiment", ["history", "friction"])
 def test_netcdf_of_xarray__loses_the_steps_alone(stored, experiment, tmp_path):
     ds = stored
@@ -172,12 +158,6 @@ def test_file__has_the_group_of_steps_and_gives_it_back(stored):
         assert set(plain.data_vars) == {*stored.data_vars, "x_bounds", "y_bounds"}
     with xr.open_datatree(path) as tree:
         assert set(tree.children) == {"steps"}
-
-
-def test_variables__refer_to_variables_of_their_own_dataset(ball):
-    for part in (ball, ball.roughvisc.steps):
-        named = [one.attrs.get("ancillary_variables", "").split() for one in part.variables.values()]
-        assert {other for others in named for other in others} <= set(part.variables)
 
 
 def test_friction__has_no_steps():

@@ -188,14 +188,6 @@ def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pict
     assert ("slide" in names or "friction" in names) == kind.moves
 
 
-@pytest.mark.thorough
-@only_slides_are_quick
-def test_report__has_pictures_and_the_key(kind, done, tmp_path, coarse_pictures):
-    page = rv.report(done.result, tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "data:image" in page
-    assert done.case.key in page
-
-
 def test_audit__has_a_verdict_on_each_assumption(kind, done):
     found = rv.audit(done.result, work_of_adhesion="50 mJ/m^2", yield_strength="10 MPa", density="1100 kg/m^3")
     verdicts = {one.name: one.verdict for one in found}

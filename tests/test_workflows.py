@@ -132,17 +132,6 @@ def test_accuracy__of_random_cases_is_judged(tmp_path, monkeypatch):
 
 
 @pytest.mark.thorough
-def test_accuracy__with_more_choices_of_kept_times_and_a_checked_reference(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
-    module = importlib.import_module("accuracy")
-    drawn, few, reference = module.judge(1, 11, kept=(module.DRAWN, 3), check=True)
-    assert [one["kept_times"] for one in (drawn, few, reference)] == ["drawn", 3, "reference"]
-    assert len(few["rows"]["pressure"]["true"]) == 3
-    own, finer = (np.nanmax(module.over_tolerance(one, "total")) for one in (few, reference))
-    assert 0 < finer < own / 3, "the reference is the more accurate"
-
-
-@pytest.mark.thorough
 def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
     monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
     module = importlib.import_module("grid_accuracy")

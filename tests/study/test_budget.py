@@ -1,11 +1,8 @@
 """The total uncertainty of a number: sources compared with closed forms; the grid chosen for a wanted error."""
 
-import json
-
 import numpy as np
 import pytest
 import xarray as xr
-from distributed import Client, LocalCluster
 from support import refused
 
 import roughvisc as rv
@@ -114,20 +111,6 @@ def test_time_scale__of_a_fluid_under_a_ball(tmp_path):
     assert width(found, "time scale") == pytest.approx(-2 / 3 * slope * np.log(1.05), rel=0.03)
 
 
-def test_time_scale__of_friction_is_its_slope_over_speed(tmp_path):
-    """Times a tenth longer are speeds a tenth higher."""
-    text = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\nspeeds = [1e-3]\npressure = "50 kPa"\n'
-    study = case(text + '[solve]\nboundary = "periodic"\n', tmp_path)
-    found = stated(study, tmp_path, "friction_coefficient", time_scale_error=0.05)
-    faster = []
-    for speed in (1e-3, 1.1e-3):
-        coarse = rv.vary(study, {"surface.resample": [27, 25], "friction.speeds": [speed]})
-        faster.append(float(rv.run(coarse, out=tmp_path / "curve", progress=False)["friction_coefficient"][0]))
-    slope = abs(np.log(faster[1] / faster[0])) / np.log(1.1)
-    assert width(found, "time scale") == pytest.approx(slope * np.log(1.05), rel=1e-3)
-    assert found["value"].dims == ("speed",)
-
-
 def test_grid__holds_the_change_to_cells_half_as_long(tmp_path):
     study = case(ROUGH, tmp_path)
     fine = rv.run(rv.vary(study, {"surface.resample": [108, 100]}), out=tmp_path / "fine", progress=False)
@@ -191,35 +174,6 @@ def test_indenter__has_no_sample_and_no_further_waves(tmp_path):
     assert found.attrs["open"] == "modulus"
 
 
-def test_surface_with_absent_cells__is_no_sample(tmp_path):
-    heights = rv.self_affine(1e-3, (24, 22), hurst=0.8, rms_slope=0.2, rolloff=3e-4, seed=3)
-    heights[3:6, 4:8] = np.nan
-    rv.save_scan(heights, tmp_path / "scan.x3p")
-    recipe = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
-    text = ROUGH.replace(recipe, 'file = "scan.x3p"\nmissing = "absent"\n')
-    found = stated(case(text, tmp_path), tmp_path, population="ensemble", cutoff="10 um")
-    assert [states(found)[name] for name in ("sample", OCTAVE)] == ["none"] * 2
-    assert (found["lower"] < found["value"]).all()
-
-
-@pytest.mark.thorough
-def test_scan_with_mirror_images__takes_patches_of_its_own_size(tmp_path):
-    scan = rv.self_affine((1e-3, 0.9e-3), (40, 36), hurst=0.8, rms_slope=0.2, rolloff=3e-4, seed=3)
-    rv.save_scan(scan, tmp_path / "scan.x3p")
-    recipe = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
-    text = ROUGH.replace(recipe, 'file = "scan.x3p"\n').replace('boundary = "periodic"', 'boundary = "mirror"')
-    study = case(text, tmp_path)
-    assert study.settings.boundary == "mirror"
-    assert 0 < width(stated(study, tmp_path, population="ensemble"), "sample") < 1
-    shapes = set()
-    for path in (tmp_path / "budget").glob("*.nc"):
-        with xr.open_dataset(path) as one:
-            height, number = one["height"].values, json.loads(one.attrs["case"])["surface"].get("realisation")
-            shapes.add((number, *height.shape))
-    assert {shape for shape in shapes if shape[0]} == {(number, 20, 18) for number in range(1, 7)}
-    assert {shape[1:] for shape in shapes if not shape[0]} == {(40, 36), (20, 18), (10, 9)}
-
-
 def test_closed_gap__has_no_interval(tmp_path):
     """The leak rate of a map in which contact percolates is zero, and has no logarithm."""
     study = case(ROUGH, tmp_path, **{"program.0.pressure": "3 MPa", "keep.fields": ["gap"]})
@@ -249,11 +203,6 @@ def test_result__gives_its_case_and_its_rows(tmp_path):
     assert len(list((tmp_path / "results" / "budget").glob("*.nc"))) == 2, "two coarser grids, and not the case again"
 
 
-def test_solve_that_did_not_converge__is_a_warning(tmp_path, caplog, stubborn):
-    stated(case(BALL, tmp_path), tmp_path)
-    assert "unconverged" in caplog.text
-
-
 @pytest.mark.parametrize(
     ("options", "key", "found"),
     [
@@ -272,38 +221,6 @@ def test_budget__refuses(tmp_path, options, key, found):
     with refused(key, found):
         stated(case(BALL, tmp_path), tmp_path, **options)
     assert not (tmp_path / "budget").exists()
-
-
-def test_budget__refuses_a_result_without_a_case():
-    ball = rv.sphere(1e-3, 2e-4, 15)
-    result = rv.simulate(ball, rv.elastic(1e6), rv.Program().load(1e-4, over=0), progress=False)
-    with refused():
-        rv.budget(result)
-
-
-@pytest.mark.thorough
-def test_command__prints_and_writes(invoke, tmp_path):
-    (tmp_path / "study.toml").write_text(BALL)
-    arguments = ("--at", "1 s", "--modulus-error", "10%", "--workers", 1)
-    status, said, complained = invoke("budget", tmp_path / "study.toml", *arguments)
-    assert status == 0, complained
-    assert all(name in said for name in ("grid", "modulus", OCTAVE))
-    folder = tmp_path / "results" / "study" / "budget"
-    assert (folder / "budget-contact_area.png").exists()
-    with xr.open_dataset(folder / "budget-contact_area.nc") as found:
-        assert found["time"].values.tolist() == [1.0]
-
-
-@pytest.mark.parametrize(
-    ("option", "found"),
-    [("--quantity", "area"), ("--modulus-error", "ten"), ("--at", "3 kg"), ("--cutoff", "-1 um")],
-)
-def test_command__refuses(invoke, tmp_path, option, found):
-    (tmp_path / "study.toml").write_text(BALL)
-    status, _, complained = invoke("budget", tmp_path / "study.toml", option, found)
-    assert status == 2
-    assert found in complained
-    assert not (tmp_path / "results").exists()
 
 
 def test_figure__draws_every_source_and_the_interval(tmp_path):
@@ -360,51 +277,11 @@ def test_choice__is_a_case_like_any_other(tmp_path, monkeypatch):
     assert got(study, tmp_path, {"mean_gap": "2 %"}).attrs["choice"] == found.attrs["choice"]
 
 
-@pytest.mark.thorough
-def test_choice__is_where_the_rule_of_three_grids_first_fits(tmp_path):
-    """Roache's factor of two grids at the order 1.5, of the larger of the last change and the one before by order."""
-    study, cells = case(ROUGH, tmp_path, **SMOOTH), [[7, 6], [14, 12], [27, 25], [54, 50], [108, 100]]
-    found = got(study, tmp_path, {"mean_gap": "0.5 %"})
-    gaps = []
-    for shape in cells:
-        one = rv.vary(study, {"surface.resample": shape, "solve.tolerance": 1e-3})
-        gaps.append(np.log(rv.run(one, tmp_path / "check", progress=False)["mean_gap"].values))
-    last, before = np.abs(np.diff(gaps, axis=0))[1:], np.abs(np.diff(gaps, axis=0))[:-1]
-    errors = (3 / (2**1.5 - 1) * np.maximum(last, before / 2**1.5)).max(axis=1)
-    fits = [shape[0] for shape, error in zip(cells[2:], errors, strict=True) if error < np.log(1.005)]
-    assert len(fits) < 3
-    assert found.sizes["x"] == fits[0]
-    half = float(written(tmp_path, "mean_gap")["half_width"].sel(source="grid").max())
-    assert half == pytest.approx(errors[[shape[0] for shape in cells[2:]].index(fits[0])], rel=1e-3)
-
-
-def test_want__is_computed_on_the_default_client(tmp_path):
-    with (
-        LocalCluster(n_workers=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster, set_as_default=False) as client,
-        client.as_current(),
-    ):
-        found = got(case(BALL, tmp_path), tmp_path, {"contact_area": "30 %"})
-        topics = client.get_events()
-    assert found.attrs["case_key"] in str(topics)
-
-
 def test_floor__above_the_wanted_error_is_refused_before_fine_grids_are_solved(tmp_path):
     with refused("approach", 0.01) as error:
         got(case(BALL, tmp_path), tmp_path, {"approach": "1 %", "modulus_error": "10 %"})
     assert "modulus: " in str(error.value)
     assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["budget"]
-
-
-@pytest.mark.thorough
-def test_error_equal_to_the_wanted_one__is_accepted(tmp_path):
-    """The force under a given approach is proportional to the modulus, which is known to the wanted error."""
-    study = case(BALL, tmp_path, **{"program": [{"approach": "1 um", "over": "10 ms"}], "keep.times": [0.01]})
-    found = got(study, tmp_path, {"force": "1 %", "modulus_error": "1 %"})
-    one = written(tmp_path, "force")
-    assert float(one["half_width"].sel(source="modulus")[-1]) == pytest.approx(np.log(1.01), rel=1e-6)
-    assert float(one["upper"][-1] / one["value"][-1]) == pytest.approx(1.01, abs=1e-4)
-    assert float(found["force"][-1]) == pytest.approx(4 / 3 * 4e6 * 1e-3**0.5 * 1e-6**1.5, rel=0.01)
 
 
 def test_target_that_the_finest_grid_misses__is_refused(tmp_path):
@@ -415,12 +292,6 @@ def test_target_that_the_finest_grid_misses__is_refused(tmp_path):
         with xr.open_dataset(path) as one:
             shapes.append(one["height"].shape[0])
     assert max(shapes) == 91, "the next cannot be better than a part of it"
-
-
-def test_closed_gap__has_no_relative_error(tmp_path):
-    study = case(ROUGH, tmp_path, **SMOOTH, **{"program.0.pressure": "3 MPa", "keep.fields": ["gap"]})
-    with refused("leak_rate", 0.1):
-        got(study, tmp_path, {"leak_rate": "10 %"})
 
 
 @pytest.mark.parametrize("text", ["1 % frobnication", "1", "1 %", "60 s", "3 kg mean_gap"])

@@ -107,11 +107,6 @@ def test_another_viscosity__keeps_the_run(invoke, study, tmp_path, counted, solv
     assert len(counted) == 2
 
 
-def test_run__without_observe_loads_none_of_it(invoke, study, counted):
-    assert invoke("run", study(""), "--out", "out", "--no-plots")[0] == 0
-    assert counted == []
-
-
 @pytest.mark.thorough
 def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coarse_pictures):
     assert invoke("run", study(LEAKAGE + LOADS), "--out", "out", "--workers", 0)[0] == 0
@@ -136,10 +131,6 @@ def test_observe__from_python_after_a_sweep(study, tmp_path):
     assert "leak_rate" in rv.open_results(tmp_path / "out")
 
 
-def test_observe__of_what_is_not_finished_adds_nothing(study, tmp_path):
-    assert rv.observe(study(LEAKAGE), tmp_path / "out") == []
-
-
 def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_path):
     punch = STUDY.replace('"wavy"\namplitude = "1 um"\nwavelength = "0.5 mm"', '"flat_punch"\nradius = "0.3 mm"')
     path = study("")
@@ -152,35 +143,6 @@ def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_
         assert "leak_rate" not in ds
     with pytest.raises(InputError, match="where the surface is absent"):
         rv.observe(path, tmp_path / "out")
-
-
-CONDUCTANCE = '[observe.conductance]\nresistivity = ["5 K m/W", 0]\n'
-
-
-@pytest.mark.thorough
-def test_conductance__is_told_drawn_and_kept(invoke, study, tmp_path, coarse_pictures, monkeypatch):
-    monkeypatch.setattr(rv.plot, "FIGURES", {"history": rv.plot.FIGURES["history"]})
-    status, told, _ = invoke("run", study(CONDUCTANCE), "--out", "out")
-    assert status == 0
-    assert "Thermal conductance at the end" in told
-    assert "infinite: full contact" in told
-    (path,) = (tmp_path / "out").glob("*.nc")
-    assert (tmp_path / "out" / f"{path.stem}-history.png").exists()
-    with rv.open_result(path) as ds:
-        again = rv.observables.conductance(ds, (5.0, 0.0))
-        xr.testing.assert_allclose(ds.thermal_conductance, again.thermal_conductance)
-        assert list(ds.thermal_conductance.attrs["resistivity"]) == [5.0, 0.0]
-        asked = {"conductance": {"resistivity": ["5 K m/W", 0]}}  # as the study states it
-        assert json.loads(ds.attrs["observed"]) == asked
-
-
-@pytest.mark.thorough
-def test_conductance__of_a_sweep(invoke, study, tmp_path, coarse_pictures):
-    assert invoke("run", study(CONDUCTANCE + LOADS), "--out", "out", "--workers", 0)[0] == 0
-    assert "thermal_conductance [W/K]" in (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig")
-    results = rv.open_results(tmp_path / "out")
-    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)]
-    assert "sweep-thermal_conductance-histories.png" in written
 
 
 @pytest.mark.thorough

@@ -8,9 +8,8 @@ import xarray as xr
 from support import PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
 
 import roughvisc as rv
-from roughvisc.experiment.grid_error import grid_uncertainty
-from roughvisc.study.neighbours import on_cells, solve
-from roughvisc.study.storage.netcdf import write_dataset
+from roughvisc.study.neighbours import on_cells
+from roughvisc.study.storage.store import write_dataset
 from roughvisc.study.trade import VARIABLES, cheapest, format_tolerance, open_trade, pareto_front, uncertainty
 
 WAVE = """
@@ -134,18 +133,6 @@ def test_slides__are_compared_where_the_profile_has_moved_by_whole_cells_of_all_
     assert errors_of(ds, FRICTION)[0] < errors_of(ds, FRICTION)[1] < 0.1
 
 
-def test_richardson__takes_the_observed_order():
-    cell = 0.1  # an error of cell^1.5 on three grids
-    near, far = ((2**1.5) ** n * (2**1.5 - 1) * cell**1.5 for n in (0, 1))
-    assert grid_uncertainty("pressure", near, far, 2.0) == pytest.approx(1.25 * cell**1.5)
-    assert grid_uncertainty("pressure", near, near, 2.0) > 2 * cell**1.5, "no convergence"
-    assert grid_uncertainty("approach", 0.0, 0.0, 2.0) == 0
-    chance = grid_uncertainty("pressure", 1e-3 * near, far, 2.0)
-    assert chance == pytest.approx(1.25 * cell**1.5), "the two finer grids agree by chance"
-    two = grid_uncertainty("pressure", [near, near], [far, np.nan], 2.0)
-    assert two[1] / two[0] == pytest.approx(3 / 1.25), "a larger factor without a third grid"
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # a scan
 
@@ -171,31 +158,6 @@ def _waves_at(old, new):
     return (few @ fine.conj().T).real / old
 
 
-def test_card_of_a_punch__is_made_coarser_by_means(tmp_path):
-    """Its material ends within the grid, which the study does not say: waves would be refused."""
-    (tmp_path / "punch.toml").write_text('generate = "flat_punch"\nradius = 2e-4\nsize = 1e-3\nshape = [31, 28]\n')
-    text = ROUGH[: ROUGH.index("[surface]")] + '[surface]\nfile = "punch.toml"\n\n' + ROUGH[ROUGH.index("[material]") :]
-    ds = measured(case_of(tmp_path, text), (1e-2, 1), (1e-2, 2.0))
-    assert np.isfinite(ds.run_time).all()
-
-
-@pytest.mark.thorough
-def test_ladder__has_finer_grids_of_a_recipe_only(tmp_path):
-    ball, rough = (
-        rv.trade(case_of(folder, text), progress=False)
-        for folder, text in ((made(tmp_path / "ball"), STUDY), (made(tmp_path / "rough"), ROUGH))
-    )
-    assert ball.coarsening.min() < 1
-    assert rough.coarsening.min() == 1
-    assert min(ball.cells_x.min(), ball.cells_y.min()) >= 12
-    assert np.isfinite(ball.error).all()
-
-
-def made(folder):
-    folder.mkdir()
-    return folder
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # time
 
@@ -203,22 +165,6 @@ def made(folder):
 def test_budget__stops_runs_and_refuses_a_reference_that_takes_too_long(tmp_path):
     with pytest.raises(rv.InputError, match="reference"):
         measured(case_of(tmp_path, ROUGH), (1e-2, 1), budget=1e-6)
-
-
-def test_reference__is_the_sharpest_run_that_there_is(tmp_path, monkeypatch):
-    """The next looser tolerance is ten times as large: Roache's factor of two runs is 3 over 10 - 1."""
-
-    def solve_loosely(cases, folder, **options):
-        if any(case.settings.tolerance < 1e-2 for case in cases):
-            raise rv.RoughviscError("too sharp")
-        return solve(cases, folder, **options)
-
-    monkeypatch.setattr("roughvisc.study.trade.solve", solve_loosely)
-    ds = measured(case_of(tmp_path), (1e-1, 1), (1e-2, 1))
-    assert ds.attrs["reference"] == "finest run: tolerance = 1e-2"
-    assert (ds.error[1] == 0).all()
-    np.testing.assert_allclose(ds.reference_time_uncertainty, ds.error[0] / 3)
-    assert np.isnan(ds.reference_grid_uncertainty).all()
 
 
 @pytest.mark.parametrize(
@@ -326,24 +272,6 @@ def test_command__writes_its_files_and_marks_the_cheapest(invoke, tmp_path, monk
     (folder / "trade.png").unlink()
     assert invoke("plot", folder / "trade.nc")[0] == 0
     assert (folder / "trade.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("option", "found", "message"),
-    [
-        ("--accuracy", "200%", "accuracy: found '200%'"),
-        ("--accuracy", "much", "accuracy: found 'much'"),
-        ("--quantity", FRICTION, f"quantity: found '{FRICTION}'"),
-        ("--budget", "0", "budget: found 0.0"),
-        ("--budget", "3 m", "budget: found '3 m'"),
-    ],
-)
-def test_command__refuses_wrong_options_before_anything_runs(invoke, tmp_path, option, found, message):
-    (tmp_path / "ball.toml").write_text(STUDY)
-    status, out, err = invoke("trade", "ball.toml", option, found)
-    assert (status, out) == (2, "")
-    assert err.startswith(f"roughvisc: {message}")
-    assert not (tmp_path / "results").exists()
 
 
 def test_figure__draws_every_setting_and_the_front():

@@ -17,7 +17,7 @@ from support import BALL, LOADS, LONG, assert_same, numbers, refused
 import roughvisc as rv
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
-from roughvisc.study.execution.cluster import connect, default_client, local_client
+from roughvisc.study.execution.cluster import connect, default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.failures import record_path
@@ -330,12 +330,3 @@ def test_results_folder_that_a_worker_does_not_see__fails_no_case(study, tmp_pat
         ).result()
     assert outcome.kind == "hindered"
     assert str(tmp_path / "elsewhere") in outcome.message
-
-
-def test_process_that_is_lost_while_it_starts__is_one_line(monkeypatch):
-    def lost(*_, **__):
-        raise RuntimeError("Nanny failed to start.")
-
-    monkeypatch.setattr("distributed.LocalCluster", lost)
-    with pytest.raises(RoughviscError, match="--workers 0"), local_client(2):
-        pass

@@ -1,17 +1,14 @@
 """Studies of friction: a table ``[friction]`` from the file to results, sweeps, figures and tables."""
 
 import json
-import logging
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import assert_same, numbers
 
 import roughvisc as rv
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.store import open_result
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
@@ -78,27 +75,6 @@ def test_run__gives_what_the_function_gives(case, tmp_path):
     stamp = (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns
     rv.run(one, tmp_path / "out", progress=False)
     assert (tmp_path / "out" / f"{one.key}.nc").stat().st_mtime_ns == stamp, "finished, and not computed again"
-
-
-def test_run__interrupted_goes_on_with_the_same_bits(case, tmp_path, caplog):
-    one = case(with_beside())
-    run_case(one, tmp_path / "whole")
-    asked = []
-
-    def stop():
-        asked.append(1)
-        return len(asked) == 2
-
-    with pytest.raises(KeyboardInterrupt):
-        run_case(one, tmp_path / "out", stop=stop)
-    assert not list((tmp_path / "out").glob("*.nc"))
-    told = []
-    with caplog.at_level(logging.INFO, "roughvisc"):
-        run_case(one, tmp_path / "out", progress=lambda now, end: told.append((now, end)))
-    assert "resumes after speed 2 of 4" in caplog.text
-    assert told == [(3.0, 4.0), (4.0, 4.0)], "two speeds are not computed again"
-    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "whole"))
-    assert [p.name for p in (tmp_path / "out").iterdir()] == [f"{one.key}.nc"], "nothing else is left"
 
 
 def test_sweep__opens_as_one_and_as_a_table(tmp_path):

@@ -74,16 +74,6 @@ def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan
     )
 
 
-def test_sweep__a_scan_that_is_gone_for_a_while_fails_no_case(study, scan, tmp_path, monkeypatch):
-    cases = read_cases(study)
-    content = scan.read_bytes()
-    after_the_first(monkeypatch, lambda: scan.write_bytes(content[: len(content) // 2]))
-    outcomes = list(run_cases(cases, tmp_path / "out", display=Display(False), workers=0).values())
-    assert [outcome.kind for outcome in outcomes] == ["done", "hindered"]
-    scan.write_bytes(content)
-    assert sweep(study, tmp_path / "out", workers=0, progress=False).sizes["case"] == 2
-
-
 def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
     study.write_text(STUDY)
     case = read_study(study)

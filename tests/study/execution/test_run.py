@@ -7,8 +7,8 @@ import xarray as xr
 from support import BALL
 
 import roughvisc as rv
-from roughvisc.errors import ConvergenceError, EdgeContactError, InputError
-from roughvisc.study.case import Case, read_study, vary
+from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.netcdf import open_result
@@ -55,20 +55,6 @@ def test_run__equals_simulate(study):
         progress=False,
     )
     xr.testing.assert_equal(ds.drop_vars("wall_time"), direct.drop_vars("wall_time"))
-
-
-def test_run__reports_progress(study):
-    reached = []
-    rv.run(study, progress=lambda now, end: reached.append((now, end)))
-    assert reached == sorted(reached)
-    assert reached[-1] == (0.2, 0.2)
-
-
-def test_run__writes_nothing_where_the_input_is_wrong(study):
-    case = vary(read_study(study), {"program.0.load": 50.0})
-    with pytest.raises(EdgeContactError, match=r"ball\.toml: .*'mirror'"):
-        rv.run(case, progress=False)
-    assert [p.name for p in study.parent.iterdir()] == ["ball.toml"]
 
 
 def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):

@@ -2,7 +2,6 @@
 
 import contextlib
 import errno
-import io
 import json
 import os
 import signal
@@ -13,7 +12,6 @@ import time
 import psutil
 import pytest
 import xarray as xr
-from rich.console import Console
 from support import BALL, LONG, assert_same, numbers
 
 from roughvisc.errors import InputError, RoughviscError
@@ -91,15 +89,6 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert "4, all before: nothing to compute" in done.stdout
-
-
-def test_connect__says_that_nobody_answers(tmp_path, monkeypatch):
-    with pytest.raises(InputError, match=r"none\.json: does not exist"), connect(file=tmp_path / "none.json"):
-        pass
-    with pytest.raises(InputError, match="expected one of them"), connect():
-        pass
-    with pytest.raises(InputError, match=r"tpc:.*no Dask scheduler answers"), connect("tpc://127.0.0.1:1"):
-        pass
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -199,20 +188,6 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
 
 
-def test_sweep__a_log_that_cannot_be_written_stops_nothing(study, tmp_path, capfd):
-    (tmp_path / "out" / "sweep.log").mkdir(parents=True)
-    assert sweep(study()[:1], tmp_path / "out", workers=0, progress=False).sizes["case"] == 1
-    assert capfd.readouterr().err == ""
-
-
-def test_sweep__not_converged_is_kept_and_said_every_time(study, tmp_path, stubborn):
-    for _ in range(2):
-        outcomes = run_cases(study()[:1], tmp_path / "out", display=Display(False), workers=0)
-        (outcome,) = outcomes.values()
-        assert outcome.kind == "unconverged"
-        assert "1 of 3 kept times did not converge, first at t = 100 ms" in outcome.message
-
-
 def alive(group):
     """Processes of a group that are not zombies."""
     found = []
@@ -259,42 +234,3 @@ def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
 
 # ----------------------------------------------------------------------------------------------------------------
 # what a user sees
-
-
-def outcome(key, kind="done", **more):
-    return outcome_module.Outcome(key, kind, **more)
-
-
-@pytest.mark.parametrize("terminal", [False, True])
-def test_watch__shows_done_running_and_failed(study, terminal, monkeypatch):
-    cases = study()
-    stream = io.StringIO()
-    watch = Display(True, Console(file=stream, force_terminal=terminal, width=160))
-    monkeypatch.setattr("roughvisc.progress.LINE_EVERY", 0.0)
-    watch.begin(cases, "http://127.0.0.1:8787/status")
-    watch.ended(outcome(cases[0].key))
-    watch.ended(outcome(cases[1].key, "failed", message="too [much] load"))
-    watch.reached(cases[2].key, 0.05, 0.2)
-    watch.close()
-    for words in ("http://127.0.0.1:8787/status", "too [much] load", "1 of 4 cases done, 1 failed, 1 running"):
-        assert words in stream.getvalue()
-
-
-@pytest.mark.thorough
-def test_watch__hears_from_workers(study, tmp_path):
-    heard = {}
-
-    class Ear(Display):
-        def reached(self, key, now, end):
-            heard.setdefault(key, []).append(now)
-
-        def begin(self, cases, link=""):
-            super().begin(cases, link)
-            heard["cases"] = len(cases)
-
-    cases = study(LONG)
-    run_cases(cases, tmp_path / "out", display=Ear(False), workers=1)
-    assert heard["cases"] == 1
-    times = heard[cases[0].key]
-    assert times == sorted(times)
-    assert times[-1] > 0

@@ -81,12 +81,6 @@ def test_sweep__over_surfaces_decides_for_each_case(study):
     assert [case.settings.boundary for case in read_cases(study(surface + BODY + sweep))] == ["free", "periodic"]
 
 
-def test_sweep__over_scans_is_asked(study):
-    for sweep in ('"surface.file" = ["rough.nc", "other.nc"]', '"surface.level" = [1, 2]'):
-        with refused("solve.boundary", "auto"):
-            read_cases(study(SCAN + BODY + f"[sweep]\n{sweep}\n"))
-
-
 def test_vary__to_another_surface_decides_anew(study):
     ball = read_study(study(BALL + BODY))
     rough = {"generate": "self_affine", "size": 1e-3, "shape": 16, "hurst": 0.8, "rms_slope": 0.1, "seed": 1}
@@ -98,9 +92,3 @@ def test_vary__to_another_surface_decides_anew(study):
     stated = read_study(study(BALL + BODY + '[solve]\nboundary = "free"\n'))
     assert vary(stated, {"surface": rough}).settings.boundary == "free"
     assert vary(Case.from_json(ball.to_json()), {"surface": rough}).settings.boundary == "periodic"
-
-
-def test_card__that_cannot_be_read_is_named(study, tmp_path):
-    (tmp_path / "scan.toml").write_text("file = ")
-    with pytest.raises(rv.InputError, match=r"study\.toml: .*scan\.toml: is not .*surface card in TOML"):
-        read_study(study('[surface]\nfile = "scan.toml"\n' + BODY))
