@@ -5,8 +5,6 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.experiment import profile as domain
-from roughvisc.experiment.profile import BEYOND, Profile, choose_domain
-from roughvisc.mechanics.body import body_of
 
 ZENER, TOLERANCE = rv.zener(1e6, 5e5, 1e5), 3e-3
 PRESS = rv.Program().load(2e-5, over=0.2).hold(0.5)
@@ -34,29 +32,6 @@ def assert_same(found, whole):
     for field in ("gap", "displacement"):
         assert np.abs(found[field] - whole[field]).max() <= 1e-2 * depth
     assert found.mean_gap.values == pytest.approx(found.gap.mean(("x", "y")).values, rel=1e-6)
-
-
-def test_domain__holds_every_cell_that_an_approach_can_touch():
-    rng = np.random.default_rng(0)
-    gap = np.hypot(*np.meshgrid(np.linspace(-1, 2, 130), np.linspace(-2, 1, 117), indexing="ij")) + 0.1 * rng.random(
-        (130, 117)
-    )
-    profile, body = Profile(rv.from_array(-gap, spacing=(1.0, 1.2))), body_of(ZENER)
-    gap = profile.gap
-    found = choose_domain(profile, body, 0.3)
-    inside = np.zeros(gap.shape, bool)
-    inside[found.cells] = True
-    assert inside.mean() < 0.5
-    assert gap[~inside].min() == found.outside > BEYOND * 0.3
-    assert choose_domain(profile, body, 10.0).is_whole
-
-
-@pytest.mark.thorough
-def test_part_of_a_scan__gives_the_fields_of_all_of_it(monkeypatch, solved_on):
-    found = pressed(bump())
-    assert min(np.prod(shape) for shape in solved_on[1:]) < 0.5 * 121 * 104
-    monkeypatch.setattr(domain, "WORTH_CROPPING", 10**9)
-    assert_same(found, pressed(bump()))
 
 
 def test_contact_that_outgrows_its_domain__begins_anew(monkeypatch):

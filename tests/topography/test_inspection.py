@@ -31,11 +31,6 @@ def test_spikes__are_counted_and_what_they_do_to_sq():
     assert inspect(SMOOTH).findings["Spikes"].values["points"] == 0
 
 
-def test_steps__leave_out_what_is_not_needed():
-    """Of a surface that repeats not even a plane: that would tear it open."""
-    assert inspect(SMOOTH).steps == {"level": 0}
-
-
 def test_tilt__and_form_by_their_coefficients():
     x, y = np.meshgrid(SMOOTH.x.values, SMOOTH.y.values, indexing="ij")
     tilted = inspect(with_values(SMOOTH.values + 0.02 * x - 0.03 * y))
@@ -107,14 +102,3 @@ def test_noise__between_missing_points_is_found_and_overestimated_a_little(share
     assert 0.95 * 2e-9 < found["rms"] < (1 + off) * 2e-9
     none = inspect(with_values(np.where(gaps, np.nan, SMOOTH.values))).findings["Noise"].values
     assert not none["floor"], "with as many gaps again the floor of filled points grows"
-
-
-def test_resolution__is_advised_on_after_a_filter_too():
-    """A filter at four cells leaves waves that contact does not resolve."""
-    fine = rv.self_affine((96e-6, 80e-6), (96, 80), hurst=0.3, rms_height=1e-7, rolloff=4e-5, shortcut=5e-6, seed=3)
-    noise = np.random.default_rng(5).normal(0, 4e-9, fine.shape)
-    found = inspect(with_values(fine.values + noise))
-    assert 3e-6 <= found.steps["filter"] < 8e-6
-    assert found.findings["Resolution"].values["fine_slopes"] > 0.5
-    assert found.findings["Resolution"].advice
-    assert not inspect(SMOOTH).findings["Resolution"].advice

@@ -90,17 +90,6 @@ def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
     assert ds.contact_area.values[-1] == pytest.approx(np.pi * exact.radius**2, rel=2e-2)
 
 
-def test_combine__a_recipe_is_no_longer_one_and_what_is_absent_stays_so():
-    punch, ball = rv.flat_punch(2e-5, 1e-4, 21), rv.sphere(1e-3, 1e-4, 21)
-    both = rv.combine(punch, ball, align="centre")
-    assert "recipe" not in both.attrs
-    assert both.attrs["missing"] == "absent"
-    assert rv.combine(ball, punch, align="centre").attrs["missing"] == "absent"
-    gaps = ball.copy()
-    gaps[0, 0] = np.nan  # of a measurement: what is there is not known
-    assert "missing" not in rv.combine(punch, gaps, align="centre").attrs
-
-
 @pytest.mark.parametrize(
     ("options", "named"),
     [

@@ -11,15 +11,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
-from scan_files import CELL, SCANS, card, real, tilted, write_x3p
+from scan_files import CELL, SCANS, real, write_x3p
 from support import refused
 
 import roughvisc as rv
-from roughvisc.cli.group import main
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.points import lattice
-from roughvisc.topography.readers import list_channels, sha256
+from roughvisc.topography.readers import list_channels
 from roughvisc.topography.scans import open_scan
 
 FILES = Path(__file__).parent / "misread"
@@ -34,13 +32,25 @@ def matrix(path, values, **options):
 # -- files of one maker ------------------------------------------------------------------------------------------------
 
 
-def test_wyko__lines_are_columns_and_aspect_is_along_y():
-    h = open_scan(FILES / "wyko1.asc")
-    assert h.shape == (24, 16)
-    np.testing.assert_allclose(spacing(h), (2e-6, 2.5e-6), rtol=1e-12)
-    assert int(np.isnan(h).sum()) == 1
-    np.testing.assert_allclose(h[0, :3], [320.409e-9, 210.304e-9, 1.93816e-9], rtol=1e-12)  # the first line
-    np.testing.assert_allclose(h[1, :2], [524.443e-9, 467.537e-9], rtol=1e-12)  # the second line
+#: file -> options, shape, spacing [m], missing points, and some heights by their places [m]
+OF_MAKERS = {
+    "wyko1.asc": ({}, (24, 16), (2e-6, 2.5e-6), 1, {(0, 0): 320.409e-9, (0, 1): 210.304e-9, (1, 0): 524.443e-9}),
+    "zygo.xyz": ({}, (24, 16), (5.067e-6, 5.067e-6), 2, {(0, 0): 0.32041e-6, (1, 0): 0.52444e-6, (2, 0): 0.73719e-6}),
+    "esri.asc": ({"unit": "mm"}, (30, 20), (0.5e-3, 0.5e-3), 1, {(0, -1): 1e-3, (1, -1): 1.2474e-3}),
+}
+
+
+@pytest.mark.parametrize("name", OF_MAKERS)
+def test_file_of_a_maker__has_its_heights_in_their_places(name):
+    options, shape, cell, missing, heights = OF_MAKERS[name]
+    h = open_scan(FILES / name, **options)
+    assert (h.shape, int(np.isnan(h).sum())) == (shape, missing)
+    np.testing.assert_allclose(spacing(h), cell, rtol=1e-12)
+    for place, height in heights.items():
+        assert float(h[place]) == pytest.approx(height, rel=1e-12)
+    if options:
+        with refused("unit"):
+            open_scan(FILES / name)
 
 
 def test_wyko__heights_in_waves(tmp_path):
@@ -54,14 +64,6 @@ def test_wyko__heights_in_waves(tmp_path):
     np.testing.assert_allclose(
         open_scan(tmp_path / "waves.asc"), 300 * open_scan(FILES / "wyko1.asc"), rtol=1e-12
     )  # 600 nm over 2
-
-
-def test_zygo_xyz__is_in_micrometres_at_the_resolution_of_the_camera():
-    h = open_scan(FILES / "zygo.xyz")
-    assert h.shape == (24, 16)
-    np.testing.assert_allclose(spacing(h), 5.067e-6, rtol=1e-12)
-    assert np.argwhere(np.isnan(h.values)).tolist() == [[4, 3], [6, 5]]
-    np.testing.assert_allclose(h[:3, 0], [0.32041e-6, 0.52444e-6, 0.73719e-6], rtol=1e-12)
 
 
 @pytest.mark.parametrize(("resolution", "counts"), [(0, 4096), (1, 32768), (2, 131072)])
@@ -94,17 +96,6 @@ def test_keyence__unit_and_spacing_are_those_of_the_header(german, tmp_path):
     (tmp_path / "vk.csv").write_text(text.replace("524", "five"))
     with pytest.raises(Exception, match="line 20: found '0.five'".replace(".", "[.,]")):
         open_scan(tmp_path / "vk.csv")
-
-
-def test_esri__has_its_first_row_on_top_and_states_missing_points():
-    with refused("unit"):
-        open_scan(FILES / "esri.asc")
-    h = open_scan(FILES / "esri.asc", unit="mm")
-    assert h.shape == (30, 20)
-    np.testing.assert_allclose(spacing(h), 0.5e-3, rtol=1e-12)
-    assert int(np.isnan(h).sum()) == 1
-    np.testing.assert_allclose(h[:3, -1], [1e-3, 1.2474e-3, 1.4794e-3], rtol=1e-12)  # the first row of the file
-    assert h.attrs["orientation"].startswith("verified")
 
 
 @pytest.mark.parametrize("comment", [b"", b"GelSight Mobile 1X", b"Created by TrueMap v6\r\n"])
@@ -195,16 +186,6 @@ def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
         np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
 
 
-def test_no_data__of_two_kinds_is_missing(tmp_path):
-    z = ROUGH.copy()
-    z[3:5, 4:9], z[10, :6] = -9999, 9999
-    np.save(tmp_path / "m.npy", z)
-    with pytest.warns(UserWarning, match="have the height") as said:
-        h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
-    assert len(said) == 2
-    np.testing.assert_allclose(h, 1e-6 * np.where(np.abs(z) > 9, np.nan, z).T, rtol=1e-12)
-
-
 def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):
     for z in (np.minimum(ROUGH, 0.5), np.where(ROUGH > 0, 1.0, 0.0), np.where(ROUGH > 1, -5.0, ROUGH)):
         np.save(tmp_path / "m.npy", z)
@@ -242,20 +223,6 @@ def test_height_scale__opens_a_file_that_states_a_wrong_unit():
     assert 1e-6 < float(h.std()) < 1e-5
     with refused("height_scale", 0):
         open_scan(path, spacing="0.645 um", height_scale=0)
-
-
-def test_keys__of_cards_and_options_of_the_command(tmp_path, monkeypatch):
-    path = write_x3p(tmp_path / "s.x3p", np.where(tilted() > 1.3e-5, -0.5, tilted()))
-    text = f'file = "s.x3p"\nsha256 = "{sha256(path)}"\nno_data = -0.5\nheight_scale = 0.5\n'
-    h = open_scan(card(tmp_path, text))
-    np.testing.assert_allclose(h, np.where(tilted() > 1.3e-5, np.nan, 0.5 * tilted()), rtol=1e-12)
-    monkeypatch.chdir(tmp_path)
-    options = ["--no-data", "-0.5", "--height-scale", "0.5", "--card"]
-    done = CliRunner().invoke(main, ["scan", "s.x3p", *options], catch_exceptions=False)
-    assert done.exit_code == 0
-    assert "Warning" not in done.output
-    assert "no_data = -0.5\nheight_scale = 0.5" in done.output
-    assert "no_data = -0.5\nheight_scale = 0.5" in (tmp_path / "s.toml").read_text()
 
 
 # -- points and tables -------------------------------------------------------------------------------------------------
@@ -333,14 +300,6 @@ def test_points__without_data_are_missing_before_they_are_sorted_into_cells(opti
     assert float(np.abs(h).max()) < 3e-6
     np.testing.assert_array_equal(h, open_scan(tmp_path / "known.xyz", unit="um", **options))
     np.testing.assert_array_equal(h, open_scan(tmp_path / "p.xyz", unit="um", no_data=-9999, **options))
-
-
-def test_points__two_at_one_node_are_no_lattice(tmp_path):
-    some = points()
-    np.savetxt(tmp_path / "p.xyz", np.vstack([some, some[:1] + np.array([0, 0, 1.0])]))
-    with refused("grid"):
-        open_scan(tmp_path / "p.xyz", unit="um")
-    assert open_scan(tmp_path / "p.xyz", unit="um", grid="6 um").shape == (13, 15)
 
 
 def test_grid__is_refused_for_a_map(tmp_path):

@@ -185,13 +185,6 @@ def test_heights__that_are_none_are_missing_if_many_and_refused_if_few(number, t
         from_array(many, CELL)
 
 
-@pytest.mark.parametrize("cell", [(0.1, 1e-6), (1e-6, 5e-12)])
-def test_refusal__implausible_spacing(cell, tmp_path):
-    pytest.importorskip("x3pio").write(tmp_path / "s.x3p", tilted().T, x_scale=cell[0], y_scale=cell[1])
-    assert "not plausible" in refusal(tmp_path / "s.x3p")
-    np.testing.assert_allclose(spacing(open_scan(tmp_path / "s.x3p", spacing=CELL)), CELL)
-
-
 def test_supported_formats__names_those_of_all_libraries():
     formats = supported_formats()
     assert {"x3p", "sdf", "nc", "card", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(formats)

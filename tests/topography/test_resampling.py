@@ -85,10 +85,3 @@ def test_is_periodic__of_what_was_made_to_repeat_as_long_as_it_does(h, tmp_path)
     others = [rv.crop(h, x=limits), h.isel(x=slice(1, None)), rv.level(h), rv.gaussian_filter(h, 3.1e-4)]
     others += [h + 0.1 * h.x, rv.combine(h, sum_of_waves(h.shape).assign_coords(x=h.x, y=h.y))]
     assert not any(is_periodic(other) for other in others)
-
-
-def test_is_periodic__is_not_said_of_a_scan_unless_the_user_does():
-    scan = sum_of_waves((21, 16))
-    assert not is_periodic(scan)
-    assert is_periodic(rv.resample(scan, (30, 31), periodic=True))
-    assert not is_periodic(rv.resample(MADE["self_affine"], (30, 31), periodic=False))
