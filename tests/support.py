@@ -56,6 +56,8 @@ times = [0, "0.1 s", "200 ms"]
 """
 
 LOADS = '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n"material.kelvin_viscosity" = ["0.05 MPa s", "0.1 MPa s"]\n'
+#: Fewer cells, for what takes its time in files.
+SMALL = BALL.replace("[24, 21]", "[12, 9]")
 #: Takes some seconds a case, in steps of milliseconds.
 LONG = BALL.replace("[keep]", 'time_step = "100 us"\n[keep]')
 
@@ -162,6 +164,29 @@ over = "50 ms"
 boundary = "periodic"
 [keep]
 times = [0, "20 ms", "50 ms"]
+"""
+
+FRICTION = """
+title = "Sliding"
+[surface]
+generate = "self_affine"
+size = ["1 mm", "0.8 mm"]
+shape = [26, 21]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.5 mm"
+shortcut = "0.16 mm"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "0.3 MPa"
+kelvin_viscosity = "0.3 kPa s"
+[friction]
+pressure = "20 kPa"
+speeds = { from = "2 mm/s", to = "2 m/s", count = 4 }
+[solve]
+boundary = "periodic"
 """
 
 

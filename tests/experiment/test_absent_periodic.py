@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from samples import UNIT
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
 import roughvisc as rv
 
-UNIT = rv.elastic(0.25)  # contact modulus 1
 SHAPE, SIDE = (10, 9), 0.1
 
 

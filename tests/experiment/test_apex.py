@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from references.indenters import Cone, Paraboloid
+from samples import UNIT
 
 import roughvisc as rv
 
-UNIT = rv.elastic(0.25)  # contact modulus 1
 INDENTERS = {
     "sphere": (lambda size, shape: rv.sphere(1.0, size, shape), Paraboloid(1.0)),
     "cone": (lambda size, shape: rv.cone(1.0, size, shape), Cone(1.0)),

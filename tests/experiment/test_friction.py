@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from samples import QUICK_RUBBER as RUBBER
 from support import refused
 
 import roughvisc as rv
@@ -13,7 +14,6 @@ from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)
-RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
 PRESS = {"pressure": 2e4, "speeds": [0.2, 2e-3, 20.0]}
 
 

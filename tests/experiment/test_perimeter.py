@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from samples import UNIT
 
 import roughvisc as rv
-
-UNIT = rv.elastic(0.25)
 
 
 def pillars():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from samples import QUICK_RUBBER as RUBBER
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -11,7 +12,6 @@ from roughvisc.study.case import Case, read_study
 from roughvisc.study.si_tables import unit_of
 
 SIDE = 1e-3
-RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
 PRESS = rv.Program().pressure(1e4, over=0).hold(2e-3)
 STUDY = """
 title = "Stop and go"

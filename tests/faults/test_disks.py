@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from support import BALL
+from support import SMALL
 
 import roughvisc as rv
 from roughvisc.study.case import read_cases
 
-TWO_LOADS = BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
+TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import os
 import zipfile
 
 import pytest
-from support import BALL, refused
+from support import SMALL, refused
 
 import roughvisc as rv
 from roughvisc.cli import group
@@ -13,7 +13,6 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.tables import Wanted, read_table
 
-SMALL = BALL.replace("[24, 21]", "[12, 9]")
 NASTY = "cost $$ of_a $x \x1b[31m[/b] red"
 
 

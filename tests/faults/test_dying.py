@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL
+from support import SMALL
 
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.upkeep import clean_folder
 
-SMALL = BALL.replace("[24, 21]", "[12, 9]")
 WAYS = ("kill", "ENOSPC", "EROFS", "EIO", "MemoryError")
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")

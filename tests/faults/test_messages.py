@@ -1,13 +1,12 @@
 """Messages on the screen if another run holds a case."""
 
 import pytest
-from support import BALL
+from support import SMALL
 
 import roughvisc as rv
 from roughvisc.study.case import read_cases
 from roughvisc.study.storage.folder import lock_case, lock_path
 
-SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 
 

@@ -8,13 +8,13 @@ import time
 
 import pytest
 import xarray as xr
-from support import BALL
+from support import SMALL
 
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result
 
-MANY_STEPS = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", 'time_step = "160 us"\n[keep]')
+MANY_STEPS = SMALL.replace("[keep]", 'time_step = "160 us"\n[keep]')
 TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
 
 

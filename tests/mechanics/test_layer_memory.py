@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from samples import COMPRESSIBLE as RUBBER
+from samples import POLYMER
 from scipy import linalg
 
 import roughvisc as rv
@@ -11,7 +13,6 @@ from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
 
 SHAPE, SPACING = (7, 6), (2e-5, 3e-5)
-RUBBER, POLYMER = rv.zener(3e6, 1e6, 1e5, poisson=0.4), rv.zener(1e7, 2e6, 2e4, poisson=0.3)
 FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
 PAIRS = {"rubber on polymer": (RUBBER, POLYMER), "fluid on rubber": (FLUID, RUBBER), "rubber on soft": (RUBBER, SOFT)}
 DURATION = 1.0

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from samples import COMPRESSIBLE as RUBBER
+from samples import POLYMER
 
 import roughvisc as rv
 from roughvisc.mechanics.layer import Layers, layer_series
 from roughvisc.mechanics.sheet import Sheet
 
-RUBBER, POLYMER = rv.zener(3e6, 1e6, 1e5, poisson=0.4), rv.zener(1e7, 2e6, 2e4, poisson=0.3)
 FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
 Q, T = np.geomspace(1e2, 3e5, 19), np.geomspace(1e-5, 1.0, 17)
 

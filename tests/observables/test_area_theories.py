@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from samples import RUBBER
 from scipy.special import erf
 
 import roughvisc as rv
@@ -15,7 +16,6 @@ from roughvisc.observables import area_by_theory
 SIDE = 1e-3
 SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE / 3, seed=3)
 SLOPE = float(rv.parameters(SURFACE, periodic=True)["Sdq"])
-RUBBER = rv.zener(3e6, 1e6, 1e5)
 
 
 def loaded(times, pressures, **attrs):

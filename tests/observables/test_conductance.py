@@ -6,6 +6,7 @@ import dask.array
 import numpy as np
 import pytest
 import xarray as xr
+from samples import RUBBER
 from support import refused
 
 import roughvisc as rv
@@ -15,7 +16,6 @@ from roughvisc.mechanics.transport.spots import frozen_contact
 from roughvisc.observables import conductance, incremental_stiffness
 
 RADIUS = 1e-2
-RUBBER = rv.zener(3e6, 1e6, 1e5)
 
 
 def pressed(material=RUBBER, load=0.02, cells=63, **settings):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import references
 import xarray as xr
+from samples import RUBBER
 from scipy.integrate import cumulative_trapezoid
 from support import refused
 
@@ -12,7 +13,6 @@ from roughvisc import observables
 from roughvisc.errors import InputError
 
 PERIOD, RADIUS = 0.5, 1e-4
-RUBBER = rv.zener(3e6, 1e6, 1e5)
 
 
 def histories(time, force, approach):

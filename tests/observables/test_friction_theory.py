@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from samples import QUICK_RUBBER as RUBBER
 from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
@@ -15,7 +16,6 @@ from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 from roughvisc.observables.theory import friction_of_waves
 
 SIDE, SPEED = 1e-3, 0.1
-RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
 
 
 def sliding_on(shape, material=RUBBER, body=HALF_SPACE):

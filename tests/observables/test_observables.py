@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sample_results as made
 import xarray as xr
+from samples import RUBBER
 from support import refused
 
 import roughvisc as rv
@@ -137,7 +138,6 @@ def test_observables__are_lazy_on_dask_and_the_same(make, observe):
 
 ROUGH = rv.self_affine(1e-3, (20, 17), hurst=0.8, rms_slope=0.1, seed=1)
 CYCLES = rv.Program.cycle(mean=0.02, amplitude=0.01, period=0.1, cycles=1)
-RUBBER = rv.zener(3e6, 1e6, 1e5)
 PRESSED = {
     "elastic": (rv.sphere(1e-2, 2e-3, (16, 15)), rv.elastic(3e6), {}),
     "viscoelastic": (rv.sphere(1e-2, 2e-3, (16, 15)), RUBBER, {}),

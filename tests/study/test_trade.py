@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from support import PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
+from support import FRICTION, PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
 
 import roughvisc as rv
 from roughvisc.study.neighbours import on_cells
@@ -28,27 +28,7 @@ kelvin_viscosity = "0.3 kPa s"
 [solve]
 boundary = "periodic"
 """
-CURVE = """
-[surface]
-generate = "self_affine"
-size = ["1 mm", "0.8 mm"]
-shape = [26, 21]
-hurst = 0.8
-rms_slope = 0.1
-rolloff = "0.5 mm"
-shortcut = "0.16 mm"
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.3 MPa"
-kelvin_viscosity = "0.3 kPa s"
-[friction]
-pressure = "20 kPa"
-speeds = ["5 mm/s", "0.2 m/s"]
-[solve]
-boundary = "periodic"
-"""
+CURVE = FRICTION.replace('{ from = "2 mm/s", to = "2 m/s", count = 4 }', '["5 mm/s", "0.2 m/s"]')
 SLIDES = (
     WAVE
     + """
@@ -62,7 +42,7 @@ speed = "0.1 m/s"
 hold = "2 ms"
 """
 )
-FRICTION, AREA = "friction_coefficient", "contact_area"
+RUBBING, AREA = "friction_coefficient", "contact_area"
 
 
 def errors_of(ds, name):
@@ -94,7 +74,7 @@ def test_finer_grid__has_the_smaller_errors_and_takes_more_transforms(tmp_path):
 def test_friction__errors_are_those_against_its_finest_run(tmp_path):
     case = case_of(tmp_path, CURVE)
     ds = measured(case, (0.1, 1), (0.01, 1), (1e-3, 2.0))
-    assert set(ds.quantity.values) == {"pressure", "approach", AREA, "mean_gap", FRICTION}
+    assert set(ds.quantity.values) == {"pressure", "approach", AREA, "mean_gap", RUBBING}
 
     def curve(height, tolerance):
         return rv.friction(height, case.material, pressure=2e4, speeds=[5e-3, 0.2], tolerance=tolerance, progress=False)
@@ -102,7 +82,7 @@ def test_friction__errors_are_those_against_its_finest_run(tmp_path):
     fine = curve(case.height(), 2e-4)
     few = rv.resample(case.height(), (13, 10), periodic=True)
     runs = [curve(case.height(), 0.1), curve(case.height(), 0.01), curve(few, 1e-3)]
-    for name in (FRICTION, AREA, "approach", "mean_gap"):
+    for name in (RUBBING, AREA, "approach", "mean_gap"):
         expected = [float(abs(run[name] - fine[name]).max() / fine[name].max()) for run in runs]
         assert errors_of(ds, name) == pytest.approx(expected, rel=1e-9), name
     assert ds.steps.values.tolist() == [2, 2, 2]
@@ -114,8 +94,8 @@ def test_friction__uncertainty_of_the_finest_run_holds_its_true_error(tmp_path):
     ds = measured(case, (1e-3, 1))
     wave = {"amplitude": 2e-6, "wavelength": 1e-3, "size": (1e-3, 1e-3), "waves": 1}
     solve = {"pressure": 1e4, "speeds": [0.03, 0.3], "tolerance": 2e-4, "progress": False}
-    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material, **solve) for cells in (192, 24))
-    for name in (FRICTION, AREA, "approach", "mean_gap"):
+    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material(), **solve) for cells in (192, 24))
+    for name in (RUBBING, AREA, "approach", "mean_gap"):
         true = float(abs(found[name] - fine[name]).max() / fine[name].max())
         assert 0.3 * true < uncertainty(ds, name) < 1, name
 
@@ -130,7 +110,7 @@ def test_slides__are_compared_where_the_profile_has_moved_by_whole_cells_of_all_
     inside = cells[(cells > 1e-9) & (cells < 6 - 1e-9)]
     assert len(inside) >= least
     assert inside == pytest.approx(np.round(inside), abs=1e-9)
-    assert errors_of(ds, FRICTION)[0] < errors_of(ds, FRICTION)[1] < 0.1
+    assert errors_of(ds, RUBBING)[0] < errors_of(ds, RUBBING)[1] < 0.1
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -175,7 +155,7 @@ def test_budget__stops_runs_and_refuses_a_reference_that_takes_too_long(tmp_path
         ([(1e-3, 0.0)], {}, "settings", 0.0),
         ([], {}, "settings", []),
         ([(1e-3, 1)], {"quantity": ["colour"]}, "quantity", "colour"),
-        ([(1e-3, 1)], {"quantity": FRICTION}, "quantity", FRICTION),
+        ([(1e-3, 1)], {"quantity": RUBBING}, "quantity", RUBBING),
     ],
 )
 def test_trade__refuses(tmp_path, settings, options, key, found):

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from support import FRICTION
 
 import roughvisc as rv
 from roughvisc.study.case import read_study, vary
@@ -14,28 +15,6 @@ pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
 )
 
-FRICTION = """
-title = "Sliding"
-[surface]
-generate = "self_affine"
-size = ["1 mm", "0.8 mm"]
-shape = [26, 21]
-hurst = 0.8
-rms_slope = 0.1
-rolloff = "0.5 mm"
-shortcut = "0.16 mm"
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.3 MPa"
-kelvin_viscosity = "0.3 kPa s"
-[friction]
-pressure = "20 kPa"
-speeds = { from = "2 mm/s", to = "2 m/s", count = 4 }
-[solve]
-boundary = "periodic"
-"""
 BESIDE = '[solve]\ngrid_error = true\nboundary = "periodic"\n'
 PRESSURES = '[sweep]\n"friction.pressure" = ["20 kPa", "40 kPa"]\n'
 TEMPERATURES = FRICTION.replace(

@@ -4,10 +4,8 @@ import subprocess
 import sys
 
 import pytest
-from support import BALL
+from support import SMALL
 
-#: A ball on a coarse grid: most of its time goes to files.
-SMALL = BALL.replace("[24, 21]", "[12, 9]")
 SCRIPT = """
 import sys, dask, roughvisc as rv
 cases = rv.read_cases("balls.toml")

@@ -1,6 +1,7 @@
 """``[material.on]`` in a study: the body that it makes, what it refuses, and what identifies its case."""
 
 import pytest
+from samples import RUBBER
 from support import BALL, refused
 
 import roughvisc as rv
@@ -20,7 +21,6 @@ shear_modulus = "3 MPa"
 kelvin_modulus = "1 MPa"
 kelvin_viscosity = "0.1 MPa s"
 """
-RUBBER = rv.zener(3e6, 1e6, 1e5)
 
 
 @pytest.fixture
