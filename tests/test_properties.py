@@ -128,19 +128,6 @@ def test_elastic_work__is_the_stored_energy_whatever_the_steps(boundary):
     assert abs(float(few.work[1])) < 1e-12 * float(few.work[0])
 
 
-@pytest.mark.parametrize(
-    "material", [rv.kelvin_voigt(1.0, 1.0), rv.zener(50.0, 5.0, 0.3), rv.power_law(0.0, 1.0, 0.6)], ids=str
-)
-def test_flat_periodic_surface__is_not_stepped_for_its_rounding(material):
-    """Its approach is zero: rounding relative to rounding once drove the steps to their least."""
-    flat = 0 * rv.self_affine((0.7, 1.0), (5, 6), hurst=0.7, rms_slope=0.1, seed=3)
-    steps = []
-    ds = simulate(flat, material, rv.Program().load(0.017, over=0.1), "periodic", progress=lambda a, b: steps.append(a))
-    assert len(steps) < 500
-    assert np.abs(ds.approach.values).max() < 1e-12
-    np.testing.assert_allclose(ds.pressure.values[-1], 0.017 / 0.7, rtol=1e-9)
-
-
 def test_random_cases__are_contact_states(monkeypatch, capsys):
     """A few of the cases of workflows/benchmarks/random_cases.py."""
     monkeypatch.syspath_prepend(str(pathlib.Path(__file__).parents[1] / "workflows" / "benchmarks"))

@@ -127,13 +127,6 @@ def test_steps__of_another_result_are_refused(ball, heavier, change):
         _ = change(ball, heavier).roughvisc.steps
 
 
-def test_concat__keeps_every_variable_of_both(ball, heavier):
-    both = concatenated([ball, heavier], "load", data_vars="all")
-    assert set(both.variables) == set(ball.variables)
-    for number, one in enumerate((ball, heavier)):
-        xr.testing.assert_equal(both.isel(load=number), one)
-
-
 @pytest.mark.parametrize("experiment", ["history", "friction"])
 def test_netcdf_of_xarray__loses_the_steps_alone(stored, experiment, tmp_path):
     ds = stored

@@ -7,12 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from samples import Scaled
 from scipy import fft
 from support import assert_same, numbers
 
 import roughvisc as rv
-from roughvisc.mechanics.body import Kernel
-from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution.run import run_case
 
@@ -260,21 +259,6 @@ def test_threads__change_no_bit(kind, done, monkeypatch):
     one, two = (computed(done.case, threads=number).drop_vars("wall_time") for number in (1, 2))
     assert used == {1, 2}
     xr.testing.assert_identical(one, two)
-
-
-@dataclass(frozen=True)
-class Scaled(Kernel):
-    """A half-space of so many times the compliance."""
-
-    factor: float
-    raises_surface: bool = False
-
-    def influence(self, shape, spacing):
-        return self.factor * love_kernel(shape, spacing)
-
-    def transfer(self, qx, qy):
-        magnitude = np.hypot(qx, qy)
-        return 2 * self.factor / np.where(magnitude > 0, magnitude, np.inf)
 
 
 def test_own_body__is_what_its_kernel_says(kind, done):

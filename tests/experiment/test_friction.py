@@ -35,21 +35,6 @@ def test_dataset__is_labelled_and_in_the_order_given(curve):
     assert float(curve.friction_coefficient[0]) == float(curve.friction_coefficient.max())
 
 
-def test_dataset__agrees_with_itself(curve):
-    area = 1e-3 * 0.8e-3
-    np.testing.assert_allclose(curve.force, 2e4 * area)
-    np.testing.assert_allclose(curve.nominal_pressure, 2e4)
-    np.testing.assert_allclose(curve.pressure.mean(("x", "y")), 2e4, rtol=1e-12)
-    np.testing.assert_allclose(curve.friction_coefficient * curve.force, curve.friction_force)
-    np.testing.assert_allclose(
-        curve.contact_fraction * curve.contact_area_counted / curve.contact_area, (curve.pressure > 0).mean(("x", "y"))
-    )
-    np.testing.assert_allclose(curve.mean_gap, curve.gap.mean(("x", "y")))
-    assert ((curve.pressure == 0) | (curve.gap == 0)).all()
-    assert "slope_friction_force" not in curve
-    assert (curve.contact_area < curve.contact_area_counted).all()
-
-
 def test_directions__are_those_of_a_turned_surface():
     """Whichever the direction, as along x of the surface turned by so many right angles."""
     one = {"pressure": 2e4, "speeds": 0.2, "fields": ("pressure",)}
@@ -84,14 +69,6 @@ def test_force_across__is_to_the_left_of_the_motion(direction, across):
     assert (found.friction_force > 0).all()
 
 
-def test_sheet__rubs_less_as_it_is_thinner(curve):
-    thin = rv.friction(ROUGH, rv.sheet(RUBBER, 2e-5), pressure=2e4, speeds=0.2)
-    assert (thin.attrs["thickness"], thin.attrs["base"]) == (2e-5, "bonded")
-    assert float(thin.contact_area[0]) < 0.9 * float(curve.contact_area[0])
-    thick = rv.friction(ROUGH, rv.sheet(RUBBER, 1e-2), pressure=2e4, speeds=0.2)
-    assert float(thick.friction_coefficient[0]) == pytest.approx(float(curve.friction_coefficient[0]), rel=1e-3)
-
-
 def test_persson__is_that_of_the_surface_as_it_slides(curve):
     """In full contact the theory is exact, whichever the direction; in partial contact its area is not far off."""
     pressed = {"pressure": 1e7, "speeds": [0.02, 0.2], "tolerance": 1e-6}
@@ -102,14 +79,6 @@ def test_persson__is_that_of_the_surface_as_it_slides(curve):
         np.testing.assert_allclose(theory.persson_friction_coefficient, full.friction_coefficient, rtol=1e-5)
     theory = rv.observables.persson(curve, material=RUBBER)
     np.testing.assert_allclose(theory.persson_contact_fraction, curve.contact_fraction, rtol=0.5)
-
-
-def test_measured_material__by_its_series(curve):
-    t = np.geomspace(1e-9, 1e4, 1400)
-    table = rv.creep_table(tuple(t), tuple(RUBBER.creep_compliance(t)))
-    found = rv.friction(ROUGH, table, **PRESS)
-    # a table bends between its rows: its loss is known to some parts in a thousand of the compliance
-    np.testing.assert_allclose(found.friction_coefficient[:2], curve.friction_coefficient[:2], rtol=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -71,13 +71,6 @@ def test_leak_rate__is_that_of_the_unfolded_surface(pair, along):
     assert found.leak_rate.attrs["sides"] == "closed"
 
 
-def test_conductance__is_a_quarter_of_that_of_the_unfolded_surface(pair):
-    found, whole = (
-        ds.roughvisc.conductance((1e-7, 0.0), kind="electrical").electrical_conductance.values for ds in pair
-    )
-    assert found[found > 0] == pytest.approx(whole[whole > 0] / 4, rel=1e-4)
-
-
 def test_stated_errors__are_those_of_the_unfolded_surface(pair):
     found, whole = pair
     assert found.contact_area_error.values == pytest.approx(whole.contact_area_error.values / 4, rel=0.02)

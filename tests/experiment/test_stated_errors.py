@@ -98,15 +98,6 @@ def test_missed_tolerance__gives_one_warning_and_an_attribute():
     assert "tolerance: " not in ds.attrs.get("warnings", "")
 
 
-def test_power_law__meets_the_tolerance_or_warns():
-    """2.3 % of the compliance is instantaneous: cells that enter carry a jump of pressure."""
-    program, ball = rv.Program().load(5e-3, over=0.1).hold(1.0), rv.sphere(10e-3, 1e-3, 65)
-    with warnings.catch_warnings(record=True) as warned:
-        warnings.simplefilter("always")
-        ds = rv.simulate(ball, rv.power_law(1e-8, 4e-7, 0.5), program, times=8, fields=(), progress=False)
-    assert len(warned) == int(ds.stated_error.max() > ds.attrs["tolerance"])
-
-
 @pytest.mark.parametrize(("rows", "sparse"), [(3, True), (13, False)])
 def test_creep_table__warns_if_rows_are_more_than_a_decade_apart(rows, sparse):
     exact = rv.power_law(1e-6, 1e-6, 0.5)

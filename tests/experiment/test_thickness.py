@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from references import OnSheet, PunchOnSheet, ting
+from references import OnSheet, ting
 from references.growing_contact import StepLoad
 from references.indenters import Paraboloid
 from scipy.interpolate import CubicSpline
@@ -48,37 +48,6 @@ def test_creeping_sphere__agrees_with_the_integral_equation(poisson, base):
     ds = pressed(ball, rubber, rv.Program().load(2e-3, over=0).hold(2.0), base=base, times=times, fields=())
     np.testing.assert_allclose(ds.approach, exact.approach(times), rtol=1e-3)
     np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=2e-3)
-
-
-def orders(exact, thickness, cells=(33, 65, 129)):
-    """Orders in the cell's side of approach and pressure (L1) under a sphere, at a contact radius of 0.1 mm."""
-    a = THICKNESS
-    load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
-    errors = []
-    for count in cells:
-        ball = rv.sphere(RADIUS, 2.6 * a, count)
-        ds = pressed(ball, rv.elastic(1e6), load, tolerance=1e-6, thickness=thickness)
-        found = ds.pressure[0]
-        at = exact.scaled_pressure(np.hypot(found.x.values[:, None] - 1.3 * a, found.y.values - 1.3 * a), a) * 4e6
-        approach = abs(float(ds.approach[0]) / float(exact.reduced(a)) - 1)
-        errors.append((approach, np.abs(found.values - at).sum() / at.sum()))
-    return -np.polyfit(np.log(cells), np.log(errors), 1)[0]
-
-
-def test_sphere__converges_as_on_a_half_space():
-    on_sheet = orders(OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS)), THICKNESS)
-    on_half_space = orders(Paraboloid(RADIUS), None)
-    assert on_sheet[0] > 1.6
-    np.testing.assert_allclose(on_sheet, on_half_space, atol=0.1)
-
-
-def test_flat_punch__agrees_with_the_integral_equation_up_to_its_outline():
-    """Of counted cells it has a radius right to half of one, as on a half-space: the ratio of both is closer."""
-    sheet, a, cells = Sheet(THICKNESS), THICKNESS, 65
-    load, punch = rv.Program().load(1e-3, over=0), rv.flat_punch(a, 2.6 * a, cells)
-    on_sheet, on_half_space = (pressed(punch, rv.elastic(1e6), load, thickness=h) for h in (THICKNESS, None))
-    stiffer = float(on_half_space.approach[0] / on_sheet.approach[0])
-    assert stiffer == pytest.approx(PunchOnSheet(a, sheet).scaled_stiffness / (2 * a), rel=1.3 / cells)
 
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.5, "bonded"), (0.5, "slipping")])

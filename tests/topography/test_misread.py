@@ -16,7 +16,6 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.points import lattice
 from roughvisc.topography.readers import list_channels
 from roughvisc.topography.scans import open_scan
 
@@ -247,26 +246,6 @@ def test_points__near_a_lattice_are_that_lattice(jitter, tmp_path):
     np.testing.assert_allclose(h, 1e-6 * (np.sin(0.2 * x) + np.cos(0.15 * y)), atol=1e-6 * jitter)
 
 
-@pytest.mark.parametrize(("oblique", "is_lattice"), [(1e-3, True), (0.009, True), (0.02, False)])
-def test_points__of_oblique_rows_are_a_lattice_up_to_a_hundredth(oblique, is_lattice):
-    some = points(jitter=1e-3)
-    straight, steps = lattice(some)
-    for axis in (0, 1):
-        turned = some.copy()
-        turned[:, axis] += oblique * some[:, 1 - axis]
-        found = lattice(turned)
-        assert (found is not None) == is_lattice
-        if found is not None:
-            np.testing.assert_array_equal(found[0], straight)
-            np.testing.assert_allclose(found[1], steps, rtol=1e-5)  # jitter times the angle
-
-
-def test_points__absent_from_the_lattice_are_missing(tmp_path):
-    some = points()[:1100]
-    np.savetxt(tmp_path / "p.xyz", some, header="x y z", comments="")
-    assert int(np.isnan(open_scan(tmp_path / "p.xyz", unit="um")).sum()) == 100
-
-
 def test_points__off_any_lattice_ask_for_a_grid_and_count_empty_cells(tmp_path):
     np.savetxt(tmp_path / "p.csv", points(jitter=0.3), delimiter=",")
     with refused("grid"):
@@ -300,15 +279,6 @@ def test_points__without_data_are_missing_before_they_are_sorted_into_cells(opti
     assert float(np.abs(h).max()) < 3e-6
     np.testing.assert_array_equal(h, open_scan(tmp_path / "known.xyz", unit="um", **options))
     np.testing.assert_array_equal(h, open_scan(tmp_path / "p.xyz", unit="um", no_data=-9999, **options))
-
-
-def test_grid__is_refused_for_a_map(tmp_path):
-    np.save(tmp_path / "m.npy", ROUGH)
-    with refused("grid"):
-        open_scan(tmp_path / "m.npy", unit="um", spacing="1 um", grid="2 um")
-    np.savetxt(tmp_path / "p.xyz", points())
-    with refused("grid"):
-        open_scan(tmp_path / "p.xyz", unit="um", spacing="1 um", grid="2 um")
 
 
 def test_x3p__point_cloud_is_points_and_not_a_profile(tmp_path):

@@ -26,7 +26,7 @@ from support import refused
 from roughvisc.errors import InputError
 from roughvisc.topography.formats import Channel, ScanFile, add_format, registry
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, list_channels, supported_formats
+from roughvisc.topography.readers import from_array, supported_formats
 from roughvisc.topography.scans import open_scan
 
 # -- every row of the table beside the real files ----------------------------------------------------------------------
@@ -68,25 +68,6 @@ def test_real_scan__libraries_agree_on_orientation_and_scale(name):
     theirs = io.read_topography(str(SCANS / name), format=h.attrs["format"]).to_unit("m")
     np.testing.assert_allclose(h, np.ma.filled(theirs.heights(), np.nan), rtol=1e-12, atol=1e-20)
     np.testing.assert_allclose(spacing(h), np.array(theirs.physical_sizes) / h.shape, rtol=1e-9)
-
-
-@real
-def test_real_scan__chosen_channel_is_named_and_others_listed():
-    h = open_scan(SCANS / "di-3.di")
-    assert h.attrs["channel"] == "ZSensor"
-    assert h.attrs["other_channels"] == "AmplitudeError, Phase, Height"
-    channels = list_channels(SCANS / "di-3.di")
-    assert [(c.name, c.is_height) for c in channels] == [
-        ("ZSensor", True),
-        ("AmplitudeError", False),
-        ("Phase", False),
-        ("Height", True),
-    ]
-    by_name, by_number = (open_scan(SCANS / "di-3.di", channel=c) for c in ("Height", 3))
-    xr.testing.assert_equal(by_name, by_number)
-    assert not by_name.equals(h)
-    assert "no areal height" in refusal(SCANS / "di-3.di", channel="Phase")
-    assert "'ZSensor'" in refusal(SCANS / "di-3.di", channel="Friction")
 
 
 @real
@@ -139,14 +120,6 @@ def test_x3p__wrong_checksum_is_a_warning_of_ours(tmp_path):
     with pytest.warns(UserWarning, match=r"bad\.x3p: its checksum is wrong"):
         h = open_scan(bad)
     np.testing.assert_array_equal(h, tilted())
-
-
-def test_x3p__layers_are_channels(tmp_path):
-    x3pio = pytest.importorskip("x3pio")
-    x3pio.write(tmp_path / "s.x3p", np.stack([tilted().T, 2 * tilted().T]), x_scale=CELL[0], y_scale=CELL[1])
-    assert open_scan(tmp_path / "s.x3p").attrs["other_channels"] == "layer 1"
-    np.testing.assert_array_equal(open_scan(tmp_path / "s.x3p", channel=1), 2 * tilted())
-    assert [c.shape for c in list_channels(tmp_path / "s.x3p")] == [SHAPE, SHAPE]
 
 
 # -- refusals ----------------------------------------------------------------------------------------------------------

@@ -161,17 +161,6 @@ def test_self_affine__a_seed_is_one_surface_on_every_grid_that_holds_its_waves(s
     np.testing.assert_allclose(third[1::3, 1::3], h, rtol=0, atol=1e-11 * float(abs(h).max()))
 
 
-@pytest.mark.parametrize("amplitudes", ["fixed", "gaussian"])
-def test_self_affine__without_a_cut_off_a_finer_grid_adds_waves_and_keeps_the_others_but_for_one_factor(amplitudes):
-    made = {"hurst": 0.8, "rms_slope": 0.1, "amplitudes": amplitudes, "seed": 4}
-    few, many = (waves_of(self_affine(SIZE, shape, **made)) for shape in ((24, 17), (45, 38)))
-    ratios = np.array([many[k] / few[k] for k in few if abs(few[k]) > 1e-12])
-    assert len(ratios) > 90
-    np.testing.assert_allclose(ratios, ratios[0].real, rtol=1e-9)
-    assert 0.5 < ratios[0].real < 0.95
-    assert sum(abs(many[k]) > 1e-12 for k in many) > 2 * len(ratios)
-
-
 def test_self_affine__gaussian_amplitudes_scatter_as_those_of_a_random_field():
     """Moments of an exponential distribution for the power of each wave; the variance of the mean square follows."""
     made = {"hurst": 0.8, "rms_height": 2e-6, "rolloff": 8e-4, "shortcut": 4e-4}

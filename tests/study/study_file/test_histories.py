@@ -133,17 +133,6 @@ def test_thinned__passes_every_row_within_the_tolerance(rows, tolerance):
     assert distance(times, values, kept) <= tolerance * (1 + 1e-9)
 
 
-def test_thinned__finds_the_corners_of_a_noisy_trapezium():
-    times = np.linspace(0, 10, 5001)
-    clean = np.interp(times, [0, 2, 7, 10], [0, 1, 1, 0.4])
-    noisy = clean + 0.004 * np.random.default_rng(1).uniform(-1, 1, times.size)
-    kept = thinned(times, noisy, 0.01)
-    assert 4 <= len(kept) <= 6  # three segments are there
-    assert distance(times, noisy, kept) <= 0.01
-    assert len(thinned(times, clean, 1e-6)) == 4
-    assert len(thinned(times, clean, 0)) == 5001
-
-
 def test_study__takes_columns_by_key_and_keeps_the_case_whole(tmp_path):
     path = write(tmp_path, "Zeit [s];Druck [kPa];Weg [um]\n2,5;0;0\n3,5;20;2\n4,5;20;1")
     study = tmp_path / "study.toml"

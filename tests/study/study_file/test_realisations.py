@@ -5,9 +5,7 @@ import pytest
 from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study, vary
-from roughvisc.topography.conditioning import condition
 
 ROUGH = """
 [surface]
@@ -105,11 +103,6 @@ def test_realisations__are_refused_where_they_make_no_sense(study, surface, swee
         read_cases(study(surface, f"[sweep]\n{sweep}\n"))
 
 
-def test_realisations__a_case_that_is_refused_says_which_it_is(study):
-    with pytest.raises(InputError, match=r"case 0 .*solve.boundary: "):  # its surrogates repeat, while it does not
-        read_cases(study(SCAN, "[sweep]\nrealisations = 2\n"))
-
-
 def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatment(tmp_path):
     """With a common seed, the first surrogates of all scans deviate in the same direction."""
     spectrum = {"hurst": 0.8, "rms_height": 1e-6, "rolloff": 4e-5}
@@ -129,9 +122,3 @@ def test_surrogates__of_each_scan_are_drawn_anew_and_do_not_depend_on_its_treatm
     np.testing.assert_allclose(waves('file = "card.toml"'), first)
     (tmp_path / "copy.x3p").write_bytes((tmp_path / "1.x3p").read_bytes())
     np.testing.assert_allclose(waves('file = "copy.x3p"'), first, err_msg="by the content, not by the name")
-
-
-@pytest.mark.parametrize(("table", "named"), [({"seed": 3}, "number"), ({"number": 1, "sed": 3}, "sed")])
-def test_realisation__that_is_a_wrong_table_is_refused(table, named):
-    with pytest.raises(InputError, match=named):
-        condition(rv.self_affine(1e-4, (33, 30), hurst=0.8, rms_height=1e-6, seed=1), {"realisation": table})

@@ -1,7 +1,6 @@
 """``[surface.second]``: the face that lies on the first."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +8,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.study.case import Case, vary
-from roughvisc.study.neighbours import is_data, on_cells
-from roughvisc.study.si_tables import unit_of
 
-WORKFLOWS = Path(__file__).parents[3] / "workflows"
 ROUGH = {"generate": "self_affine", "hurst": 0.7, "rms_height": "0.5 um", "size": "1 mm", "shape": [64, 48], "seed": 4}
 HEAD = """
 [surface]
@@ -75,13 +71,6 @@ def test_second__runs_and_says_so(two, tmp_path):
     ds.close()
 
 
-def test_second__is_data_of_which_a_trade_keeps_the_waves_that_a_coarser_grid_holds(two):
-    assert is_data(two)
-    shape = two.height().shape
-    assert on_cells(two, two.height(), 2.0).surface["resample"] == [round(n / 2) for n in shape]
-    assert unit_of("surface.second.offset") == unit_of("surface.second.radius") == "m"
-
-
 @pytest.mark.parametrize(
     ("key", "value", "at_fault", "found"),
     [
@@ -97,13 +86,3 @@ def test_second__is_data_of_which_a_trade_keeps_the_waves_that_a_coarser_grid_ho
 def test_second__is_refused_at_the_key(two, key, value, at_fault, found):
     with refused(at_fault, found):
         vary(two, {f"surface.{key}": value})
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "at_fault"),
-    [("offset", ["1 m", 0], "surface.second"), ("crop", {"x": [0, 1e-6]}, "surface.second.crop.x")],
-)
-def test_second__that_does_not_fit_is_refused_with_the_heights(two, key, value, at_fault):
-    case = vary(two, {f"surface.second.{key}": value})
-    with refused(at_fault):
-        case.height()

@@ -20,13 +20,6 @@ def test_unit_of__is_that_of_the_argument_of_every_model_and_recipe(table, funct
         assert unit_of(f"{table}.{name}") == ("" if unit == "1" else unit)
 
 
-def test_unit_of__words_counts_and_unknown_keys_have_none():
-    for key in ("surface.seed", "surface.level", "solve.boundary", "solve.tolerance", "keep.times", "keep.fields"):
-        assert unit_of(key) == ""
-    for key in ("", "program", "program.0", "program.first.load", "material.colour", "nothing.load", "title"):
-        assert unit_of(key) == ""
-
-
 def test_unit_of__a_number_or_a_word_a_list_and_what_is_inside():
     assert unit_of("solve.time_step") == "s"
     assert [unit_of(f"surface.{key}") for key in ("size", "spacing", "crop.x", "crop.x.0")] == ["m"] * 4
@@ -46,7 +39,3 @@ def test_unit_of__what_has_two_units_needs_the_case():
         assert unit_of("program.0.cycle.mean", CYCLES[control]) == unit
         assert unit_of("program.0.table.values", TABLES[control]) == unit
     assert unit_of("program.0.cycle.mean", {"program": [{"cycle": {}}]}) == "N", "of load unless it says otherwise"
-
-
-def test_unit_of__a_case_of_another_model_tells_nothing_against_it():
-    assert unit_of("material.viscosity", {"material": {"model": "elastic"}}) == "Pa s"
