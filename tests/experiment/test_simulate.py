@@ -48,9 +48,10 @@ def test_result__is_a_contact_state():
     assert ds.mean_gap.values == pytest.approx(ds.gap.mean(("x", "y")).values)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("material", "duration"),
-    [pytest.param(rv.maxwell(1e6, 1e6), 2.0, marks=pytest.mark.thorough), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
+    [(rv.maxwell(1e6, 1e6), 2.0), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
     ids=["maxwell", "zener"],
 )
 def test_seed_papers_validations__at_the_default_tolerance(material, duration):

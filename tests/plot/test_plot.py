@@ -73,7 +73,7 @@ def test_area_against_load__one_line_per_case_and_the_low_load_line():
 
 
 def test_area_against_load__of_cases_in_many_shapes():
-    one = made.hertz_cycle(30)
+    one = made.hertz_creep((21, 16))
     stacked = xr.concat([one, one], dim="case").assign_coords(program_0_load=("case", [0.5, 1.0]))
     assert {"Program 0 load 0.5", "Program 0 load 1"} <= set(lines(plot.area_against_load(stacked).axes[0]))
     assert set(lines(plot.area_against_load(one).axes[0])) == {"computed"}

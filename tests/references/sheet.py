@@ -68,9 +68,9 @@ class OnSheet:
     Examples
     --------
     >>> from references.indenters import Paraboloid
-    >>> thick, thin = (OnSheet(Paraboloid(1.0), Sheet(h, base="slipping")) for h in (1e3, 1e-3))
-    >>> round(float(thick.scaled_force(0.1)), 6), round(float(thin.scaled_force(0.1)), 3)  # 4 a^3/3R, pi a^4/4Rh
-    (0.001333, 0.079)
+    >>> thick = OnSheet(Paraboloid(1.0), Sheet(1e3, base="slipping"))
+    >>> round(float(thick.scaled_force(0.1)), 6)  # 4 a^3 / 3 R
+    0.001333
     """
 
     indenter: Indenter

@@ -101,6 +101,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
         report([ds])
 
 
+@pytest.mark.thorough
 def test_page__holds_the_study_that_gives_the_result_again(page, folder, tmp_path):
     found = [html.unescape(one) for one in re.findall(r"<pre>(title = .*?)</pre>", page, re.S)]
     assert len(found) == 3
