@@ -117,7 +117,7 @@ def test_command__writes_the_page_and_refuses_an_empty_folder(folder, tmp_path, 
     monkeypatch.chdir(tmp_path)
     file = next(folder.glob("*.nc"))
     done = CliRunner().invoke(main, ["report", str(file), "-o", "mine.html"])
-    assert (done.exit_code, done.output) == (0, "Report: mine.html\n")
+    assert (done.exit_code, done.output.endswith("Report: mine.html\n")) == (0, True)
     (tmp_path / "empty").mkdir()
     assert CliRunner().invoke(main, ["report", "empty"]).exit_code == 2
 
