@@ -94,7 +94,7 @@ def test_friction__uncertainty_of_the_finest_run_holds_its_true_error(tmp_path):
     ds = measured(case, (1e-3, 1))
     wave = {"amplitude": 2e-6, "wavelength": 1e-3, "size": (1e-3, 1e-3), "waves": 1}
     solve = {"pressure": 1e4, "speeds": [0.03, 0.3], "tolerance": 2e-4, "progress": False}
-    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material(), **solve) for cells in (192, 24))
+    fine, found = (rv.friction(rv.wavy(shape=(cells, 2), **wave), case.material, **solve) for cells in (192, 24))
     for name in (RUBBING, AREA, "approach", "mean_gap"):
         true = float(abs(found[name] - fine[name]).max() / fine[name].max())
         assert 0.3 * true < uncertainty(ds, name) < 1, name
