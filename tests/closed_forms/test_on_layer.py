@@ -7,23 +7,20 @@ import numpy as np
 import pytest
 from layered import (
     GrowingOnLayer,
-    creep_of_wave,
     elastic_factor,
     inverted,
-    laplace_compliance,
-    relaxation_of_wave,
 )
-from references import ElasticLayer, OnSheet, PunchOnSheet, full_contact_wave
+from references import ElasticLayer, OnSheet, PunchOnSheet
 from references.growing_contact import StepLoad
-from references.indenters import Cone, Paraboloid
+from references.indenters import Paraboloid
 from references.layer import layer_complement, layer_factor
 from scipy.special import j0
 
 import roughvisc as rv
-from roughvisc.mechanics.sheet import Sheet, reduction
+from roughvisc.mechanics.sheet import reduction
 
 POISSON = [(0.0, 0.3), (0.3, 0.3), (0.4, 0.5), (0.5, 0.5), (0.5, 0.0)]
-SOFT, STIFF = rv.zener(1e6, 3e5, 1e5, 0.4), rv.zener(5e6, 5e6, 3e6, 0.3)
+SOFT = rv.zener(1e6, 3e5, 1e5, 0.4)
 
 
 @pytest.mark.parametrize(("poisson", "base_poisson"), POISSON)
@@ -78,42 +75,24 @@ def test_limits__of_the_factor():
                 assert float(layer_complement(1e9, nu, base_nu, ratio)) == 0
 
 
-def test_stiff_layer__bends_like_a_plate_on_its_base():
-    """p = (D q^4 + 4 (1 - nu2) / (3 - 4 nu2) G2 q) u, a base that cannot spread, with the bending stiffness D.
-
-    Short of the next order in q h.
-    """
-    errors = []
-    for ratio in (1e4, 1e7):
-        x = (2 / ratio) ** (1 / 3)  # where both give way by about as much
-        modulus = 2 * ratio / (1 - 0.3)
-        plate = modulus / 12 * x**4 + 4 * (1 - 0.4) / (3 - 4 * 0.4) * x  # D = E* h^3 / 12
-        errors.append(abs(float(layer_factor(x, 0.3, 0.4, ratio)) * 2 / (modulus * x) * plate - 1))
-    assert errors[0] < 0.1
-    assert math.log(errors[0] / errors[1], 1e3) > 0.3
-
-
 # --------------------------------------------------------------------------------------------------------------
 # contact
 
 
-def gao(thickness_over_radius):
-    """H. Gao, C.-H. Chiu, J. Lee, Int. J. Solids Struct. 29 (1992) 2471: the share of the layer in the stiffness."""
-    x = thickness_over_radius
-    logarithm = math.log((1 + x**2) / x**2)
+def gao(x, nu):
+    """Share of a layer of `x` punch radii in the stiffness.
 
-    def share(nu):
-        bent = (1 - 2 * nu) * x * logarithm - x / (1 + x**2)
-        return 2 / math.pi * math.atan(x) + bent / (2 * math.pi * (1 - nu))
-
-    return share, 2 / math.pi * math.atan(x) + x / math.pi * logarithm
+    H. Gao, C.-H. Chiu, J. Lee, Int. J. Solids Struct. 29 (1992) 2471.
+    """
+    bent = (1 - 2 * nu) * x * math.log((1 + x**2) / x**2) - x / (1 + x**2)
+    return 2 / math.pi * math.atan(x) + bent / (2 * math.pi * (1 - nu))
 
 
 @pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("wide", [0.2, 1.0, 5.0])
 def test_punch__on_a_layer_of_nearly_the_bases_modulus_is_gaos(poisson, wide):
     """Exact in the first order of the difference: what is left is of second order."""
-    share = gao(1 / wide)[0](poisson)
+    share = gao(1 / wide, poisson)
     left = []
     for more in (0.02, 0.01):
         punch = PunchOnSheet(wide, ElasticLayer(1.0, poisson, poisson, 1 + more))
@@ -121,31 +100,6 @@ def test_punch__on_a_layer_of_nearly_the_bases_modulus_is_gaos(poisson, wide):
         left.append(abs(stiffness - 1 - more * share))
     assert left[0] < 0.1 * 0.02 * share
     assert math.log2(left[0] / left[1]) == pytest.approx(2, abs=0.05)
-
-
-@pytest.mark.parametrize("wide", [0.3, 1.0, 4.0])
-def test_punch__on_a_layer_of_nearly_the_bases_poissons_ratio_is_gaos(wide):
-    left = []
-    for less in (0.02, 0.01):
-        punch = PunchOnSheet(wide, ElasticLayer(1.0, 0.3 - less, 0.3, 1.0))
-        stiffness = punch.scaled_stiffness / (2 * wide) * (1 - 0.3) / (1 - 0.3 + less)
-        left.append(abs(1 / stiffness - 1 - less * gao(1 / wide)[1] / 0.7))
-    assert left[0] < 0.1 * 0.02
-    assert math.log2(left[0] / left[1]) == pytest.approx(2, abs=0.1)
-
-
-@pytest.mark.parametrize("wide", [0.1, 3.0])
-def test_contact__on_limits_of_a_layer(wide):
-    same, rigid = ElasticLayer(0.7, 0.4, 0.4, 1.0), ElasticLayer(0.7, 0.4, 0.2, 1e-14)
-    a, sheet = 0.7 * wide, Sheet(0.7, 0.4)
-    for indenter in (Paraboloid(10.0), Cone(0.1)):
-        assert float(OnSheet(indenter, same).scaled_force(a)) == pytest.approx(
-            float(indenter.scaled_force(a)), rel=1e-12
-        )
-        assert float(OnSheet(indenter, same).reduced(a)) == pytest.approx(float(indenter.reduced(a)), rel=1e-12)
-        force, depth = OnSheet(indenter, sheet).scaled_force(a), OnSheet(indenter, sheet).reduced(a)
-        assert float(OnSheet(indenter, rigid).scaled_force(a)) == pytest.approx(float(force), rel=1e-10)
-        assert float(OnSheet(indenter, rigid).reduced(a)) == pytest.approx(float(depth), rel=1e-10)
 
 
 @pytest.mark.parametrize("ratio", [0.02, 5.0, 100.0])
@@ -176,14 +130,6 @@ def test_inversion__knows_a_pair():
     np.testing.assert_allclose(inverted(lambda s: s**-1.3, t), t**0.3 / math.gamma(1.3), rtol=1e-8)
 
 
-def test_creep_and_relaxation__of_a_wave_on_one_material():
-    t, q = np.array([0.1, 0.5, 2.0]), 3.0
-    compliance = np.asarray(SOFT.contact_compliance(t))
-    np.testing.assert_allclose(creep_of_wave(q, SOFT, SOFT, 1.0, t), 2 / q * compliance, rtol=1e-8)
-    np.testing.assert_allclose(relaxation_of_wave(q, SOFT, SOFT, 1.0, t), full_contact_wave(1.0, q, SOFT, t), rtol=1e-8)
-    assert float(laplace_compliance(SOFT, 1e30)) == SOFT.glassy
-
-
 def profile(x):
     return np.asarray(x) ** 2 / 100.0
 
@@ -196,18 +142,3 @@ def test_growing_contact__on_moduli_that_creep_alike_is_that_of_lee_and_radok():
         found = GrowingOnLayer(profile, SOFT, base, 3e4, times)
         np.testing.assert_allclose(found.radius, exact.radius(times), rtol=1e-8)
         np.testing.assert_allclose(found.approach, exact.approach(times), rtol=1e-8)
-
-
-def test_growing_contact__on_others_converges_with_the_steps_and_ends_relaxed():
-    ends = []
-    for steps in (4, 8, 16):
-        found = GrowingOnLayer(profile, SOFT, STIFF, 3e4, np.append(0, np.geomspace(0.01, 4, steps)))
-        ends.append([found.radius[-1], found.approach[-1]])
-    errors = np.abs(np.array(ends) - np.array(ends[2]))[:2, 0]
-    assert errors[1] < 1e-4
-    assert math.log2(errors[0] / errors[1]) > 1.5
-    relaxed = GrowingOnLayer(profile, SOFT, STIFF, 3e4, np.append(0, np.geomspace(0.01, 100, 8)))
-    whole = [material.glassy + sum(material.compliances) for material in (SOFT, STIFF)]
-    elastic = OnSheet(Paraboloid(100.0), ElasticLayer(1.0, 0.4, 0.3, whole[1] / whole[0]))
-    scaled = 3e4 * (1 - 0.4) / 2 * whole[0]
-    assert relaxed.radius[-1] == pytest.approx(float(elastic.radius_at_scaled_force(scaled)), rel=1e-5)

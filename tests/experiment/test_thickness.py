@@ -18,7 +18,6 @@ from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.case import Case, read_cases
 
 RADIUS, THICKNESS = 1e-3, 1e-4
-WAVY = rv.self_affine(1e-3, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
 
 
 def pressed(height, material, program, *, thickness=THICKNESS, **settings):
@@ -65,22 +64,6 @@ def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base):
     # the mean of the gap is zero: the highest cell has sunk by its height and by the sheet's compression
     sunk = 3 * crest / modulus * sheet.uniform_displacement
     assert float(ds.approach[0]) == pytest.approx(float(wave.max()) + sunk, rel=1e-3)
-
-
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_thick_sheet__tends_to_the_half_space(boundary):
-    load = rv.Program().load(0.02, over=0.1).hold(0.2)
-    rubber = rv.zener(1e6, 3e5, 1e5)
-    edge = {"edge": "accept"} if boundary == "free" else {}
-    thin, thick, half = (
-        pressed(WAVY, rubber, load, boundary=boundary, times=[0.1, 0.3], thickness=h, **edge) for h in (0.02, 2.0, None)
-    )
-    differences = [float(abs(one.pressure - half.pressure).sum() / half.pressure.sum()) for one in (thin, thick)]
-    assert differences[1] < max(1e-3, 0.02 * differences[0])
-    assert float(abs(thick.approach / half.approach - 1).max()) < 1e-3
-    endless = pressed(WAVY, rubber, load, boundary=boundary, times=[0.1, 0.3], thickness=math.inf, **edge)
-    np.testing.assert_array_equal(endless.pressure, half.pressure)
-    assert "thickness" not in endless.attrs
 
 
 @pytest.mark.thorough

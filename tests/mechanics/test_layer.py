@@ -29,24 +29,6 @@ def test_effective_compliance__on_a_rigid_base_is_that_of_a_bonded_sheet(poisson
     np.testing.assert_allclose(found, x / 2 * Sheet(1.0, poisson).transfer(x, 0.0), rtol=1e-7)
 
 
-def test_effective_compliance__of_one_material_in_two_layers_is_that_of_one():
-    once = effective_compliance(X, (1.0,), (0.5, 0.3), (1.0, 40.0 - 3j))
-    np.testing.assert_allclose(effective_compliance(X, (0.3, 0.7), (0.5, 0.5, 0.3), (1, 1, 40 - 3j)), once, rtol=1e-12)
-
-
-def test_effective_compliance__of_long_and_short_waves_is_that_of_base_and_layer():
-    found = effective_compliance(np.array([1e-9, 50.0]), (1.0,), (0.3, 0.5), (2.0, 7.0))
-    np.testing.assert_allclose(found, [0.25 * 7.0, 0.35 * 2.0], rtol=1e-8)
-
-
-def test_effective_compliance__of_a_stiff_film_on_a_soft_base_bends_as_a_plate():
-    h, x, ratio = 1.0, 0.02, 1e4  # shear modulus of the film over the base's, both incompressible
-    bending = h**3 / (6 * (1 - 0.5))
-    stiffness = 2 / ratio * x / h + bending * (x / h) ** 4
-    found = float(effective_compliance(x / h, (h,), (0.5, 0.5), (1.0, ratio)))
-    assert 2 * found / x == pytest.approx(1 / stiffness, rel=2e-3)
-
-
 def elastic(thicknesses, poissons, compliances):
     """Kernel of elastic layers, whose shear compliances are given."""
     *layers, body = (rv.elastic(1 / one, poisson=nu) for one, nu in zip(compliances, poissons, strict=True))
@@ -85,11 +67,6 @@ def test_kernel__displacement_by_a_cell_is_that_by_its_nine_parts(side):
     for i, j in ((0, 0), (2, 1), (14, 5), (3, 15)):
         near = [abs(np.arange(3 * at - 1, 3 * at + 2)) for at in (i, j)]
         assert parts[np.ix_(*near)].sum() == pytest.approx(whole[i, j], rel=1e-7)
-
-
-def test_kernel__far_away_is_the_half_space_below():
-    found = elastic((1.0,), (0.5, 0.3), (1.0, 0.02)).influence((401, 1), (1.0, 1.0))[-1, 0]
-    assert found == pytest.approx(0.7 / 0.5 * 0.02 * love_kernel((401, 1), (1.0, 1.0))[-1, 0], rel=1e-3)
 
 
 def test_layer__lies_on_another_one():

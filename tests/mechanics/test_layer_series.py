@@ -13,19 +13,6 @@ FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
 Q, T = np.geomspace(1e2, 3e5, 19), np.geomspace(1e-5, 1.0, 17)
 
 
-@pytest.mark.parametrize("material", [RUBBER, FLUID, SOFT])
-def test_creep__of_one_material_is_its_own(material):
-    found = Layers((1e-4,), (material, material)).creep(Q, T)
-    np.testing.assert_allclose(found, np.tile(material.contact_compliance(T), (Q.size, 1)), rtol=1e-8)
-
-
-def test_creep__on_a_rigid_base_is_that_of_a_bonded_sheet():
-    q = Q[Q > 2e3]
-    found = Layers((1e-4,), (RUBBER, rv.elastic(1e15))).creep(q, T)
-    factor = q / 2 * Sheet(1e-4, RUBBER.poisson).transfer(q, 0.0)
-    np.testing.assert_allclose(found, np.outer(factor, RUBBER.contact_compliance(T)), rtol=1e-5)
-
-
 @pytest.mark.parametrize(
     "materials",
     [
@@ -53,12 +40,6 @@ def _each(series):
     """``C_0`` alone, then each term alone."""
     count = len(series.compliances)
     return [(1.0, np.zeros(count)), *((0.0, one) for one in np.eye(count))]
-
-
-def test_layer_series__of_one_material_has_its_times_alone():
-    found = layer_series(Layers((1e-4,), (RUBBER, RUBBER)), 1e-5, 1.0, 1e-4)
-    np.testing.assert_allclose(found.times, RUBBER.times)
-    assert found.error < 1e-8
 
 
 @pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic"])
