@@ -164,7 +164,7 @@ def test_observables__merge_with_their_result(kind):
     for one in found:
         assert not set(one.data_vars) & set(ds.data_vars), "a name means one thing"
         for name in one.data_vars:
-            assert merged[name].attrs == VARIABLES[str(name)].attributes()
+            assert merged[name].attrs == VARIABLES[str(name)].attributes
             assert merged[name].dims == VARIABLES[str(name)].over("time")
     assert float(merged.cluster_count.max()) >= 1
 

@@ -9,7 +9,7 @@ from support import FRICTION, PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, 
 
 import roughvisc as rv
 from roughvisc.study.neighbours import on_cells
-from roughvisc.study.storage.store import write_dataset
+from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.study.trade import VARIABLES, cheapest, format_tolerance, open_trade, pareto_front, uncertainty
 
 WAVE = """

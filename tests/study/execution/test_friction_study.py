@@ -9,7 +9,7 @@ from support import FRICTION
 
 import roughvisc as rv
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.storage.store import open_result
+from roughvisc.study.storage.netcdf import open_result
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
