@@ -21,8 +21,8 @@ def variables():
 def limits():
     """Return the table of the limits of an audit, with their meaning and source."""
     lines = [
-        "| assumption | number | doubtful, broken from | meaning | source |",
-        "|---|---|---|---|---|",
+        "| assumption | number | doubtful, broken from | meaning and source |",
+        "|---|---|---|---|",
     ]
     for name, one in LIMITS.items():
         lines.append(

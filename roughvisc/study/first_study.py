@@ -137,33 +137,32 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
 
 
 _TEXT = """\
-# A first study of {name}: pressed on a rubber, and held while the contact creeps.
-#   roughvisc plan {study}     what it will model and cost
-#   roughvisc run {study}      results and figures, in the folder results/ beside it
-# Quantities are numbers in SI, or texts with a unit. Change what you like; what cannot be is refused by name.
+# First study of {name}: pressed on a rubber, and held while the contact creeps.
+#   roughvisc plan {study}     contact, time and memory that it expects
+#   roughvisc run {study}      results and figures, in the folder results/ next to it
+# Quantities are numbers in SI, or texts with a unit. An invalid value is reported with its key.
 title = "{title} on a rubber"
 
 {surface}
-[material]                          # a spring in series with a Kelvin element; put your own numbers here
+[material]                          # a spring in series with a Kelvin element; enter your own material
 model = "zener"
 shear_modulus = "{shear}"             # instantaneous
-kelvin_modulus = "{kelvin}"            # softer in the end ...
+kelvin_modulus = "{kelvin}"            # softer at long times ...
 kelvin_viscosity = "{viscosity}"      # ... after some 0.1 s: viscosity over modulus
 poisson = 0.5
 
-# The pressure aims at {contact} % of the area in contact in the end (roughvisc new --contact "{contact} %"). Elastic
-# presses on {pressed} cells, with the stiffness that the rubber has then, give {late} % in the end and {early} % at
-# once.
+# This pressure brings about {contact} % of the area into contact at the end (roughvisc new --contact "{contact} %").
+# Elastic solutions on {pressed} cells give {late} % with the final modulus and {early} % with the initial modulus.
 [[program]]
 pressure = "{pressure}"  # nominal: {force} over the whole surface
-over = "50 ms"                      # within this time, linearly
+over = "50 ms"                      # a linear ramp
 
 [[program]]
-hold = "0.95 s"                     # ten times the time of the creep
+hold = "0.95 s"                     # ten times the retardation time
 
 [solve]
 {boundary}
-tolerance = 1e-2                    # of pressure, force and approach; 1e-3 for the final answer
+tolerance = 1e-2                    # relative error of pressure, force and approach; 1e-3 for final results
 
 [keep]
 fields = ["pressure", "gap"]
