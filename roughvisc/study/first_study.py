@@ -45,10 +45,10 @@ class FirstPressure:
 
 _REMARKS = {
     "crop": "the largest part without large holes",
-    "level": "0: the mean is taken off; 1: a plane; 2: plane and curvature",
+    "level": "subtracts the mean (0), a plane (1) or plane and curvature (2)",
     "outliers": "spikes become missing points",
     "fill": "missing points are filled in; the result keeps their mask",
-    "filter": "shorter waves are noise",
+    "filter": "shorter wavelengths are noise",
 }
 #: Boundary of the study, for a scan that stands for a larger, nominally flat surface.
 _BOUNDARIES = {
