@@ -33,7 +33,7 @@ from roughvisc.study.storage.folder import (
     require_writable,
     result_path,
 )
-from roughvisc.study.storage.netcdf import DamagedError, open_result, set_aside, write_result
+from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
 from roughvisc.study.storage.sweep_cases import labels_of_case
 from roughvisc.variables import AXES, NOT_CONVERGED, axis_of
 
@@ -195,13 +195,7 @@ def run_case(
                 stop=stop,
             )
             with closing(keeper):
-                if not is_result_of(case, path):
-                    try:
-                        open_result(path).close()
-                    except DamagedError as error:
-                        log.warning("%s", set_aside(path, error))
-                    except InputError:  # there is none
-                        pass
+                if not is_result_of(case, path, log.warning):
                     keeper.resume()
                     try:
                         keep(compute(case, progress=progress, keeper=keeper, threads=threads), case, folder)
@@ -243,8 +237,17 @@ def run_stated(
     return dataset
 
 
-def is_result_of(case: Case, path: Path) -> bool:
+def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = None) -> bool:
     """Return whether a file is the result of a case; an absent or damaged one is not.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    path : Path
+        File named by its key.
+    warn : callable, optional
+        Rename a damaged file and call this with a message about it. The lock of the case must be held.
 
     Raises
     ------
@@ -256,7 +259,11 @@ def is_result_of(case: Case, path: Path) -> bool:
     try:
         with open_result(path) as dataset:
             found = dataset.attrs.get("case_key")
-    except DamagedError:
+    except DamagedError as error:
+        if warn is not None:
+            aside = path.with_name(f"{path.name}.damaged")
+            os.replace(path, aside)
+            warn(f"{path}: is damaged: {error.found}; it is renamed to {aside.name} and computed again")
         return False
     if found != case.key:
         expected = f"the result of case {case.key}, which its name says"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
-from roughvisc.study.case import Case, read_cases
+from roughvisc.study.case import Case, program, read_cases
 from roughvisc.study.execution.cluster import (
     default_client,
     local_client,
@@ -30,7 +30,6 @@ from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
 from roughvisc.study.storage.folder import is_writable, lock_case, lock_path, require_writable, result_path
 from roughvisc.study.storage.index import Entry, index_of, save_index
-from roughvisc.study.storage.netcdf import DamagedError, open_result, set_aside
 from roughvisc.study.storage.results_table import write_table
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.sweep_data import open_results
@@ -167,7 +166,7 @@ def run_cases(
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
-            elif (failed := recorded_failure(folder, key)) and not retry_failed:
+            elif (failed := recorded_failure(folder, key, by=program())) and not retry_failed:
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         processes = 0
@@ -185,8 +184,10 @@ def run_cases(
         if not writable:
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
-            for case in todo.values():
-                _require_own(case, folder, record)
+            for key, case in todo.items():
+                if (path := result_path(folder, key)).exists():  # damaged, unless a run is at work on it; else refused
+                    with suppress(OSError), lock_case(lock_path(folder, key), patience=0.0):
+                        is_result_of(case, path, record.warn)
             _compute(todo, record, client, processes, threads)
         except (KeyboardInterrupt, SystemExit):
             log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
@@ -198,23 +199,6 @@ def run_cases(
             record.save()
             display.close()
     return {key: outcomes[key] for key in distinct}
-
-
-def _require_own(case: Case, folder: Path, record: Record) -> None:
-    """Rename the file of a case if it is damaged, unless a run is at work on it.
-
-    Raises
-    ------
-    InputError
-        If a file of that name cannot be read or is something else; nothing has been computed then.
-    """
-    path = result_path(folder, case.key)
-    if not is_result_of(case, path) and path.exists():
-        with suppress(OSError), lock_case(lock_path(folder, case.key), patience=0.0):
-            try:
-                open_result(path).close()
-            except DamagedError as error:
-                record.warn(set_aside(path, error))
 
 
 def _compute(todo: dict[str, Case], record: Record, client: Client | None, processes: int, threads: int | None) -> None:

@@ -76,13 +76,6 @@ def _unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     return DamagedError(text, key=str(path), found=reason, transient=True)
 
 
-def set_aside(path: Path, error: DamagedError) -> str:
-    """Rename a damaged result and return a message about it."""
-    aside = path.with_name(f"{path.name}.damaged")
-    os.replace(path, aside)
-    return f"{path}: is damaged: {error.found}; it is renamed to {aside.name} and computed again"
-
-
 def open_result(path: str | Path) -> xr.Dataset:
     """Open a result; its fields are read when they are needed, in any thread or process.
 

@@ -15,7 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
-from roughvisc.study.storage.failures import stated_failure
+from roughvisc.study.storage.failures import recorded_failure
 from roughvisc.study.storage.folder import atomic_write, no_results
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, parameters_of, read_sweep
@@ -125,7 +125,7 @@ def _table(
         elif one.key in held:
             status, message = "held by another run", held[one.key]
         else:
-            record = stated_failure(folder, one.key)
+            record = recorded_failure(folder, one.key)
             status, message = ("failed", str(record.get("message", ""))) if record else ("not computed", "")
         numbers.append(found)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
