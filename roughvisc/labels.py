@@ -71,8 +71,9 @@ def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) ->
             raise KeyError(f"variable {name!r} is not declared")
         wanted = declared.dims if declared else variable.dims
         found = variable.dims[variable.ndim - len(wanted) :]
-        fits = all(dim in rows if one in (ROW, STEP) else dim == one for dim, one in zip(found, wanted, strict=False))
-        if declared is None or len(found) < len(wanted) or not fits:
+        if wanted and found and wanted[0] in (ROW, STEP) and found[0] in rows:
+            found = (wanted[0], *found[1:])  # rows may lie over any axis of rows
+        if declared is None or found != wanted:
             if name in dataset.coords:
                 continue  # of another meaning
             raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {wanted}")

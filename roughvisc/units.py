@@ -211,9 +211,7 @@ def in_si(value: Any, unit: str, name: str) -> Any:
         return quantity(value, unit, name)
     if isinstance(value, Mapping):
         return {key: in_si(one, unit, f"{name}[{key!r}]") for key, one in value.items()}
-    if not isinstance(value, list | tuple) or not any(
-        issubclass(kind, str | list | tuple) for kind in {*map(type, value)}
-    ):
+    if not isinstance(value, list | tuple) or {str, np.str_, list, tuple}.isdisjoint(map(type, value)):
         return value
     return type(value)([in_si(one, unit, f"{name}[{number}]") for number, one in enumerate(value)])
 

@@ -62,7 +62,7 @@ def test_attributes__are_plain(stored):
     )
 
 
-def test_result__has_few_variables_and_attributes(stored):
+def test_result__has_few_variables_and_attributes(stored, tmp_path):
     rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
     material = rv.sheet(RUBBER, 1e-3)
     press = rv.Program().pressure(1e4, over=0.1)
@@ -72,6 +72,11 @@ def test_result__has_few_variables_and_attributes(stored):
     for ds in (stored, curve, scan):
         assert len(ds.variables) <= 26
         assert len(ds.attrs) <= 14
+    sheet = STUDY.replace('viscosity = "1 MPa s"', 'viscosity = "1 MPa s"\nthickness = "0.1 mm"')
+    (tmp_path / "sheet.toml").write_text(sheet + "fields = []\n[solve]\ntime_step = 0.5\n")
+    fullest = rv.run(tmp_path / "sheet.toml", progress=False)
+    assert {"thickness", "warnings"} <= set(fullest.attrs)
+    assert len(fullest.attrs) <= 14
     assert stored.stated_error.attrs["long_name"] == "numerical error"
     slide = rv.simulate(rough, RUBBER, press.slide(1e-4, over=0.1), boundary="periodic", times=2, **shared)
     assert set(slide.variables) - set(scan.variables) == {

@@ -320,15 +320,11 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
         where, shortest = f"program.{number}", min(segment.duration, segment.period)
         what = "the period of a cycle" if segment.period < segment.duration else "a segment"
-        if segment.duration > 0 and not (shortest >= 1 / LARGEST and end <= LARGEST):
+        least = max(LEAST_ROUNDINGS * math.ulp(end), 1 / LARGEST)
+        if segment.duration > 0 and not (least <= shortest and end <= LARGEST):
             raise InputError(
-                f"{where}: {what} lasts {shortest:g} s and ends by {end:g} s: expected times from "
-                f"{1 / LARGEST:g} to {LARGEST:g} s"
-            )
-        if segment.duration > 0 and shortest < LEAST_ROUNDINGS * math.ulp(end):
-            raise InputError(
-                f"{where}: {what} lasts {shortest:g} s where time has reached {end:g} s, which has a resolution of "
-                f"{math.ulp(end):.2g} s: expected at least {LEAST_ROUNDINGS * math.ulp(end):.2g} s"
+                f"{where}: {what} lasts {shortest:g} s where time has reached {end:g} s: expected at least "
+                f"{least:.2g} s, which the resolution of the time allows, and an end by {LARGEST:g} s"
             )
         if segment.slide is not None:
             if boundary == "mirror":

@@ -7,7 +7,7 @@ import multiprocessing
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -208,10 +208,6 @@ def require_loading(
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
     savings = {"rv.run, which keeps the fields in a file": partial(needed, in_memory=False)} if in_memory else {}
-    if in_memory and len(settings.fields) > 1:
-        one = replace(settings, fields=settings.fields[:1])
-        saving = partial(march_bytes, one, memory, rows=rows, part=part, in_memory=True)
-        savings[f"one kept field in place of {len(settings.fields)}"] = saving
     require_memory(shape, needed, savings)
 
 

@@ -44,7 +44,7 @@ log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
 #: Facts that the attribute ``case`` of a stored result states.
-_IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale")
+_IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale", "base")
 
 
 def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool = True) -> Path:
