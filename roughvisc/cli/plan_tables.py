@@ -1,9 +1,8 @@
-"""Table of a plan on the command line: what a study will model and what it will cost."""
+"""Table of a plan on the command line: what a study models, and what it costs."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,170 +14,120 @@ from rich.text import Text
 from roughvisc.cli.tables import readable, two_columns
 from roughvisc.units import unit_for
 
+#: Cases that a plan lists one by one.
+_LISTED = 20
+
 
 def plan_tables(costs: xr.Dataset) -> Group:
-    """What a study will model and what it will cost.
+    """Return a summary of all cases, and a row for each case of a sweep.
 
     Parameters
     ----------
     costs : xarray.Dataset
         Of :func:`roughvisc.plan`.
     """
-    total, attrs = costs.sizes["case"], costs.attrs
-    varied = [str(name) for name in costs.coords if name != "case_key"]
+    total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
     whole = [
-        ("Cases", f"{total}, {_side_by_side(attrs['processes'], attrs['threads'], costs)}"),
-        *((label, _alike(costs, name)) for name, label in _MODELLED.items()),
-        ("Grid", _range_of(costs, _grid)),
-        ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa").removeprefix("about ")),
-        ("Contact", _contact(costs)),
-        *((f"{name.capitalize()} per case", _span(costs[name], "")) for name in _counts(costs)),
+        ("Cases", f"{total}, {attrs['processes']} in parallel, threads on large grids: {attrs['threads']} each"),
+        ("Boundary", _distinct(costs["boundary"].values)),
+        ("Memory of the material", _distinct(costs["memory_model"].values)),
+        ("Program", _distinct(costs["note"].values)),
+        ("Grid", _distinct(_grid(costs.isel(case=i)) for i in range(total))),
+        ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa")),
+        ("Contact", _span(100 * costs["contact_fraction"], "", " % of the area")),
+        ("Steps per case", _span(costs["steps"], "")),
         ("Convolutions per case", _span(costs["convolutions"], "")),
         ("Wall time per case", _span(costs["wall_time"], "s")),
         ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}"),
         ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
         ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
-        ("Estimated from", f"coarse runs of {int(costs['marched'].sum())} of {total} cases"),
+        ("Estimated from", f"coarse runs of {own} of {total} cases"),
     ]
     parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
-    parts += [Text(f"Warning: {text}", style="bold red") for text in _warnings(costs)]
+    for text in dict.fromkeys(costs["warning"].values):
+        if text:
+            warned = int((costs["warning"] == text).sum())
+            several = f" ({warned} of {total} cases)" if total > 1 else ""
+            parts.append(Text(f"Warning: {text}{several}", style="bold red"))
     if total > 1:
-        parts += [Text(), _case_table(costs, varied)]
-        if not costs["marched"].all():
-            parts.append(Text("~ Estimated from the coarse run of the most similar case.", style="italic"))
+        parts += [Text(), _case_table(costs.isel(case=slice(_LISTED)), total)]
+    if own < total:
+        parts.append(Text("~ Estimated from the coarse run of the most similar case.", style="italic"))
     return Group(*parts)
 
 
-#: What is modelled, shown once if it is the same in all cases.
-_MODELLED = {
-    "boundary": "Boundary",
-    "memory_model": "Memory of the material",
-    "scheme": "Time",
-    "program_note": "Program",
-    "late_times": "Kept times",
-}
-#: Cells of a grid on which several threads are used.
-_THREADED = 1024**2
-#: Cases that a plan lists one by one.
-_LISTED = 20
+def _distinct(texts: Any) -> str:
+    """Return the first three different texts, and the number of further ones."""
+    found = [one for one in dict.fromkeys(str(text).rstrip(".") for text in texts) if one]
+    return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
 
 
 def _grid(row: xr.Dataset) -> str:
-    """Cells of a case, and of the part that is solved on."""
+    """Return the cells of a case, and of the part that is solved on."""
     whole, part = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "solved_"))
     solved = f", solved on {part[0]} x {part[1]} of them" if part not in ((0, 0), whole) else ""
     return f"{whole[0]} x {whole[1]} cells{solved}"
 
 
-def _contact(costs: xr.Dataset) -> str:
-    """Return how much comes into contact, and the grids of this estimate."""
-    known = costs.isel(case=np.flatnonzero(np.isfinite(costs["contact_fraction"].values)))
-    if not known.sizes["case"]:
-        return ""
-    found = 100 * known["contact_fraction"].values
-    parts = " to ".join(dict.fromkeys(f"{float(f'{part:.2g}'):g}" for part in (found.min(), found.max())))
-    grids = _range_of(known, lambda row: f"{int(row['coarse_cells_x'])} x {int(row['coarse_cells_y'])}")
-    return f"about {parts} % of the area, estimated on {'grids' if ',' in grids else 'a grid'} of {grids} cells"
-
-
-def _side_by_side(processes: int, threads: int, costs: xr.Dataset) -> str:
-    """How many cases at once, and how many threads each may use."""
-    large = bool(((costs["cells_x"] * costs["cells_y"]) >= _THREADED).any())
-    return f"{processes} in parallel" + (f", {threads} threads each" if large and threads > 1 else "")
-
-
-def _warnings(costs: xr.Dataset) -> list[str]:
-    """What is foreseen in some cases, once, where most is foreseen; and in how many."""
-    found, total = [], costs.sizes["case"]
-    for name, which in (("warning", "; this is the largest"), ("border_warning", "")):
-        warned = np.flatnonzero(costs[name].values != "")
-        if warned.size:
-            worst = warned[np.argmax(costs["nominal_pressure"].values[warned])]
-            several = f" ({warned.size} of {total} cases{which})" if total > 1 else ""
-            found.append(f"{costs[name].values[worst]}{several}")
-    return found
-
-
-def _alike(costs: xr.Dataset, name: str) -> str:
-    found = list(dict.fromkeys(str(value).rstrip(".") for value in costs[name].values if value))
-    text = "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
-    if name == "boundary":
-        text += ", FFTs padded to twice the grid" if costs["padded"].any() else ", FFTs not padded"
-    return text
-
-
-def _range_of(costs: xr.Dataset, text: Callable[[Any], str]) -> str:
-    found = dict.fromkeys(text(costs.isel(case=i)) for i in range(costs.sizes["case"]))
-    return ", ".join([*found][:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
-
-
-def _span(values: xr.DataArray, unit: str) -> str:
+def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
+    """Return the range of the known values; empty if none is known."""
     known = values.values[np.isfinite(values.values)]
-    if not known.size:
-        return "not known"
-    ends = [f"{value:.0f}" if not unit else readable(float(value), unit) for value in (known.min(), known.max())]
-    return f"about {ends[0]}" if ends[0] == ends[1] else f"about {ends[0]} to {ends[1]}"
+    ends = [f"{float(f'{one:.2g}'):g}" if not unit else readable(float(one), unit) for one in known]
+    ends = list(dict.fromkeys(ends[i] for i in (known.argmin(), known.argmax()))) if known.size else []
+    return f"about {' to '.join(ends)}{after}" if ends else ""
 
 
-def _counts(costs: xr.Dataset) -> list[str]:
-    """What is counted: steps of programs, speeds of curves of friction, rows of anything else."""
-    return [name for name in ("steps", "speeds") if np.isfinite(costs[name].values).any()] or ["rows"]
+def _case_table(costs: xr.Dataset, total: int) -> Table:
+    """Return settings and costs of each case: a column has one unit, in its heading.
 
-
-def _case_table(costs: xr.Dataset, varied: Sequence[str]) -> Table:
-    """Settings and costs of each case: a column has one unit, in its heading."""
-    listed = costs.isel(case=slice(_LISTED))
-    refused = listed["refusal"].values != ""
+    Parameters
+    ----------
+    costs : xarray.Dataset
+        Listed cases.
+    total : int
+        Number of all cases.
+    """
+    varied = [str(name) for name in costs.coords if name != "case_key"]
+    refused, copied = costs["refusal"].values != "", ~costs["marched"].values
     last = [key.rpartition(".")[2] for key in varied]
-    names = [
-        name if last.count(name) == 1 and not name.isdecimal() else key for name, key in zip(last, varied, strict=True)
-    ]
-    settings = [
-        _column(listed[key].values, name.replace("_", " "), str(listed[key].attrs.get("units", "")))
-        for key, name in zip(varied, names, strict=True)
-    ]
-    counts = [(name, [f"{value:.0f}" for value in listed[name].values]) for name in (*_counts(costs), "convolutions")]
-    spent = {"wall_time": "s", "memory": "byte", "disk": "byte"}
-    costing = [
-        _column(np.where(refused, np.nan, listed[name].values), name.replace("_", " "), unit, 3)
-        for name, unit in spent.items()
-    ]
+    names = [name if last.count(name) == 1 else key for name, key in zip(last, varied, strict=True)]
+    columns = [_column(costs[key], name.replace("_", " "), 6) for key, name in zip(varied, names, strict=True)]
+    for name in ("steps", "convolutions"):
+        columns.append((name, [f"{value:.0f}" for value in costs[name].values]))
+    columns += [_column(costs[name], name.replace("_", " "), 3) for name in ("wall_time", "memory", "disk")]
     table = Table(box=None, pad_edge=False)
-    for heading, _ in (*settings, *counts, *costing):
+    for heading, _ in columns:
         table.add_column(Text(heading), justify="right", overflow="fold")
-    for i, cut in enumerate(refused):
-        mark = "" if bool(listed["marched"][i]) else "~"
-        found = [Text("cannot run")] if cut else [Text(mark + cells[i]) for _, cells in (*counts, *costing)]
-        table.add_row(*(Text(cells[i]) for _, cells in settings), *found)
-    if costs.sizes["case"] > _LISTED:
-        table.add_row(Text(f"and {costs.sizes['case'] - _LISTED} more"))
+    for i in range(costs.sizes["case"]):
+        cells = [text[i] for _, text in columns]
+        counted = [("~" if copied[i] else "") + cell for cell in cells[len(varied) :]]
+        table.add_row(*map(Text, cells[: len(varied)]), *(["cannot run"] if refused[i] else counted))
+    if total > _LISTED:
+        table.add_row(f"and {total - _LISTED} more")
     return table
 
 
-def _column(values: Any, name: str, si: str, digits: int = 6) -> tuple[str, list[str]]:
-    """Heading with the unit that suits all values of a column, and the values in it; texts as they are."""
-    if np.asarray(values).dtype.kind not in "iuf":
-        return name, [str(value) for value in values]
-    known = values[np.isfinite(values)]
-    if si == "byte":
+def _column(values: xr.DataArray, name: str, digits: int) -> tuple[str, list[str]]:
+    """Return a heading with the unit that suits all values, and the values in it; texts as they are."""
+    if values.dtype.kind not in "iuf":
+        return name, [str(value) for value in values.values]
+    known = values.values[np.isfinite(values.values)]
+    if values.attrs.get("units") == "byte":
         factor, symbol = _bytes(float(known.max(initial=0.0)))
     else:
-        unit = unit_for(known, si)
+        unit = unit_for(known, str(values.attrs.get("units", "")))
         factor, symbol = unit.factor, unit.symbol
-    cells = [
-        "half-space" if value == math.inf else "" if np.isnan(value) else f"{value / factor:.{digits}g}"
-        for value in values
-    ]
+    cells = ["half-space" if value == math.inf else f"{value / factor:.{digits}g}" for value in values.values]
     return (f"{name}\n[{symbol}]" if symbol else name), cells
 
 
 def _bytes(count: float) -> tuple[float, str]:
-    """Unit that suits a number of bytes."""
+    """Return the unit that suits a number of bytes."""
     return next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if count >= one[0]), (1e3, "kB"))
 
 
 def size(count: float) -> str:
-    """A number of bytes as one reads it.
+    """Return a number of bytes with a unit.
 
     Examples
     --------

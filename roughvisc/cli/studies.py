@@ -32,8 +32,9 @@ _SHOWN = 5
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Show what a study will model and what it will cost.
 
-    Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 64 x 64 cells, the time
-    by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on the disk.
+    Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 128 x 128 cells, and
+    the time by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on
+    the disk.
 
     \b
     Example:

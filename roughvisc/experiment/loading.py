@@ -114,6 +114,19 @@ class LoadingRows(Rows):
         From which the run continues. Default: from rest.
     in_memory : bool
         Whether the kept fields stay in memory.
+
+    Attributes
+    ----------
+    scene : Scene
+        What the time steps need: grid, gap, memory, program, kept times.
+    choice : Choice
+        Memory of the body, and its distance from the material.
+    domain : Domain
+        Part of the surface that is solved on.
+    area : float
+        Nominal area, of the stated surface. [m2]
+    reaches_border : bool
+        Whether contact is expected at the border of a free surface.
     """
 
     def __init__(
@@ -127,7 +140,8 @@ class LoadingRows(Rows):
 
         enlarged, outgrown = (None, 0) if state is None else (state.enlarged, state.outgrown)
         surface = choose_surface(profile, problem, program, enlarged, outgrown)
-        self._area, self._profile, self._domain = profile.area, surface.profile, surface.domain
+        self.area, self._profile, self.domain = profile.area, surface.profile, surface.domain
+        self.reaches_border = surface.reaches_border
         self.problem = replace(problem, height=surface.profile.height)
         self._start = state or LoadingState(enlarged=surface.enlarged)
         self._border = self._start.border
@@ -136,12 +150,12 @@ class LoadingRows(Rows):
         gap = np.ascontiguousarray(profile.gap[cells])
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel)
         options = memory_options(program, settings)
-        self._choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
-        log.info("memory: %s", self._choice.note)
-        self._scene = Scene(
+        self.choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
+        log.info("memory: %s", self.choice.note)
+        self.scene = Scene(
             grid=grid,
             gap=gap,
-            memory=self._choice.memory,
+            memory=self.choice.memory,
             program=program,
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
@@ -149,7 +163,7 @@ class LoadingRows(Rows):
             present=None if profile.all_present else profile.present[cells],
         )
         if isinstance(body, LayeredBody):
-            check_convergence(body, self._scene)
+            check_convergence(body, self.scene)
 
     def __iter__(self) -> Iterator[Row]:
         """Compute the steps to the end of the program.
@@ -161,7 +175,7 @@ class LoadingRows(Rows):
         EdgeContactError
             If contact reaches the border of another free surface, unless that is accepted.
         """
-        scene, start, largest, domain = self._scene, self._start, self._start.largest, self._domain
+        scene, start, largest, domain = self.scene, self._start, self._start.largest, self.domain
         every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
         for step in march(scene, start.march):
             point = step.point
@@ -173,7 +187,7 @@ class LoadingRows(Rows):
                     self._reach_border(point.time)
 
             so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
-            stated = error_columns(step, scene, self._choice.series_error, so_far)
+            stated = error_columns(step, scene, self.choice.series_error, so_far)
             kept = scene.keeps(point.time)
             if every:
                 kept = point.time in ends or meets_tolerance(step, scene, stated["stated_error"])
@@ -214,7 +228,7 @@ class LoadingRows(Rows):
         kept : bool
             Whether it is a row of the result, or of the histories of all steps only.
         """
-        scene, profile, domain, point = self._scene, self._profile, self._domain, step.point
+        scene, profile, domain, point = self.scene, self._profile, self.domain, step.point
         contact, grid, is_whole = point.pressure > 0, scene.grid, domain.is_whole
         present = scene.memory.displacement(point.history)
         displacement, effective = present[0], present[-1]
@@ -279,10 +293,10 @@ class LoadingRows(Rows):
 
         The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
         """
-        scene, choice, body = self._scene, self._choice, self.problem.body
+        scene, choice, body = self.scene, self.choice, self.problem.body
         dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
-        dataset["nominal_pressure"] = dataset["force"] / self._area
-        loaded = self._profile.height[self._domain.cells]
+        dataset["nominal_pressure"] = dataset["force"] / self.area
+        loaded = self._profile.height[self.domain.cells]
         warnings = loading_warnings(
             scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border
         )

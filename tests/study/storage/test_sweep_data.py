@@ -133,9 +133,9 @@ def test_own_times__are_opened_by_xarray_alone(own_times):
 def test_listed_times__after_the_end_of_a_program_are_left_out(study, tmp_path):
     text = SMALL.replace('[0, "0.1 s", "200 ms"]', '[0, "0.1 s", 1, 5]')
     cases = study(text + '[sweep]\n"program.1.hold" = ["0.2 s", "1 s", "20 s"]\n')
-    assert rv.plan(cases, tmp_path / "out").late_times.values.tolist() == [
-        "1 s, 5 s left out: the program ends at 200 ms",
-        "5 s left out: the program ends at 1 s",
+    assert rv.plan(cases, tmp_path / "out").note.values.tolist() == [
+        "1 s, 5 s left out: the program ends at 200 ms.",
+        "5 s left out: the program ends at 1 s.",
         "",
     ]
     ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
