@@ -7,8 +7,8 @@ import json
 import logging
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError, RoughviscError, TooLargeError
 from roughvisc.experiment.base import Problem
-from roughvisc.labels import label, warnings_of
-from roughvisc.mechanics.grid import transform_library
+from roughvisc.labels import warnings_of
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -78,11 +77,11 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
 
 
 def compute(
-    case: Case, *, progress: bool | Progress = True, keeper: CheckpointWriter | None = None, threads: int | None = None
+    case: Case, keeper: CheckpointWriter, *, progress: bool | Progress = True, threads: int | None = None
 ) -> xr.Dataset:
-    """Result of a case, with all that is needed to run it again in its attributes.
+    """Return the result of a case, with all that is needed to run it again in its attributes.
 
-    With a keeper it goes on from what that has kept, and the fields of the result are read from there.
+    The run continues from what the keeper has kept, and the fields of the result are read from there.
 
     Raises
     ------
@@ -90,45 +89,30 @@ def compute(
         As :func:`roughvisc.simulate` and :func:`roughvisc.friction`, with the study's name in front.
     """
     height = case.height()
-    with _named(case):
+    try:
         problem = Problem(height, case.body, case.settings)
         dataset = solve(problem, case.experiment, keeper, progress=progress, threads=threads)
-    if "speed" in dataset:
-        reduced = case.shift_factor * dataset["speed"].values
-        dataset = label(dataset.assign(reduced_speed=("speed", reduced)))
-    transforms = transform_library() if keeper is None else keeper.latest.transforms
-    provenance = _provenance(case, dataset.attrs.pop("history", ""), transforms)
-    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
-    return dataset.assign_coords(labels_of_case(json.loads(case.to_json())))
-
-
-@contextmanager
-def _named(case: Case) -> Iterator[None]:
-    """Put the study's name in front of what is wrong with a case."""
-    try:
-        yield
     except (InputError, ConvergenceError) as error:
         if case.origin is None or (error.transient and not isinstance(error, TooLargeError)):
             raise
         if isinstance(error, InputError):
             raise error.prefixed(str(case.origin)) from error
         raise ConvergenceError(f"{case.origin}: {error}") from error
-
-
-def _provenance(case: Case, before: str, transforms: str) -> dict[str, str]:
-    """Attributes that say what this is, whence it came, and how to have it again."""
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    named = f"run of {case.origin.name}" if case.origin else "run of a case"
-    varied = "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items())
-    return {
+    if "speed" in dataset:
+        dataset = dataset.assign(reduced_speed=("speed", case.shift_factor * dataset["speed"].values))
+    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
+    ran = f"{now} {program()}: run of {case.origin.name if case.origin else 'a case'}"
+    provenance = {
         "Conventions": "CF-1.11",
-        "title": case.title + varied,
-        "source": f"{program_version()}; {transforms}",
-        "history": "\n".join(filter(None, [before, f"{now} {program()}: {named}"])),
-        "case": case.to_json(),
+        "title": case.title + "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items()),
+        "source": f"{program_version()}; {keeper.latest.transforms}",
+        "history": "\n".join(filter(None, [dataset.attrs.pop("history", ""), ran])),
+        "case": stated,
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,
     }
+    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
+    return dataset.assign_coords(labels_of_case(json.loads(stated)))
 
 
 def run_case(
@@ -198,7 +182,8 @@ def run_case(
                 if not is_result_of(case, path, log.warning):
                     keeper.resume()
                     try:
-                        keep(compute(case, progress=progress, keeper=keeper, threads=threads), case, folder)
+                        dataset = compute(case, keeper, progress=progress, threads=threads)
+                        write_result(dataset, path, precision=case.precision)
                     except RoughviscError as error:
                         if not error.transient:  # it would fail again in the same way
                             keeper.remove()
@@ -206,6 +191,10 @@ def run_case(
                     except KeyboardInterrupt:
                         keeper.save()
                         raise
+                    stated = warnings_of(dataset.attrs)
+                    complaints = unconverged(dataset), stated.get("tolerance"), stated.get("material")
+                    for complaint in filter(None, complaints):
+                        log.warning("%s: %s", path, complaint)
                 keeper.remove()
     except BlockingIOError:
         if is_result_of(case, path):  # the other run has just finished
@@ -275,16 +264,6 @@ def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = No
             transient=True,
         )
     return True
-
-
-def keep(dataset: xr.Dataset, case: Case, folder: Path) -> Path:
-    """Write a case's result to its file in a folder; the file is named by the case's key."""
-    path = write_result(dataset, result_path(folder, case.key), precision=case.precision)
-    dataset.encoding["source"] = str(path)
-    stated = warnings_of(dataset.attrs)
-    for complaint in filter(None, (unconverged(dataset), stated.get("tolerance"), stated.get("material"))):
-        log.warning("%s: %s", path, complaint)
-    return path
 
 
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
