@@ -1,7 +1,7 @@
-"""How thick must a soft coating be? A measured face slides on rubber that is bonded to a stiffer rubber.
+"""How thick must a soft coating be? A measured surface slides on rubber that is bonded to a stiffer rubber.
 
-What a wave of pressure meets, by its length and its frequency; and friction and contact area of the scan against speed,
-for coatings from 2 um to a half-space.
+Draws the effective compliance of a coating against wavelength and frequency, and friction and contact area of the scan
+against speed for coatings from 2 um to a half-space.
 
     python workflows/coating.py [CELLS] [FIGURE]
 """
@@ -51,7 +51,7 @@ def body(thickness):
 
 
 def draw_compliance(fig, axes):
-    """Size of the effective compliance over that of the coating alone, of a coating of 10 um."""
+    """Draw the effective compliance of a coating of 10 um, relative to the coating alone."""
     wavelength, frequency = np.geomspace(1e-6, 1e-3, 121), np.geomspace(1, 1e7, 101)
     q, omega = 2 * np.pi / wavelength[None, :], frequency[:, None]
     found = [np.abs(one.waves(q, 0 * q, omega)[1]) for one in (body(10e-6), body(np.inf))]

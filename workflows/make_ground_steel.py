@@ -1,9 +1,9 @@
-"""Write surfaces/ground_steel.x3p: a synthetic scan of ground steel, as an instrument might have given it.
+"""Write surfaces/ground_steel.x3p, a synthetic scan of ground steel with typical faults of a measurement.
 
     python workflows/make_ground_steel.py [FILE]
 
-Roughness drawn out along the grinding direction x, then what a measurement adds: tilt, an offset, noise, points lost
-on steep flanks and spikes beside them. The same file comes out byte for byte, up to the version of the writer.
+The roughness is elongated along the grinding direction x. The scan has tilt, an offset, noise, missing points on steep
+flanks and spikes next to them. The file is reproduced byte for byte, up to the version of the writer.
 """
 
 import sys
@@ -17,7 +17,7 @@ SIZE, SHAPE = (1.0e-3, 0.9e-3), (256, 224)  # cells of 3.906 x 4.018 um
 
 
 def texture(rng: np.random.Generator) -> np.ndarray:
-    """Long lays and their fine structure [m], both periodic; phases in the order in which this file was first drawn."""
+    """Return long grooves and their fine structure [m], both periodic."""
     (nx, ny), (q_l, q_s) = SHAPE, (2 * np.pi / 60e-6, 2 * np.pi / 17e-6)
     along = [2 * np.pi * np.fft.fftfreq(nx, SIZE[0] / nx), 2 * np.pi * np.fft.rfftfreq(ny, SIZE[1] / ny)]
     q = np.hypot(2 * along[0][:, None], along[1] / 2)  # four times longer along x
@@ -28,7 +28,7 @@ def texture(rng: np.random.Generator) -> np.ndarray:
 
 
 def measured() -> np.ndarray:
-    """Heights over (x, y) [m] with tilt, noise, missing points and spikes."""
+    """Return heights over (x, y) [m] with tilt, noise, missing points and spikes."""
     rng = np.random.default_rng(20_25)
     z = texture(rng)
     z -= 0.06e-6 * (z / 0.5e-6) ** 2  # grinding leaves deeper grooves than ridges

@@ -1,4 +1,4 @@
-"""The paper's first validation: a sphere on a Maxwell half-space under a suddenly applied load.
+"""The paper's first case: a sphere on a Maxwell half-space under a step load.
 
 Pressure profiles at several times against the closed form (Lee and Radok), in the paper's dimensionless axes:
 pressure over the Hertz peak pressure at time zero, against radius over the Hertz contact radius at time zero.
@@ -34,7 +34,7 @@ def pressure_of(contact, r, t):
     equilibrium, moduli, times = contact.material.relaxation_spectrum()
     since = t * np.linspace(0, 1, 1001) ** 2
     age = t - (since[1:] + since[:-1]) / 2
-    relaxed = equilibrium + np.exp(-np.append(t, age)[:, None] / times) @ moduli  # the first is that of the jump
+    relaxed = equilibrium + np.exp(-np.append(t, age)[:, None] / times) @ moduli  # first: the jump
     depth = np.sqrt(np.maximum(contact.radius(since) ** 2 - np.asarray(r)[..., None] ** 2, 0))
     modulus = 2 / (1 - contact.material.poisson) * relaxed
     return 2 / (np.pi * contact.sphere_radius) * (np.diff(depth, prepend=0) @ modulus)

@@ -1,10 +1,10 @@
-"""Contact area against load of the study beside this script, at several ages, with the elastic limits.
+"""Contact area against load of ``scan_to_area.toml`` at several times, with the elastic limits.
 
     python workflows/scan_to_area.py [FOLDER]
 
-Under a load that is held the contact grows from that of an elastic solid with the glassy modulus to that with the
-rubbery one. Both are computed on the same surface; their lines of low loads are those of a Gaussian surface of the same
-slope. Ground steel has fewer peaks than valleys, and so two to three times that area.
+Under a constant load the contact grows from the elastic contact with the glassy modulus to the elastic contact with the
+rubbery modulus. Both are computed on the same surface. The lines at low loads are for a Gaussian surface of the same
+slope. Ground steel has fewer peaks than valleys, and two to three times this area.
 """
 
 import sys
@@ -18,7 +18,7 @@ STUDY = Path(__file__).with_suffix(".toml")
 
 
 def main(folder=STUDY.parent / "results" / STUDY.stem, changes=None):
-    """Compute the cases and draw them; returns the figure."""
+    """Compute the cases and return the figure."""
     cases = [rv.vary(case, changes or {}) for case in rv.read_cases(STUDY)]
     poisson, compliance = cases[0].material.poisson, cases[0].material.contact_compliance
     limits = {"glassy": 1 / float(compliance(0.0)), "rubbery": 1 / float(compliance(float("inf")))}
@@ -38,7 +38,7 @@ def main(folder=STUDY.parent / "results" / STUDY.stem, changes=None):
 
 
 def at_age(results, time):
-    """The states of all cases at one age, as one Dataset along the loads."""
+    """Return the states of all cases at one time as one Dataset along the loads."""
     return xr.concat(
         [ds.sel(time=[time]) for ds in results],
         "time",

@@ -1,9 +1,9 @@
-"""Where is it right? Time over retardation time and early over late modulus, against the closed form, as a map.
+"""Error against the closed form, as a map over time and ratio of moduli.
 
     python workflows/stability_map.py [FIGURE.png]
 
-Each point is a case of stability_map.toml: a ball pressed in at once and held. Its force relaxes as the modulus does;
-the error is that of the force over the force at once, so that it is of time alone. What is refused is hatched.
+Each point is a case of stability_map.toml: a ball pressed in by a step and held. Its force relaxes like the modulus.
+The error of the force is relative to the initial force. Refused cases are hatched.
 """
 
 import sys
@@ -22,7 +22,7 @@ FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "stability_map.png"
 
 
 def error_of(case):
-    """Largest error of the force over its first value; NaN where the case is refused."""
+    """Return the largest error of the force over its first value; NaN if the case is refused."""
     try:
         ds = rv.simulate(case.height(), case.material, case.program, times=3, fields=(), progress=False)
     except rv.InputError:
@@ -34,7 +34,7 @@ def error_of(case):
 
 
 def draw(error, largest):
-    """Map of the errors over the numbers of the points; refused cases hatched, errors beyond the largest framed."""
+    """Draw the errors as a map; refused cases are hatched, errors beyond the largest are framed."""
     across, up = error.dims
     values = np.maximum(error.transpose(up, across).values, 1e-6 * largest)
     figure = Figure(figsize=(5.6, 3.9), layout="constrained")

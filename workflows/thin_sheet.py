@@ -43,7 +43,7 @@ def main(cells=128, figure="thin_sheet.png"):
 
 
 def force_on_sheet(x, cells):
-    """Return the force over that on a half-space at a depth x = sqrt(R delta) / h."""
+    """Return the force relative to a half-space at a depth x = sqrt(R delta) / h."""
     approach = (x * THICKNESS) ** 2 / RADIUS
     widest = 2.6 * np.sqrt(2) * x * THICKNESS  # of a thin sheet the contact radius is sqrt(2 R delta)
     ball, press = rv.sphere(RADIUS, widest, cells), rv.Program().approach(approach, over=0)

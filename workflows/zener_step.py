@@ -1,7 +1,7 @@
-"""The paper's second validation: a sphere on a Zener half-space under a suddenly applied load.
+"""The paper's second case: a sphere on a Zener half-space under a step load.
 
-For a Kelvin modulus equal to the spring's and for a quarter of it: the paper's equation (20) holds for the first
-only, the closed form used here for any.
+The Kelvin modulus equals the spring's modulus, or a quarter. The paper's equation (20) holds for the first only, the
+closed form used here for any.
 
     python workflows/zener_step.py [CELLS] [FIGURE]
 """

@@ -1,15 +1,14 @@
-"""Does every row keep its word? Random cases, each against a run of the same case at a thirtieth of its tolerance.
+"""Compare stated and true errors of random cases, with runs at a thirtieth of the tolerance.
 
     python workflows/benchmarks/accuracy.py [COUNT] [SEED] [--first N] [--out OUT.nc] [--processes N] [--kept 1 10 50]
 
-The cases are those of ``accuracy_cases.py``; COUNT is 1000 and SEED 1 unless given, and ``1 1 --first N`` reruns case N
-alone. Each case is printed when done. At the end OUT.nc holds a table of the cases, and a summary is printed. Errors of
-a row are relative: of the pressure its absolute difference summed, over the largest force so far; of approach, force
-and work over their largest absolute values so far, all of the reference and up to that row. Approach and force are
-judged where the program does not give them.
-``--kept`` runs each case once more for each number of kept times, evenly spaced up to the end of the program; all runs
-of a case share a reference, which keeps the times of all of them. ``--check N`` holds the references of the first N
-cases against runs ten times finer.
+``accuracy_cases.py`` draws the cases. The default COUNT is 1000 and SEED 1; ``1 1 --first N`` reruns case N alone. Each
+case is printed when done. At the end OUT.nc holds a table of the cases, and a summary is printed. Errors of a row are
+relative to the reference: the sum of absolute differences of pressure over the largest force so far, and the
+differences of approach, force and work over their largest absolute values so far. Approach and force count if the
+program does not prescribe them. ``--kept`` runs each case once more for each number of kept times, evenly spaced up to
+the end of the program; all runs of a case share a reference. ``--check N`` compares the references of the first N cases
+with runs at a tenth of their tolerance.
 """
 
 import argparse
@@ -35,7 +34,7 @@ def whole(dataset):
 
 SHARPER = 30
 QUANTITIES = ("total", "pressure", "approach", "force", "work")
-#: The same of the references that are checked, over that of the references.
+#: Tolerance of references over the tolerance of the runs that check them.
 FINER = 10
 #: Errors below this part of the tolerance do not count where stated errors are compared with true ones.
 FLOOR = 1e-3
@@ -73,9 +72,9 @@ def _judged(numbers, seed, processes, time_limit, kept, check):
 
 
 def judge(seed, number, time_limit=TIME_LIMIT, kept=(DRAWN,), check=False):
-    """Plain records of a case, one for each choice of kept times: what it is, what it took, and the errors of its rows.
+    """Return records of a case, one for each choice of kept times: description, cost, and errors of its rows.
 
-    Or what went wrong. With ``check`` the reference's own errors are those of a last record.
+    If a run fails, the record states the failure. With ``check`` the last record has the errors of the reference.
     """
     logging.getLogger("roughvisc").setLevel(logging.ERROR)  # of steep slopes
     drawn = case(seed, number)
@@ -110,14 +109,14 @@ def judge(seed, number, time_limit=TIME_LIMIT, kept=(DRAWN,), check=False):
 
 
 def times_of(drawn, kept):
-    """Kept times of a case by its own draw, or so many."""
+    """Return the kept times of a case as drawn, or a given number."""
     end = drawn.program.duration
     return drawn.times if kept == DRAWN else np.linspace(0, end, kept + 1)[1:].tolist()
 
 
 @contextlib.contextmanager
 def limited(seconds):
-    """Raise TimeoutError after so much processor time, where the system can."""
+    """Raise TimeoutError after a processor time, on systems that can."""
 
     def stop(*_):
         raise TimeoutError(f"no end after {seconds:g} s of processor time")
@@ -157,7 +156,7 @@ def watched(program):
 
 
 def compared(ds, exact, program):
-    """True and stated errors of the rows of a result, by quantity; NaN where there is none."""
+    """Return true and stated errors of the rows of a result, by quantity; NaN if unknown."""
     so_far = {name: np.maximum.accumulate(np.abs(exact[name].values)) for name in ("force", "approach", "work")}
     rows = np.searchsorted(exact.time.values, ds.time.values - 1e-12 * program.duration)
     if not np.allclose(exact.time.values[rows], ds.time.values, rtol=0, atol=1e-11 * program.duration):
@@ -183,7 +182,7 @@ def compared(ds, exact, program):
 
 
 def prescribed(program, times):
-    """Where the program gives the approach and the force; what a hold keeps of the other kind is found by the run."""
+    """Return at which times the program prescribes the approach, and the force."""
     ends = np.array(program.corners[1:])
     given = {"approach": [], "force": []}
     for now in times:
@@ -276,7 +275,7 @@ def described(result):
 
 
 def summarise(found, ds):
-    """Print what holds of all rows, first without soft cases, then of them, and the worst cases by number."""
+    """Print a summary of all rows, first without soft cases, then of soft cases, and the worst cases."""
     wrong = [result for result in found if result["status"] != "ok"]
     print(f"\n{len(found)} cases, {len(wrong)} without a comparison", *map(described, wrong), sep="\n")
     print(f"processor time of a case [s]: median {float(ds.cpu.median()):.2f}, largest {float(ds.cpu.max()):.1f}; with "
@@ -313,7 +312,7 @@ STATED_WITHIN = (0.8, 5.0)
 
 
 def _verdict(kept, part):
-    """A line for all cases with the same choice of kept times: what was asked of the program, quantity by quantity."""
+    """Print a line per quantity for all cases with the same choice of kept times."""
     steps, convolutions, cpu = (sum(result[name] for result in part) for name in ("steps", "convolutions", "cpu"))
     print(f"\nkept times: {kept}; {len(part)} cases, {steps} steps, {convolutions} convolutions, {cpu:.1f} s")
     print(f"{'':9}  rows  within   cases  worst  stated 0.8 to 5.0 true    below, of large  median of the worst")

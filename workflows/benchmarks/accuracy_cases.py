@@ -19,7 +19,7 @@ KEPT = ("8 even", "40 even", "20 logarithmic", "200 even", "every step")
 
 @dataclass(frozen=True)
 class Case:
-    """What is pressed on what, how, and what is kept of it."""
+    """Surface, material, program and kept times."""
 
     number: int
     height: xr.DataArray
@@ -31,7 +31,7 @@ class Case:
 
     @property
     def soft(self):
-        """Whether hardly any compliance is there at once: then cells that enter make the pressure jump."""
+        """Return whether the instantaneous compliance is so small that the pressure jumps in entering cells."""
         at_once, final = self.material.contact_compliance(np.array([0.0, self.program.duration]))
         return bool(at_once < 0.1 * final)
 
@@ -94,7 +94,7 @@ def _burgers(rng, unit, span):
 
 
 def _prony(rng, unit, span):
-    """Times over up to eight decades, a part of them all much faster than the program."""
+    """Draw times over up to eight decades, in some cases all much shorter than the program."""
     count = rng.integers(1, 7)
     slowest = 1e-8 if rng.random() < 0.15 else 10 ** rng.uniform(-2, 2)
     times = span * slowest * 10 ** (-rng.uniform(0, 8) * rng.random(count))

@@ -1,11 +1,10 @@
-"""What the grid costs in accuracy, and whether ``grid_error`` says so, against closed forms and finer grids.
+"""Compare ``grid_error`` with true errors, from closed forms and finer grids.
 
     python workflows/benchmarks/grid_accuracy.py [--orders] [--small]
 
-With ``--orders`` the error of the approach over ``(h/a)^2``, with cells of side h and a contact of radius a, of balls
-and cones whose apex lies in a cell or between cells. Otherwise what is stated of the grid's errors over the true
-ones, by quantity: of how many cases it is at least 0.8 of the true one, and the ratio of both in the middle. Some
-minutes on one core.
+Prints by quantity in how many cases the stated error is at least 0.8 of the true error, and the median ratio of both.
+With ``--orders`` it prints the error of the approach over ``(h/a)^2``, with cells of side h and a contact of radius a,
+for balls and cones whose apex lies in a cell or between cells. Some minutes on one core.
 """
 
 import argparse
@@ -18,7 +17,7 @@ from roughvisc.experiment.coarser import pressure_distance
 
 UNIT, SLOPE = rv.elastic(0.25), 0.01  # contact modulus 1
 LOADS = {"sphere": 4 / 3 * SLOPE, "cone": np.pi / 2 * SLOPE, "punch": SLOPE}  # to a contact radius of one
-#: Errors below this are those of the solver.
+#: Errors below this are solver errors.
 NONE = 1e-5
 #: kind -> (what makes it, its parameter, height over the distance from the apex, closed form)
 CASES = {
@@ -73,7 +72,7 @@ def indenters(radii, offsets, seed=1):
 
 
 def _against(ds, exact, load, apex, points=8):
-    """True errors of a result: the largest of pressure (L1), force and approach, and that of the corrected area."""
+    """Return the true errors of a result: the largest of pressure (L1), force and approach, and the corrected area."""
     side = float(ds.x[1] - ds.x[0])
     inside = (np.arange(points) + 0.5) / points - 0.5
     x, y = ((ds[axis].values[:, None] + side * inside).ravel() - at for axis, at in zip("xy", apex, strict=True))
@@ -89,7 +88,7 @@ def _against(ds, exact, load, apex, points=8):
 
 
 def _row(ds, **true):
-    """What is stated of each quantity, over the true error; errors below the tolerance of the runs are none."""
+    """Return stated over true errors by quantity; errors below the tolerance of the runs count as zero."""
     stated = ds
     side = float(ds.x[1] - ds.x[0])
     return {"cells": float(ds.contact_area_counted[0]) / side**2} | {
@@ -99,7 +98,7 @@ def _row(ds, **true):
 
 
 def scans(seeds, cells=(32, 48), finer=5, shortcuts=(4.0, 8.0, 16.0), fractions=(0.003, 0.03, 0.15)):
-    """Rough surfaces of one spectrum against the same surface on cells so many times shorter."""
+    """Compare rough surfaces of one spectrum with the same surfaces on shorter cells."""
     for seed, count in itertools.product(range(seeds), cells):
         for shortcut in shortcuts:  # shortest wave, in cells
             fine = rv.self_affine(1.0, count * finer, hurst=0.8, rms_slope=0.1, rolloff=0.5, shortcut=shortcut / count,
@@ -120,7 +119,7 @@ def scans(seeds, cells=(32, 48), finer=5, shortcuts=(4.0, 8.0, 16.0), fractions=
 def judged(rows):
     """By kind and quantity: the part of the cases whose stated error is at least 0.8 of the true one; the middle ratio.
 
-    Of what is given no error is stated, and there is none.
+    Prescribed quantities have no error.
     """
     for kind in dict.fromkeys(row["kind"] for row in rows):
         for name in ("pressure", "force", "approach", "gap", "area"):

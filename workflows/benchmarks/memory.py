@@ -1,6 +1,6 @@
-"""Peak memory of a process that computes a case, against what is stated of it: python memory.py 512 1024 2048.
+"""Compare the peak memory of a process that computes a case with its estimate: python memory.py 512 1024 2048.
 
-Each case runs in a process of its own, since the system tells only the highest that a process has come to.
+Each case runs in its own process, since the system reports only the peak of a process.
 """
 
 import json
@@ -44,7 +44,7 @@ def measure(sides, materials=tuple(MATERIALS), boundaries=tuple(BOUNDARIES)):
 
 
 def one(side, material, boundary):
-    """Bytes of this process at its peak, and those that are stated of the case once its contact is known."""
+    """Return the peak memory of this process, and the estimate for the case with its contact. [byte]"""
     surface = CASE["surface"] | {"shape": [side, side], "shortcut": max(1.6e-5, 4e-3 / side), "seed": 1}
     case = vary(Case.from_json(json.dumps(CASE | {"surface": surface, "material": MATERIALS[material]})), {})
     case = vary(case, BOUNDARIES[boundary])

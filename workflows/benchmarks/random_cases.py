@@ -1,10 +1,9 @@
-"""Random small cases: is every result a contact state, whatever is pressed on what, and how?
+"""Check that the results of random small cases satisfy the contact conditions.
 
     python workflows/benchmarks/random_cases.py [COUNT] [SEED]
 
 Prints each violation with the number of its case, and exits with status 1 if there is any. COUNT is 2000 and SEED 1
-unless given. Of 2000 cases (seed 1, 65 s on one core) none was in violation; before, work was counted along
-approaches without contact, and a flat periodic surface that creeps was stepped for its rounding.
+unless given. Of 2000 cases (seed 1, 65 s on one core) none was in violation.
 """
 
 import sys
@@ -87,7 +86,7 @@ def case(seed, number):
 
 
 def violations(ds):
-    """What is wrong with a result; empty if nothing."""
+    """Return the violations of a result."""
     present = np.isfinite(ds.height.values)
     pressure, force = ds.pressure.values, ds.force.values
     area = float(np.prod([float(ds[axis][1] - ds[axis][0]) for axis in ("x", "y")]))
@@ -105,7 +104,7 @@ def violations(ds):
     scale = np.abs(ds.displacement.values[:, present]).max() + np.ptp(ds.height.values[present])
     if np.ptp(ds.height.values[present]) == 0 and ds.boundary == "periodic":
         scale = 1.0  # nothing moves but by rounding
-    # the tolerance is one in energy, and that of the gap in a single cell about its square root
+    # the tolerance is relative to the energy; for the gap of a single cell it is about the square root
     allowed = np.sqrt(TOLERANCE) * scale
     deepest = -np.min(opening[:, present])
     if deepest > allowed:

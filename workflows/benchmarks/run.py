@@ -3,7 +3,7 @@
     python workflows/benchmarks/run.py [--small] [--only paper,tamaas,contact_mechanics] [--out benchmarks.nc]
 
 Every figure is a ratio or a count measured in one run, at equal or smaller measured error. Times are processor times,
-of one thread. Tamaas and ContactMechanics are compared with where they are installed.
+of one thread. Tamaas and ContactMechanics are used if installed.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""What the benchmarks press: scenes with a closed form or a tight solution, and how errors are measured."""
+"""Contact problems of the benchmarks, with a closed form or a sharp solution, and their errors."""
 
 import sys
 import time

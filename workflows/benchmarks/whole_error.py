@@ -1,16 +1,16 @@
-"""Does the stated interval hold the truth? Rough surfaces whose true numbers are known, each measured coarsely.
+"""Coverage of the intervals of ``rv.budget``, on rough surfaces with known values that are scanned coarsely.
 
     python workflows/benchmarks/whole_error.py [--first N] [--count N] [--out whole_error.jsonl] [--friction] [--seed N]
         [--cells N] [--step N]
 
-A true surface has waves down to a cut-off of its own on a grid four times finer than that of its scan, which holds the
-waves of two of its cells and longer ones. ``rv.budget`` sees the scan and the cut-off. It is compared with the number
-of the true surface (``patch``) and with the mean of the logarithms of 24 other surfaces of the same recipe on cells
-half as long as the scan's (``ensemble``). Five families (Hurst exponent, cut-off in cells of the scan), three loads and
-three materials give 45 scenes, each with three times, or with ``--friction`` with three speeds: 135 cases for each
-quantity. Lines are appended to OUT; scenes that are found there are not run again. The factors
-of the budget were chosen on the surfaces of ``--seed 1``; the default are others. At the end the coverage is printed,
-by quantity and population, with the median half-width over the median error and the cost over that of one solve.
+A true surface has waves down to its cut-off on a grid four times finer than its scan, which resolves waves of two cells
+and longer. ``rv.budget`` gets the scan and the cut-off. Its interval is compared with the value of the true surface
+(``patch``) and with the mean logarithm of 24 other surfaces of the same recipe on cells half as long (``ensemble``).
+Five families (Hurst exponent, cut-off in cells of the scan), three loads and three materials give 45 scenes, each with
+three times, or with ``--friction`` with three speeds: 135 cases for each quantity. Lines are appended to OUT; scenes in
+this file are not run again. The factors of the budget were chosen with ``--seed 1``; the default is another seed. At
+the end the coverage is printed by quantity and population, with the median half-width over the median error and the
+cost relative to one solve.
 """
 
 import argparse
@@ -46,7 +46,7 @@ SLIDING = ("friction_coefficient", "contact_area", "mean_gap")
 
 
 def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2, cells=64, step=1):
-    """Run the scenes that are not in the record yet, and print what was found."""
+    """Run the scenes that are not in the file yet, and print the coverage."""
     record = Path(out)
     lines = [json.loads(line) for line in record.read_text().splitlines()] if record.exists() else []
     known = {(line["scene"], line["friction"]) for line in lines}
@@ -64,7 +64,7 @@ def main(first=0, count=45, out="whole_error.jsonl", friction=False, seed=2, cel
 
 
 def study(family, load, material, seed, cells, friction, scanned):
-    """A study of a surface of a family, on so many cells where its scan has so many, as text."""
+    """Return the text of a study of a surface of a family, for given cells of the study and of the scan."""
     hurst, cutoff, rolloff = FAMILIES[family]
     surface = {
         "generate": "self_affine",
@@ -103,7 +103,7 @@ def numbers(text, names, folder):
 
 
 def scene(family, load, material, number, friction, start, cells):
-    """Budgets of one scene, and its truths."""
+    """Return the budgets of one scene, and the true values."""
     names = SLIDING if friction else LOADED
     cutoff, seed = FAMILIES[family][1], 1000 * start + number
     with tempfile.TemporaryDirectory() as folder:
@@ -157,7 +157,7 @@ def _lists(columns):
 
 
 def summary(lines):
-    """Print how often the truth was within what was stated."""
+    """Print how often the interval contains the true value."""
     if not lines:
         return
     for label in lines[0]["budgets"]:

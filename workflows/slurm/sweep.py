@@ -1,7 +1,7 @@
-"""A sweep whose workers are jobs of SLURM; the same command goes on after whatever ended it.
+"""A sweep whose workers are SLURM jobs; the same command resumes it.
 
-Needs dask-jobqueue. On a cluster, run it on the login node in tmux, or as a job of its own with a long walltime;
-without one, one_node.sh beside it starts a SLURM on this machine::
+Needs dask-jobqueue. On a cluster, run it on the login node in tmux, or as a job with a long walltime. Without a
+cluster, one_node.sh starts SLURM on this machine::
 
     python workflows/slurm/sweep.py STUDY.toml /shared/results --queue normal --walltime 02:00:00 --jobs 40
 """
@@ -21,7 +21,7 @@ import roughvisc as rv
 
 
 def cluster(queue: str, walltime: str, memory: str = "4GB", logs: str = "slurm-logs") -> SLURMCluster:
-    """One process a job, whatever becomes of a job then touches one case; it leaves before its walltime is over."""
+    """Return a cluster with one process per job; jobs end before their walltime."""
     hours, minutes, seconds = map(int, walltime.split(":"))
     allowed = 3600 * hours + 60 * minutes + seconds
     return SLURMCluster(
@@ -32,7 +32,7 @@ def cluster(queue: str, walltime: str, memory: str = "4GB", logs: str = "slurm-l
         walltime=walltime,
         log_directory=os.path.abspath(logs),
         scheduler_options={"dashboard_address": ":0"},  # whichever port is free
-        # leave early enough to end a step and write a checkpoint, and not all at once
+        # time for a step and a checkpoint, and not all jobs at the same time
         worker_extra_args=["--lifetime", f"{0.85 * allowed:.0f}s", "--lifetime-stagger", f"{0.1 * allowed:.0f}s"],
         # scancel and the walltime send SIGTERM to the job's shell too: it waits for the worker's checkpoint
         job_script_prologue=["trap : TERM", "export MALLOC_TRIM_THRESHOLD_=2146435072 MALLOC_MMAP_THRESHOLD_=33554432"],
