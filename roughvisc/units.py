@@ -249,10 +249,11 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
         def called(*args: Any, **given: Any) -> Any:
             for name in units.keys() & given.keys():
                 given[name] = in_si(given[name], units[name], name)
-            known = [
-                in_si(one, units[name], name) if name in units else one for name, one in zip(names, args, strict=False)
-            ]
-            return function(*known, *args[len(names) :], **given)
+            known = list(args)
+            for place, name in enumerate(names[: len(args)]):
+                if name in units:
+                    known[place] = in_si(args[place], units[name], name)
+            return function(*known, **given)
 
         called.quantities = units  # type: ignore[attr-defined]
         return called

@@ -18,10 +18,44 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.topography.borders import boundary_of
+from roughvisc.topography.borders import MIRRORED, is_mirrored, is_periodic, recipe_name
 from roughvisc.topography.grid import spacing
+from roughvisc.topography.indenters import is_indenter
+from roughvisc.topography.synthesis import BOUNDARIES
 
 Array = NDArray[np.float64]
+
+
+def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
+    """Boundary that a surface was made for; None where it has to be said: of scans, plain arrays, and all others.
+
+    The recipe of an indenter is believed if it gives the heights again, because the grid may have to grow. The recipe
+    of waves and roughness, and mirror images, are believed if the attribute ``period`` gives the sides of the grid and
+    the borders meet (:func:`is_periodic`).
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+
+    Returns
+    -------
+    {"free", "periodic"} or None
+        ``free`` of an indenter, ``periodic`` of waves, self-affine roughness, and surfaces with their mirror images.
+
+    Examples
+    --------
+    >>> from roughvisc.topography.indenters import sphere
+    >>> from roughvisc.topography.synthesis import wavy
+    >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
+    >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
+    ('free', 'periodic', None)
+    """
+    if is_indenter(h):
+        return "free"
+    mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
+    made = BOUNDARIES.get(recipe_name(h)) == "periodic" or (mirrored and is_mirrored(h.values))
+    return "periodic" if made and is_periodic(h) else None
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,16 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
-from roughvisc.experiment.kept_times import kept_times, memory_options
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
-from roughvisc.experiment.stated import area_error, error_columns, length_of, meets_tolerance
+from roughvisc.experiment.rows import (
+    area_error,
+    error_columns,
+    kept_times,
+    length_of,
+    meets_tolerance,
+    memory_options,
+)
 from roughvisc.experiment.warnings import loading_warnings
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import fft
 
 from roughvisc.errors import InputError, TooLargeError
-from roughvisc.experiment.kept_times import memory_options
+from roughvisc.experiment.rows import memory_options
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory

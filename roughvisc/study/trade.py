@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
-from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.rows import kept_times
 from roughvisc.labels import label, steps_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.study.case import Case, read_study, vary

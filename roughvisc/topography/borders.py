@@ -1,10 +1,9 @@
-"""Borders of surfaces: which boundary one was made for, whether it repeats, and whether its opposite borders meet."""
+"""Borders of surfaces: whether one repeats, and whether its opposite borders meet."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import is_indenter
-from roughvisc.topography.synthesis import BOUNDARIES
 
 #: Borders jump that differ by more than so many times what neighbouring rows do.
 JUMP = 2.0
@@ -70,7 +68,8 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
 
 def period_of(h: xr.DataArray) -> list[float]:
     """Sides of a grid, as the attribute ``period`` of one that is a period of a surface gives them. [m]"""
-    return [n * d for n, d in zip(h.shape, spacing(h), strict=True)]
+    (nx, ny), (dx, dy) = h.shape, spacing(h)
+    return [nx * dx, ny * dy]
 
 
 def is_periodic(h: xr.DataArray) -> bool:
@@ -90,38 +89,6 @@ def is_periodic(h: xr.DataArray) -> bool:
     return max(border_mismatch(h).of_neighbours) <= 2 * JUMP
 
 
-def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
-    """Boundary that a surface was made for; None where it has to be said: of scans, plain arrays, and all others.
-
-    The recipe of an indenter is believed if it gives the heights again, because the grid may have to grow. The recipe
-    of waves and roughness, and mirror images, are believed if the attribute ``period`` gives the sides of the grid and
-    the borders meet (:func:`is_periodic`).
-
-    Parameters
-    ----------
-    h : xarray.DataArray, dims (x, y)
-        Heights. [m]
-
-    Returns
-    -------
-    {"free", "periodic"} or None
-        ``free`` of an indenter, ``periodic`` of waves, self-affine roughness, and surfaces with their mirror images.
-
-    Examples
-    --------
-    >>> from roughvisc.topography.indenters import sphere
-    >>> from roughvisc.topography.synthesis import wavy
-    >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
-    >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
-    ('free', 'periodic', None)
-    """
-    if is_indenter(h):
-        return "free"
-    mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
-    made = BOUNDARIES.get(_recipe_name(h)) == "periodic" or (mirrored and is_mirrored(h.values))
-    return "periodic" if made and is_periodic(h) else None
-
-
 def is_analytic(h: xr.DataArray) -> bool:
     """Whether heights are those of an indenter or a regular wave.
 
@@ -133,10 +100,10 @@ def is_analytic(h: xr.DataArray) -> bool:
     >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
     (True, False, True)
     """
-    return is_indenter(h) or _recipe_name(h) == "wavy"
+    return is_indenter(h) or recipe_name(h) == "wavy"
 
 
-def _recipe_name(h: xr.DataArray) -> str:
+def recipe_name(h: xr.DataArray) -> str:
     """Name of the recipe of a surface whose grid still is the one that it was made on; empty otherwise."""
     try:
         recipe = json.loads(h.attrs["recipe"])

@@ -7,7 +7,7 @@ from references.growing_contact import lee_radok_step
 
 import roughvisc as rv
 from roughvisc.experiment import profile as domain
-from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.rows import kept_times
 from roughvisc.variables import FIELDS, VARIABLES
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))

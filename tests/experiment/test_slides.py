@@ -7,7 +7,7 @@ from samples import QUICK_RUBBER as RUBBER
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
-from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.rows import kept_times
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.si_tables import unit_of
 

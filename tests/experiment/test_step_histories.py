@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.kept_times import spread_times
+from roughvisc.experiment.rows import spread_times
 
 RADIUS, LOAD = 1e-3, 1e-4
 CELL = 2e-4 / 33

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.experiment.stated import error_columns, meets_tolerance
+from roughvisc.experiment.rows import error_columns, meets_tolerance
 from roughvisc.mechanics import stepping
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import Memory

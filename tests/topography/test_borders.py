@@ -5,7 +5,8 @@ import pytest
 import xarray as xr
 
 import roughvisc as rv
-from roughvisc.topography.borders import boundary_of, is_periodic
+from roughvisc.experiment.base import boundary_of
+from roughvisc.topography.borders import is_periodic
 from roughvisc.topography.conditioning import boundary_after, condition
 from roughvisc.topography.scans import open_card, surface_boundary
 

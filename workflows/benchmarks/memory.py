@@ -10,8 +10,8 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
-from roughvisc.experiment.kept_times import memory_options
 from roughvisc.experiment.resources import PROCESS, march_bytes
+from roughvisc.experiment.rows import memory_options
 from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.run import run_case

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.kept_times import memory_options
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import (
     PART,
@@ -25,6 +24,7 @@ from roughvisc.experiment.resources import (
     march_bytes,
     memory_available,
 )
+from roughvisc.experiment.rows import memory_options
 from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.study.case import Case
 from roughvisc.topography.grid import counts
