@@ -9,8 +9,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 
 #: Type of an argument or option that names a file or a folder.
 PATH = click.Path(path_type=Path)
+WORKERS = click.option(
+    "--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]"
+)
+QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 
 
 class Quantity(click.ParamType):
@@ -38,6 +43,16 @@ class Quantity(click.ParamType):
 
 
 QUANTITY = Quantity()
+
+
+def options(*them: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a decorator that adds several options to a command."""
+    return lambda command: reduce(lambda decorated, one: one(decorated), reversed(them), command)
+
+
+def quantity(name: str, metavar: str, meaning: str, **settings: Any) -> Any:
+    """Return an option whose value is a quantity."""
+    return click.option(name, type=QUANTITY, metavar=metavar, help=meaning, **settings)
 
 
 class Failure(click.ClickException):
@@ -56,6 +71,13 @@ def complain(message: str) -> None:
     click.echo(f"roughvisc: {printable(message)}", err=True)
 
 
+def screen(quiet: bool = False) -> Console:
+    """Return the terminal, or a file in its place."""
+    from rich.console import Console  # slow to import
+
+    return Console(quiet=quiet)
+
+
 def counted(count: int, what: str) -> str:
     """Return a count of things in words."""
     return f"{count} {what}" + ("" if count == 1 else "s")
@@ -67,7 +89,7 @@ def say(console: Console, line: str) -> None:
 
 
 def say_path(console: Console, what: str, path: Path) -> None:
-    """Write a line with a path."""
+    """Write a line with a path, relative to this folder if it is below it."""
     say(console, f"{what}: {near(path)}")
 
 
@@ -123,6 +145,29 @@ def _settings_of_process() -> Iterator[None]:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
+def _failure(error: BaseException) -> Failure | None:
+    """Return the message and the exit status of a known error; None of any other."""
+    match error:
+        case RoughviscError():
+            return Failure(str(error), 2 if isinstance(error, InputError) else 1)
+        case OSError() if error.errno != errno.EPIPE:  # the reader of the output has closed it: click ends quietly
+            place = f"{error.filename}: " if error.filename else ""
+            return Failure(f"{place}{error.strerror or error}", 1)
+        case MemoryError():
+            return Failure("not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1)
+        case RecursionError():
+            return Failure("the input is nested too deeply: expected a few levels of tables", 2)
+        case OverflowError():
+            return Failure(f"a number in the input is too large ({error}): expected one below 1e308", 2)
+        case RuntimeError() if str(error).startswith("NetCDF: "):
+            advice = "a file is damaged; run `roughvisc verify FOLDER` to find it"
+            return Failure(f"a result cannot be read ({error}): {advice}", 1)
+        case KeyboardInterrupt():
+            text = "interrupted; finished work is kept; repeat the command to resume"
+            return Failure(text, 143 if isinstance(error, Terminated) else 130)
+    return None
+
+
 class Commands(click.Group):
     """Commands that print one message for a known error and return an exit status, without a traceback."""
 
@@ -139,29 +184,10 @@ class Commands(click.Group):
         try:
             with _settings_of_process():
                 return super().invoke(ctx)
-        except InputError as error:
-            raise Failure(str(error), 2) from error
-        except RoughviscError as error:
-            raise Failure(str(error), 1) from error
-        except OSError as error:  # a full disk, a file that is gone
-            if error.errno == errno.EPIPE:  # the reader of the output has closed it: click ends quietly
-                raise
-            place = f"{error.filename}: " if error.filename else ""
-            raise Failure(f"{place}{error.strerror or error}", 1) from error
-        except MemoryError as error:
-            raise Failure("not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1) from error
-        except RecursionError as error:
-            raise Failure("the input is nested too deeply: expected a few levels of tables", 2) from error
-        except OverflowError as error:
-            raise Failure(f"a number in the input is too large ({error}): expected one below 1e308", 2) from error
-        except RuntimeError as error:
-            if not str(error).startswith("NetCDF: "):
-                raise
-            advice = "a file is damaged; run `roughvisc verify FOLDER` to find it"
-            raise Failure(f"a result cannot be read ({error}): {advice}", 1) from error
-        except KeyboardInterrupt as error:
-            text = "interrupted; finished work is kept; repeat the command to resume"
-            raise Failure(text, 143 if isinstance(error, Terminated) else 130) from error
+        except BaseException as error:
+            if failure := _failure(error):
+                raise failure from error
+            raise
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from roughvisc.cli.group import PATH, QUANTITY, Failure, complain, counted, say_figures, say_path
+import roughvisc as rv
+from roughvisc.cli.group import PATH, Failure, complain, counted, quantity, say_figures, say_path, screen
 from roughvisc.errors import printable
 
 
@@ -28,24 +28,24 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
       roughvisc plot results/focus_variation-study --out figures
       roughvisc plot results/focus_variation-study/trade/trade.nc
     """
-    from rich.console import Console
-
     from roughvisc.experiment.resources import cores
-    from roughvisc.plot import save_sweep_figures, trade
+    from roughvisc.plot import save_sweep_figures
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files, write_figure
     from roughvisc.study.storage.folder import results_at
     from roughvisc.study.trade import is_trade, open_trade
 
     paths = results_at(result)
     trades = [path for path in paths if path.is_file() and is_trade(path)]
-    drawn = [write_figure(trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png") for path in trades]
+    drawn = [
+        write_figure(rv.plot.trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png") for path in trades
+    ]
     cases = [path for path in paths if path not in trades]
     together = results_of_sweep(result) if len(cases) > 1 else None
     if together is not None:
         drawn += save_sweep_figures(together, out or result)
     if together is None or every:
         drawn += save_figures_of_files(cases, out, every=every, processes=cores())
-    say_figures(Console(), drawn)
+    say_figures(screen(), drawn)
 
 
 @click.command()
@@ -61,12 +61,9 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from rich.console import Console
-
     from roughvisc.experiment.resources import cores
-    from roughvisc.reports.report import report as write
 
-    say_path(Console(), "Report", write(results, out, processes=cores()))
+    say_path(screen(), "Report", rv.report(results, out, processes=cores()))
 
 
 @click.command()
@@ -82,46 +79,28 @@ def table(results: Path, out: Path | None) -> None:
     Example:
       roughvisc table results/focus_variation-study -o table.csv
     """
-    from rich.console import Console
-
-    from roughvisc.study.storage.export import to_csv
     from roughvisc.study.storage.folder import atomic_write
-    from roughvisc.study.storage.netcdf import open_result
-    from roughvisc.study.storage.results_table import to_table
 
     if results.is_dir():
         path = out or results / "table.csv"
-        cases = to_table(results)
+        cases = rv.to_table(results)
         with atomic_write(path) as temporary:
             cases.to_csv(temporary)
     else:
-        with open_result(results) as dataset:
-            path = to_csv(dataset, out or results.with_suffix(".csv"))
-    say_path(Console(), "Table", path)
-
-
-#: Properties that an audit needs: option, sign in the help, meaning.
-_PROPERTIES = (
-    ("--work-of-adhesion", "W", 'Work of adhesion of the two surfaces: "50 mJ/m^2".'),
-    ("--yield-strength", "Y", 'Tensile yield strength of the softer body: "40 MPa".'),
-    ("--thickness", "H", 'Actual thickness of the body modelled as a half-space: "5 mm".'),
-    ("--density", "RHO", 'Density of the body: "1100 kg/m^3".'),
-    ("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".'),
-    ("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".'),
-    ("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".'),
-)
-
-
-def _property_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the properties of an audit to a command."""
-    for option, sign, meaning in reversed(_PROPERTIES):
-        command = click.option(option, type=QUANTITY, metavar=sign, help=meaning)(command)
-    return command
+        with rv.open_result(results) as dataset:
+            path = rv.to_csv(dataset, out or results.with_suffix(".csv"))
+    say_path(screen(), "Table", path)
 
 
 @click.command()
 @click.argument("result", type=PATH)
-@_property_options
+@quantity("--work-of-adhesion", "W", 'Work of adhesion of the two surfaces: "50 mJ/m^2".')
+@quantity("--yield-strength", "Y", 'Tensile yield strength of the softer body: "40 MPa".')
+@quantity("--thickness", "H", 'Actual thickness of the body modelled as a half-space: "5 mm".')
+@quantity("--density", "RHO", 'Density of the body: "1100 kg/m^3".')
+@quantity("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".')
+@quantity("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".')
+@quantity("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".')
 @click.option("--base", help="Support of that body: bonded or slipping. [default: bonded]")
 @click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
 def audit(result: Path, study: Path | None, **properties: Any) -> None:
@@ -134,19 +113,14 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
     Example:
       roughvisc audit results/focus_variation-study --work-of-adhesion "50 mJ/m^2"
     """
-    from rich.console import Console
-
     from roughvisc.cli.accuracy_tables import audit_table
-    from roughvisc.study.audit.audit import audit as audited
-    from roughvisc.study.case import read_cases
     from roughvisc.study.storage.folder import results_at
-    from roughvisc.study.storage.netcdf import open_result
 
-    stated = {} if study is None else read_cases(study)[0].audit_inputs
+    stated = {} if study is None else rv.read_cases(study)[0].audit_inputs
     given = stated | {name: value for name, value in properties.items() if value is not None}
     for path in results_at(result):
-        with open_result(path) as dataset:
-            Console().print(audit_table(audited(dataset, **given)))
+        with rv.open_result(path) as dataset:
+            screen().print(audit_table(rv.audit(dataset, **given)))
 
 
 @click.command()

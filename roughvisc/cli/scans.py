@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from roughvisc.cli.group import PATH, QUANTITY, say, say_path
+import roughvisc as rv
+from roughvisc.cli.group import PATH, QUANTITY, options, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,11 +30,12 @@ class _Sides(click.ParamType):
         return sides[0] if len(sides) == 1 else sides
 
 
-_READING = (
+#: Options of :func:`roughvisc.open_scan`.
+_READING = options(
     click.option("--unit", help="Unit of length, if the file states none: um."),
     click.option("--height-unit", help="Unit of the heights, if it is another."),
     click.option("--spacing", type=_Sides(), help="Distance between points, if the file states none: 1um, or 1um,2um."),
-    click.option("--grid", type=QUANTITY, help="Side of the cells into which points x, y, z are sorted: 2um."),
+    quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
     click.option("--no-data", type=float, help="Number in the file that stands for a missing point: -9999."),
     click.option("--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."),
     click.option("--channel", help="Name or number of the channel. [default: the height]"),
@@ -48,19 +48,11 @@ _QUESTIONS: dict[str, tuple[str, Any]] = {
 }
 
 
-def _reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of :func:`roughvisc.open_scan` to a command."""
-    for option in reversed(_READING):
-        command = option(command)
-    return command
-
-
 def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
     """Open a scan; ask once for a unit and a spacing that the file lacks, if a person sits at the terminal.
 
     The answers are added to the options, whose spacing is converted to metres.
     """
-    from roughvisc.topography.scans import open_scan
     from roughvisc.units import in_si
 
     if (options["channel"] or "").isdecimal():
@@ -71,7 +63,7 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
         try:
             with warnings.catch_warnings(record=True) as complaints:
                 warnings.simplefilter("always", UserWarning)
-                height = open_scan(file, **options)
+                height = rv.open_scan(file, **options)
             for complaint in complaints:
                 click.echo(f"Warning: {complaint.message}", err=True)
             return height
@@ -96,7 +88,7 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
     help="Write a surface card with these recommendations. [name: FILE's name.toml, beside it]",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-@_reading_options
+@_READING
 def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, force: bool, **options: Any) -> None:
     """Summarise a scan and recommend preprocessing.
 
@@ -109,57 +101,47 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
       roughvisc scan focus_variation.x3p --plot scan.png
       roughvisc scan focus_variation.x3p --to scan.nc --card scan.toml
     """
-    from rich.console import Console
-
     from roughvisc.cli.tables import scan_table
-    from roughvisc.plot import surface
     from roughvisc.plot.save import write_figure
-    from roughvisc.study.storage.folder import atomic_write
-    from roughvisc.topography.bandwidth import level
-    from roughvisc.topography.inspection import inspect
-    from roughvisc.topography.parameters import parameters
-    from roughvisc.topography.readers import list_channels
-    from roughvisc.topography.writers import card_text, known_suffix, save_scan, surface_table
+    from roughvisc.study.storage.folder import atomic_write, write_text
+    from roughvisc.topography.writers import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
-    channels = () if "card" in height.attrs else list_channels(file, format=options["format"])
+    channels = () if "card" in height.attrs else rv.list_channels(file, format=options["format"])
     picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
     if to:
         known_suffix(to)
     for out in filter(None, (to, card, picture if plot or force else None)):
         if out.exists() and (not force or out.samefile(file)):
             raise InputError(f"{out}: already exists: expected another name" + ("" if force else ", or --force"))
-    levelled, found = level(height), inspect(height)
+    levelled, found = rv.level(height), rv.inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
-    console = Console()
-    console.print(scan_table(height, parameters(levelled), file.name, channels), "", _advice(found), "", sep="\n")
+    console = screen()
+    console.print(scan_table(height, rv.parameters(levelled), file.name, channels), "", _advice(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
     if picture.exists() and not force and not plot:
         say_path(console, "Existing picture kept (--force overwrites it)", picture)
     else:
-        say_path(console, "Picture", write_figure(surface(levelled), picture))
+        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture))
     if to:
         with atomic_write(to) as temporary:
-            save_scan(height, temporary)
+            rv.save_scan(height, temporary)
         say_path(console, "Converted", to)
     if card:
-        with atomic_write(card) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        say_path(console, "Card", card)
+        say_path(console, "Card", write_text(card, text))
 
 
 @click.command()
 @click.argument("file", type=PATH, required=False)
 @click.option("-o", "--out", type=PATH, help="Study file to write. [default: FILE's name-study.toml, here]")
-@click.option(
+@quantity(
     "--contact",
-    type=QUANTITY,
-    metavar="PART",
+    "PART",
+    "Part of the area in contact at the end, which sets the pressure.",
     default="5 %",
     show_default=True,
-    help="Part of the area in contact at the end, which sets the pressure.",
 )
-@_reading_options
+@_READING
 def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> None:
     """Write a first study for a scan, or for an example.
 
@@ -174,13 +156,10 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
       roughvisc run focus_variation-study.toml
       roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
-    from rich.console import Console
-
     from roughvisc.study.first_pressure import first_pressure
     from roughvisc.study.first_study import starter_study
-    from roughvisc.study.storage.folder import atomic_write
+    from roughvisc.study.storage.folder import write_text
     from roughvisc.topography.example import EXAMPLE
-    from roughvisc.topography.inspection import inspect
     from roughvisc.units import number
 
     part = number(contact, "1", "contact", above=0, below=1)
@@ -193,13 +172,15 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     if file is None:
         for option in (name for name, value in options.items() if value is not None):
             raise InputError(key=option, found=options[option], expected="FILE, which it belongs to")
-        _write_example(source)
+        shipped = rv.example_scan().read_bytes()
+        if source.exists() and source.read_bytes() != shipped:
+            expected = "an empty folder, or your own FILE"
+            raise InputError(f"{source}: already exists and differs from the example: expected {expected}")
+        source.write_bytes(shipped)
     height = _opened(source, options)
-    found = inspect(height)
-    text = starter_study(source, out, options, found, first_pressure(height, found, part))
-    with atomic_write(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    console = Console()
+    found = rv.inspect(height)
+    write_text(out, starter_study(source, out, options, found, first_pressure(height, found, part)))
+    console = screen()
     console.print(_advice(found), "", sep="\n")
     if file is None:
         say_path(console, "Scan", source)
@@ -220,18 +201,3 @@ def _advice(found: Inspection) -> Group:
         table.add_row(one.name, Text(one.seen))
         table.add_row("", Text(f"-> {one.advice or 'no action needed'}", style="bold" if one.advice else ""))
     return Group(Text("Findings and recommendations", style="bold"), table)
-
-
-def _write_example(path: Path) -> None:
-    """Write the scan that ships with roughvisc, unless it is there already."""
-    from roughvisc.study.storage.folder import atomic_write
-    from roughvisc.topography.example import example_scan
-
-    shipped = example_scan()
-    if not path.exists():
-        with atomic_write(path) as temporary:
-            shutil.copyfile(shipped, temporary)
-    elif path.read_bytes() != shipped.read_bytes():
-        raise InputError(
-            f"{path}: already exists and differs from the example: expected an empty folder, or your own FILE"
-        )

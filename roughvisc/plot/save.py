@@ -25,8 +25,6 @@ from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.case_text import case_words, file_stems
 from roughvisc.study.storage.folder import atomic_write
-from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.sweep_data import open_results
 
 _Result = TypeVar("_Result")
 
@@ -165,6 +163,8 @@ def save_figures_of_files(
     label : str
         Text of the progress bar.
     """
+    from roughvisc.study.storage.netcdf import open_result  # slow to import
+
     cases: dict[str, Any] = {}
     if len(paths) > 1:
         for path in paths:
@@ -179,6 +179,8 @@ def save_figures_of_files(
 
 
 def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
+    from roughvisc.study.storage.netcdf import open_result  # slow to import
+
     path, folder, stem, title, every = job
     with open_result(path) as dataset:
         return save_figures(dataset, folder, stem, title=title, every=every)
@@ -211,6 +213,8 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
     """Results of the sweep that ran last in a folder; None if there are fewer than two."""
+    from roughvisc.study.storage.sweep_data import open_results  # slow to import
+
     try:
         results = open_results(folder)
     except InputError:

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
-from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
@@ -67,6 +66,8 @@ def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> F
 
 def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
     """Draw the settings of one quantity."""
+    from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty  # slow to import
+
     time, error = dataset["run_time"].values, 100 * dataset["error"].sel(quantity=quantity).values
     unsure = float(np.nan_to_num(100 * uncertainty(dataset, quantity)))
     known = np.isfinite(time) & np.isfinite(error)

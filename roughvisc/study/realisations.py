@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.stats
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from roughvisc.errors import InputError
 from roughvisc.study.sweep_table import ITSELF, REALISATION
@@ -100,7 +100,7 @@ def statistics(values: Array) -> dict[str, Array]:
     count = np.isfinite(values).sum(axis=0)
     with np.errstate(all="ignore"):  # a missing value or too few of them give NaN
         freedom = np.where(count > 1, count - 1, np.nan)
-        student = scipy.stats.t.ppf(0.975, freedom)
+        student = stdtrit(freedom, 0.975)
         mean = np.nansum(values, axis=0) / count
         deviation = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / freedom)
         logarithms = np.log(values)

@@ -84,7 +84,9 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
             lengths = {key: len(values) for key, values in stated.items() if isinstance(values, list)}
             if len(set(lengths.values())) > 1 or 0 in lengths.values():
                 raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
-            for entry in range(min(max(lengths.values(), default=1), MOST_CASES + 1)):
+            if (count := max(lengths.values(), default=1)) > MOST_CASES:
+                raise InputError(key=f"sweep.{number}", found=f"{count} cases", expected=f"at most {MOST_CASES}")
+            for entry in range(count):
                 found.append({key: one[entry] if isinstance(one, list) else one for key, one in stated.items()})
         return found
     if not isinstance(sweep, Mapping):

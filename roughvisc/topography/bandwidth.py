@@ -6,8 +6,7 @@ import math
 from typing import Literal
 
 import numpy as np
-import scipy.fft
-import scipy.ndimage
+import scipy  # which imports a submodule when it is first used: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.arguments import one_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-import scipy.ndimage
+import scipy  # which imports a submodule when it is first used: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.topography.borders import border_mismatch

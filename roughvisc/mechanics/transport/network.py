@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -149,10 +148,12 @@ def equations(network: Network) -> sparse.csr_array:
 
 def factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
     """Return a solver of symmetric equations by direct factors, after scaling by the root of the diagonal."""
+    from scipy.sparse.linalg import splu  # slow to import
+
     scale = 1 / np.sqrt(matrix.diagonal())
     scaling = sparse.diags_array(scale)
     scaled = (scaling @ matrix @ scaling).tocsc()
     # positive definite: no pivoting, and the ordering of symmetric matrices
     options = {"SymmetricMode": True}
-    found = linalg.splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    found = splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     return lambda source: scale * found.solve(scale * source)

@@ -170,6 +170,13 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> Path:
+    """Write a text to a file, completely or not at all."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path
+
+
 def _sync(path: Path) -> None:
     """Have the operating system put a file, or the names in a folder, on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
