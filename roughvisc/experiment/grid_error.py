@@ -162,8 +162,11 @@ def with_grid_error(
     estimates much below it. Missing where there is no coarser solution. The coarser grid has all waves that it can
     hold: see :func:`~roughvisc.experiment.coarser.coarser`.
     """
-    places = [float(one) for one in dataset[axis_of(dataset.variables)].values]
+    axis = axis_of(dataset.variables)
+    places = dataset[axis].values.tolist()
     histories = [name for name in GRID_ERROR if name in dataset and name != "pressure"]
+    found = {name: np.full(len(places), math.nan) for name in ("pressure", *histories)}
+    least: dict[str, Array] = {}
     try:
         few = coarser(height, 2.0, dataset.attrs["boundary"])
         if few.size == height.size:
@@ -171,33 +174,39 @@ def with_grid_error(
         coarse = press_again(few, places)
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)
-        return _with_errors(dataset, {name: np.full(len(places), math.nan) for name in ("pressure", *histories)})
-    ratio = math.sqrt(height.size / few.size)
-    known = {"force", "approach", "contact_area", "mean_gap", *histories} & set(map(str, dataset.variables))
-    largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in known}
-    off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
-    apart = {name: off[name] / largest[name] for name in histories}
-    apart["pressure"] = pressure_distance(coarse, dataset) / largest["force"]
-    found = {}
-    for name, difference in apart.items():
-        safety, order = _ONE_COARSER[name]
-        found[name] = safety * difference / (ratio**order - 1)
-    given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
-    for row in range(len(places)):
-        for name, error in _least_errors(dataset, row, largest, bool(given[row]), peak).items():
-            if name in found:  # a result over an axis of its own may do without
-                found[name][row] = np.maximum(found[name][row], error)
-    return _with_errors(dataset, found)
-
-
-def _with_errors(dataset: xr.Dataset, found: Mapping[str, Array]) -> xr.Dataset:
-    """Return a result with the errors of its grid."""
-    axis, errors = axis_of(dataset.variables), {}
-    for name, error in found.items():
-        variable = GRID_ERROR[name]
-        errors[variable] = np.maximum(errors[variable], error) if variable in errors else error
+    else:
+        known = {"force", "approach", "contact_area", "mean_gap", *histories} & set(map(str, dataset.variables))
+        largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in known}
+        off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
+        apart = {name: off[name] / largest[name] for name in histories}
+        apart["pressure"] = pressure_distance(coarse, dataset) / largest["force"]
+        ratio = math.sqrt(height.size / few.size)
+        for name, difference in apart.items():
+            safety, order = _ONE_COARSER[name]
+            found[name] = safety * difference / (ratio**order - 1)
+        is_given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
+        rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(places))]
+        least = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    errors = grid_errors(found, least)
     errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
     return dataset.assign({name: (axis, values) for name, values in errors.items()})
+
+
+def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the errors of the grid by the variables that state them: of two the larger one, of quantities the largest.
+
+    Parameters
+    ----------
+    found : mapping
+        Quantity -> error by the difference between the grids; missing (NaN) if there is no coarser solution.
+    least : mapping
+        Quantity -> error that the finest grid alone leaves open.
+    """
+    errors: dict[str, Array] = {}
+    for name, error in found.items():
+        larger, variable = np.maximum(error, least.get(name, 0.0)), GRID_ERROR[name]
+        errors[variable] = np.maximum(errors.get(variable, larger), larger)
+    return errors
 
 
 def _peak(height: xr.DataArray) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.grid_error import counting_error, grid_uncertainties, hidden_opening
+from roughvisc.experiment.grid_error import counting_error, grid_errors, grid_uncertainties, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.warnings import (
@@ -243,7 +243,7 @@ class SlidingRows(Rows):
             row, fields = self._row(found)
             row["friction_force_across"] = slides[0].force(found.pressure, axis=1)
             if self._settings.grid_error:
-                row |= grid_errors(self._grids, states)
+                row |= sliding_grid_errors(self._grids, states)
             if not found.converged:
                 row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
                 fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
@@ -301,7 +301,7 @@ class SlidingRows(Rows):
         return dataset.drop_vars("creep_left").assign_attrs(attributes)
 
 
-def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:
+def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:
     """Return the relative errors of friction, area, approach and gap that the grid causes at a speed.
 
     Parameters
@@ -325,11 +325,9 @@ def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> 
         numbers = (state.power_force, area, state.approach, gap) if state.converged else [math.nan] * 4
         runs.append(dict(zip(_QUANTITIES, numbers, strict=True)))
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
-    errors = {name: float(one) for name, one in grid_uncertainties(runs, ratio, moving=True).items()}
 
     contact = found.pressure > 0
     hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
-    hidden_gap /= max(runs[0]["mean_gap"], hidden_gap) or 1.0
     counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
     # By pressure times slope of the profile: the surface follows the profile at the centres of the cells in contact and
     # not at the edges of contact, which is an error of the grid.
@@ -338,8 +336,7 @@ def grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> 
     least = {
         "friction_force": apart if apart <= _MEANINGFUL else 0.0,
         "contact_area": max(hidden_area, counting),
-        "mean_gap": hidden_gap,
+        "mean_gap": hidden_gap / (max(runs[0]["mean_gap"], hidden_gap) or 1.0),
     }
-    for name, error in least.items():
-        errors[name] = float(np.maximum(errors[name], error))  # NaN stays
-    return {GRID_ERROR[name]: error for name, error in errors.items()}
+    errors = grid_errors(grid_uncertainties(runs, ratio, moving=True), least)
+    return {name: float(error) for name, error in errors.items()}
