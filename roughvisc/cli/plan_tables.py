@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.cli.tables import readable, two_columns
+from roughvisc.experiment.resources import amount, byte_unit
 from roughvisc.units import unit_for
 
 #: Cases that a plan lists one by one.
@@ -39,8 +40,8 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Convolutions per case", _span(costs["convolutions"], "")),
         ("Wall time per case", _span(costs["wall_time"], "s")),
         ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}"),
-        ("Memory", f"{size(attrs['memory'])} of {size(attrs['free_memory'])} free"),
-        ("Disk", f"{size(attrs['disk'])} of {size(attrs['free_disk'])} free"),
+        ("Memory", f"{amount(attrs['memory'])} of {amount(attrs['free_memory'])} free"),
+        ("Disk", f"{amount(attrs['disk'])} of {amount(attrs['free_disk'])} free"),
         ("Estimated from", f"coarse runs of {own} of {total} cases"),
     ]
     parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
@@ -113,26 +114,9 @@ def _column(values: xr.DataArray, name: str, digits: int) -> tuple[str, list[str
         return name, [str(value) for value in values.values]
     known = values.values[np.isfinite(values.values)]
     if values.attrs.get("units") == "byte":
-        factor, symbol = _bytes(float(known.max(initial=0.0)))
+        factor, symbol = byte_unit(float(known.max(initial=0.0)))
     else:
         unit = unit_for(known, str(values.attrs.get("units", "")))
         factor, symbol = unit.factor, unit.symbol
     cells = ["half-space" if value == math.inf else f"{value / factor:.{digits}g}" for value in values.values]
     return (f"{name}\n[{symbol}]" if symbol else name), cells
-
-
-def _bytes(count: float) -> tuple[float, str]:
-    """Return the unit that suits a number of bytes."""
-    return next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if count >= one[0]), (1e3, "kB"))
-
-
-def size(count: float) -> str:
-    """Return a number of bytes with a unit.
-
-    Examples
-    --------
-    >>> size(2131948), size(24.5e9)
-    ('2.13 MB', '24.5 GB')
-    """
-    factor, unit = _bytes(count)
-    return f"{count / factor:.3g} {unit}"

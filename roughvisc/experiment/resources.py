@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -207,8 +207,7 @@ def require_loading(
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
-    savings = {"rv.run, which keeps the fields in a file": partial(needed, in_memory=False)} if in_memory else {}
-    require_memory(shape, needed, savings)
+    require_memory(shape, needed, partial(needed, in_memory=False))
 
 
 def require_surface(shape: Any) -> None:
@@ -217,7 +216,7 @@ def require_surface(shape: Any) -> None:
 
 
 def require_memory(
-    shape: tuple[int, int], needed: Callable[[float], float], savings: Mapping[str, Callable[[float], float]] = {}
+    shape: tuple[int, int], needed: Callable[[float], float], in_file: Callable[[float], float] | None = None
 ) -> None:
     """Refuse what needs more memory than is available.
 
@@ -227,8 +226,8 @@ def require_memory(
         Cells of the surface.
     needed : callable
         Memory by the number of cells. [byte]
-    savings : mapping
-        What may be changed, in words -> memory by the number of cells. [byte]
+    in_file : callable, optional
+        The same if the kept fields go to a file. [byte]
 
     Raises
     ------
@@ -240,12 +239,12 @@ def require_memory(
         return
     there = memory_available()
     if not there.fits(needed(cells)):
-        changes = [words for words, size in savings.items() if there.fits(size(cells))]
-        raise TooLargeError(too_large(shape, needed, there, changes))
+        advice = ["rv.run, which keeps the fields in a file"] if in_file and there.fits(in_file(cells)) else []
+        raise TooLargeError(too_large(shape, needed, there, advice))
 
 
 def too_large(
-    shape: tuple[int, int], needed: Callable[[float], float], there: Available, savings: Sequence[str] = ()
+    shape: tuple[int, int], needed: Callable[[float], float], there: Available, advice: Sequence[str] = ()
 ) -> str:
     """Return the message of a case that does not fit.
 
@@ -257,16 +256,15 @@ def too_large(
         Memory by the number of cells. [byte]
     there : Available
         Memory that may be taken.
-    savings : sequence of str
+    advice : sequence of str
         Changes with which it would fit. The finest grid of whole strides is added.
     """
-    advice = list(savings)
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
         few = [math.ceil(count / stride) for count in shape]
         size = needed(math.prod(few))
         if there.fits(size):
             wanted = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(size)}"
-            advice.insert(0, f"{wanted} (resample = {few} under [surface], rv.resample in Python)")
+            advice = [f"{wanted} (resample = {few} under [surface], rv.resample in Python)", *advice]
             break
     fitting = f"what would fit: {'; or '.join(advice)}" if advice else "expected more memory, or a coarser grid"
     return (
@@ -281,6 +279,12 @@ def amount(size: float) -> str:
     Examples
     --------
     >>> amount(2.13e9), amount(350e6), amount(-1)
-    ('2.1 GB', '350 MB', '0 MB')
+    ('2.1 GB', '350 MB', '0 kB')
     """
-    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{max(size, 0) / 1e6:.0f} MB"
+    factor, unit = byte_unit(size)
+    return f"{float(f'{max(size, 0) / factor:.2g}'):g} {unit}"
+
+
+def byte_unit(size: float) -> tuple[float, str]:
+    """Return the unit that suits a number of bytes: its size in bytes, and its symbol."""
+    return next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if size >= one[0]), (1e3, "kB"))

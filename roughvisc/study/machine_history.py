@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 _NOISE = 0.01
 #: Number of segments from which a note proposes a larger `thin`, if they are more than a tenth of the rows.
 _MANY = 300
-#: Rows that a search for the end of a segment looks at first.
-_AHEAD = 64
 
 
 class History(NamedTuple):
@@ -196,35 +195,22 @@ def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
     Notes
     -----
     From each row that is kept the line goes to the farthest row that it can reach: the slopes that pass all rows
-    between within the tolerance form a cone, which narrows row by row. One sweep through the rows.
+    between within the tolerance form a cone, which narrows row by row.
     """
-    count = len(times)
-    if tolerance <= 0 or count < 3:
-        return np.arange(count)
-    ends = [*np.flatnonzero(np.diff(times) == 0).tolist(), count - 1]
-    kept, row = [0], 0
-    for end in ends:
-        while row < end:
-            row = _farthest(times, values, row, end, tolerance)
-            kept.append(row)
-        if end < count - 1:
-            row = end + 1
-            kept.append(row)
+    if tolerance <= 0:
+        return np.arange(len(times))
+    at, of, kept = times.tolist(), values.tolist(), [0]
+    while kept[-1] < len(at) - 1:
+        start = kept[-1]
+        low, high, farthest = -math.inf, math.inf, start + 1
+        for row in range(start + 1, len(at)):
+            if at[row] == at[row - 1]:  # a jump: the line ends before it
+                break
+            span, rise = at[row] - at[start], of[row] - of[start]
+            if low <= rise / span <= high:
+                farthest = row
+            low, high = max(low, (rise - tolerance) / span), min(high, (rise + tolerance) / span)
+            if low > high:
+                break
+        kept.append(farthest)
     return np.array(kept)
-
-
-def _farthest(times: Array, values: Array, row: int, end: int, tolerance: float) -> int:
-    """Return the farthest row, up to an end, that a line from a row reaches within a tolerance of all between."""
-    low, high, best = -np.inf, np.inf, row + 1
-    here, ahead = row + 1, _AHEAD
-    while here <= end and low <= high:
-        there = min(here + ahead, end + 1)
-        span, rise = times[here:there] - times[row], values[here:there] - values[row]
-        lows = np.maximum.accumulate(np.concatenate([[low], (rise - tolerance) / span]))
-        highs = np.minimum.accumulate(np.concatenate([[high], (rise + tolerance) / span]))
-        reached = np.flatnonzero((lows[:-1] <= rise / span) & (rise / span <= highs[:-1]))
-        if reached.size:
-            best = here + int(reached[-1])
-        low, high = float(lows[-1]), float(highs[-1])
-        here, ahead = there, 2 * ahead
-    return best

@@ -100,6 +100,7 @@ def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
 
 
 def test_memory__is_limited_by_the_container_and_the_dask_worker(monkeypatch):
+    memory_available()  # imports what it needs
     used = psutil.Process().memory_info().rss
     monkeypatch.setattr("distributed.system.MEMORY_LIMIT", used + 5e6)
     container = memory_available()
