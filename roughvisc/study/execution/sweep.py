@@ -29,7 +29,7 @@ from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attemp
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
 from roughvisc.study.storage.folder import is_writable, lock_case, lock_path, require_writable, result_path
-from roughvisc.study.storage.index import Entry, index_of, save_index
+from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.results_table import write_table
 from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
 from roughvisc.study.storage.sweep_data import open_results
@@ -293,7 +293,6 @@ class Record:
                 forget_failure(self.folder, key)
                 if outcome.entry is None:
                     self._outcomes[key] = outcome_of(index[key], reused=True)
-        save_index(self.folder, index)
         held = {key: outcome.message for key, outcome in self._outcomes.items() if outcome.kind == "held"}
         write_table(self.folder, index, self._listed, held)
 

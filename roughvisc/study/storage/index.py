@@ -115,7 +115,9 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 
 def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
-    """Return the entry of every result in a folder by its key; the log names files that are no result.
+    """Return the entry of every result in a folder by its key, and bring the cache up to date.
+
+    The log names files that are no result.
 
     Parameters
     ----------
@@ -130,7 +132,8 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
         If the folder is absent, or a file.
     """
     require_folder(folder)
-    before = _read_index(folder) | {entry.file: entry for entry in known}
+    cached = _read_index(folder)
+    before = cached | {entry.file: entry for entry in known}
     entries = {}
     for path in result_files(folder):
         if not _KEY.fullmatch(path.stem):  # made from a result, or by somebody else
@@ -147,10 +150,12 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
             warn_once(str(error))
         except FileNotFoundError:  # gone meanwhile
             continue
+    if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
+        _write_index(folder, entries)
     return entries
 
 
-def save_index(folder: Path, entries: Mapping[str, Entry]) -> None:
+def _write_index(folder: Path, entries: Mapping[str, Entry]) -> None:
     """Write the cache of a folder; if that is impossible, results are only slower to open."""
     grids: dict[str, int] = {}
     results = {}

@@ -17,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.study.case import Case
 from roughvisc.study.storage.folder import no_results, warn_once
-from roughvisc.study.storage.index import Entry, index_of, save_index
+from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import read_variable
 from roughvisc.study.storage.sweep_cases import (
     CASE_KEY,
@@ -88,7 +88,6 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
     """
     folder = Path(out).absolute()
     index = index_of(folder)
-    save_index(folder, index)
     if not isinstance(cases, str):
         listed = sweep_cases(cases)
     elif cases in ("last", "all"):

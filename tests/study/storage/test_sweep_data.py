@@ -5,6 +5,7 @@ import shutil
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from support import BALL, LOADS, refused
@@ -305,6 +306,15 @@ def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
     assert float(ds.force.sum()) == pytest.approx(0.5 * 55 * 6 * 4)
     with pytest.raises(AssertionError, match="a result was opened"):
         ds.pressure.compute(scheduler="sync")
+
+
+def test_table__reads_each_file_once(tmp_path, monkeypatch):
+    import netCDF4
+
+    synthetic(tmp_path, loads=2, seeds=1)
+    wanted = rv.to_table(tmp_path)
+    monkeypatch.setattr(netCDF4, "Dataset", None)
+    pd.testing.assert_frame_equal(rv.to_table(tmp_path), wanted)
 
 
 @pytest.mark.thorough
