@@ -18,20 +18,6 @@ def result():
     return rv.simulate(BALL, RUBBER, PROGRAM, times=[4.5], tolerance=1e-3, progress=False)
 
 
-def test_histories__hold_the_steps_between_kept_times(result):
-    steps = rv.observables.history(result)
-    assert result.sizes["time"] == 1
-    assert steps.sizes["time"] > 5
-    assert np.all(np.diff(steps.time) > 0)
-    assert steps.time[0] == 0
-    assert steps.time[-1] == 4.5
-    assert np.any(np.isclose(steps.time, 0.5, rtol=1e-12)), "the end of the ramp"
-    for name in ("force", "approach", "contact_area", "work", "mean_gap", "time_error"):
-        assert float(steps[name][-1]) == float(result[name][-1])
-        assert steps[name].attrs["units"] == result[name].attrs["units"]
-    np.testing.assert_allclose(steps.force, np.minimum(LOAD * steps.time / 0.5, LOAD), rtol=1e-12)
-
-
 def test_histories__follow_the_closed_form(result):
     # a growing contact: the approach of a ball by the functional equation of Lee and Radok, exact at every instant
     steps = rv.observables.history(result)
