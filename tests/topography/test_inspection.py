@@ -91,3 +91,21 @@ def test_large_holes__are_cropped_away_and_small_ones_filled():
     assert int(treated.filled.sum()) == 2
     assert found.shape == treated.shape
     assert treated.sizes["x"] == 70
+
+
+@pytest.mark.parametrize(("share", "off"), [(0.004, 0.1), (0.1, 0.35)])
+def test_noise__between_missing_points_is_found_and_overestimated_a_little(share, off):
+    noisy = SMOOTH.values + np.random.default_rng(5).normal(0, 2e-9, SMOOTH.shape)
+    gaps = np.random.default_rng(3).random(SMOOTH.shape) < share
+    found = inspect(with_values(np.where(gaps, np.nan, noisy))).findings["Noise"].values
+    assert found["floor"]
+    assert 0.95 * 2e-9 < found["rms"] < (1 + off) * 2e-9
+    none = inspect(with_values(np.where(gaps, np.nan, SMOOTH.values))).findings["Noise"].values
+    assert not none["floor"], "with as many gaps again the floor of filled points grows"
+
+
+@pytest.mark.parametrize("values", [np.zeros((20, 20)), SMOOTH.values[:15, :40]], ids=["flat", "few points"])
+def test_noise__is_not_measured_on_a_flat_or_small_scan(values):
+    found = inspect(with_values(values))
+    assert found.findings["Noise"].values == {}
+    assert "filter" not in found.steps

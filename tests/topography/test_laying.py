@@ -1,4 +1,4 @@
-"""Two faces on one grid."""
+"""Two faces on one grid: planes stay planes, missing points stay missing, two balls press as one."""
 
 import numpy as np
 import pytest
@@ -88,6 +88,17 @@ def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
     exact = rv.closed_forms.hertz(1 / (1 / 1e-2 + 1 / 3e-2), modulus, 0.02)
     assert ds.approach.values[-1] == pytest.approx(exact.approach, rel=5e-3)
     assert ds.contact_area.values[-1] == pytest.approx(np.pi * exact.radius**2, rel=2e-2)
+
+
+def test_combine__a_recipe_is_no_longer_one_and_what_is_absent_stays_so():
+    punch, ball = rv.flat_punch(2e-5, 1e-4, 21), rv.sphere(1e-3, 1e-4, 21)
+    both = rv.combine(punch, ball, align="centre")
+    assert "recipe" not in both.attrs
+    assert both.attrs["missing"] == "absent"
+    assert rv.combine(ball, punch, align="centre").attrs["missing"] == "absent"
+    gaps = ball.copy()
+    gaps[0, 0] = np.nan  # of a measurement: what is there is not known
+    assert "missing" not in rv.combine(punch, gaps, align="centre").attrs
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Numbers of a surface."""
+"""Parameters of a surface: closed forms of waves, convergence of differences, missing points."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import labelled, spacing
-from roughvisc.topography.parameters import PARAMETERS, parameters, rms_slope
+from roughvisc.topography.parameters import PARAMETERS, levelled_parameters, parameters, rms_slope
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.spectrum import psd
 from roughvisc.topography.synthesis import self_affine, wavy
@@ -163,3 +163,8 @@ def test_lone_cell__has_no_wave_and_no_slope():
     assert spacing(alone) == (2e-6, 3e-6)
     assert float(parameters(alone, periodic=True)["Sq"]) == 0
     assert psd(alone).sizes["wavevector"] == 0
+
+
+def test_levelled_parameters__subtract_the_mean_where_points_determine_no_plane():
+    line = from_array(np.outer([1.0, np.nan, np.nan], np.arange(8.0)) * 1e-6, spacing=1e-5)
+    assert float(levelled_parameters(line).Sq) == pytest.approx(np.arange(8).std() * 1e-6, rel=1e-12)

@@ -52,6 +52,22 @@ def test_surrogates__repeat_and_differ():
     assert first.realisation.values.tolist() == [1, 2]
 
 
+def test_surrogates__of_mirror_images_are_as_large_as_what_was_measured():
+    scan = rv.crop(rough(), x=(0, 6e-4), y=(1e-4, 8e-4))
+    found, of_images = rv.surrogates(scan, 2, seed=3), rv.surrogates(rv.mirror(scan), 2, seed=3)
+    np.testing.assert_allclose(of_images, found, rtol=0, atol=1e-12 * float(found.std()))
+    for axis in ("x", "y"):
+        np.testing.assert_allclose(of_images[axis], scan[axis], rtol=1e-12)
+        np.testing.assert_array_equal(found[axis], scan[axis])
+
+
+def test_surrogates__of_a_scan_are_periodic_and_have_its_slope():
+    scan = rv.crop(rough((90, 104)), x=(0, 6e-4))
+    found = rv.surrogates(scan, 8, seed=1)
+    slopes = [float(rv.parameters(one, periodic=True).Sdq) for one in found]
+    assert np.mean(slopes) == pytest.approx(float(rv.parameters(scan).Sdq), rel=0.15)
+
+
 @pytest.mark.parametrize(
     ("key", "value"), [("count", 0), ("count", 2.0), ("seed", -1), ("seed", None), ("amplitudes", "normal")]
 )
