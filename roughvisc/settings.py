@@ -131,17 +131,6 @@ class Settings(Numerics):
         for name, value in found.items():
             object.__setattr__(self, name, value)
 
-    def has_grid_error(self, cells: int, axis: str) -> bool:
-        """Return whether a result over an axis states its grid error.
-
-        By default it does if the number of cells is between the two :data:`GRID_ERROR_CELLS`, and if no
-        further field has to be kept.
-        """
-        if self.grid_error != "auto":
-            return self.grid_error
-        fewest, most = GRID_ERROR_CELLS
-        return fewest <= cells <= most and (axis == "speed" or "pressure" in self.fields)
-
 
 #: Message if ``auto`` cannot be resolved, for a study file; in Python ``=`` has no spaces.
 OPEN_BOUNDARY = """\

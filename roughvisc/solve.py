@@ -16,14 +16,14 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.errors import ConvergenceError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import TITLE, label, with_steps
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.topography.grid import checked, nominal_area
+from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
 from roughvisc.variables import STEPPED, VARIABLES
 
@@ -141,13 +141,8 @@ def solve(
     ConvergenceError
         If there is no row.
     """
-    height = checked(problem.height, "height", least=1)
-    problem = replace(problem, height=height).with_known_boundary(experiment.boundary)
-    settings = problem.settings
-    settings = replace(settings, grid_error=settings.has_grid_error(height.size, experiment.axis))
-    problem = replace(problem, settings=settings)
-    for name, found, why in experiment.unsupported(settings):
-        raise InputError(f"{name} is {found!r}: {why}")
+    problem = problem.resolved(experiment)
+    height, settings = problem.height, problem.settings
     needed: tuple[str, ...] = ()
     if settings.grid_error and isinstance(experiment, Loading) and "pressure" not in settings.fields:
         needed = ("pressure",)

@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.experiment.base import Problem
+from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.case import Case, vary
 from roughvisc.variables import FIELDS
@@ -122,11 +125,17 @@ def test_study__states_the_settings_that_the_solver_gets(chosen):
 
 @pytest.mark.parametrize(("cells", "stated"), [(255, False), (256, True), (512, True), (513, False)])
 def test_grid_error__is_estimated_by_default_if_it_takes_at_most_a_third(cells, stated):
-    assert Settings().has_grid_error(cells * cells, "time") is stated
-    assert not Settings(fields=()).has_grid_error(cells * cells, "time"), "no pressure is kept"
-    assert Settings(fields=()).has_grid_error(cells * cells, "speed") is stated
-    assert Settings(grid_error=True).has_grid_error(9, "time")
-    assert not Settings(grid_error=False).has_grid_error(256 * 256, "time")
+    ball, body = rv.sphere(1e-3, 2e-4, cells), rv.Body(rv.elastic(1e6))
+    pressed, slid = Loading(rv.Program().load(1e-3, over=0)), SteadySliding(speeds=1.0, load=1.0)
+
+    def found(experiment, **settings):
+        return Problem(ball, body, Settings(**settings)).resolved(experiment).settings.grid_error
+
+    assert found(pressed) is stated
+    assert not found(pressed, fields=()), "no pressure is kept"
+    assert found(slid, fields=()) is stated
+    assert found(pressed, grid_error=True)
+    assert not found(pressed, grid_error=False)
 
 
 def test_grid_error__is_in_a_result_by_default():

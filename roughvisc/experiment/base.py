@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.settings import GRID_ERROR_CELLS, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.topography.borders import MIRRORED, is_mirrored, is_periodic, recipe_name
-from roughvisc.topography.grid import spacing
+from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.synthesis import BOUNDARIES
 
@@ -76,22 +76,31 @@ class Problem:
     body: Body
     settings: Settings
 
-    def with_known_boundary(self, only: Literal["free", "periodic"] | None) -> Problem:
-        """Return the problem with the boundary that ``auto`` stands for, see :func:`known_boundary`.
+    def resolved(self, experiment: Experiment) -> Problem:
+        """Return the problem as an experiment computes it: with what ``auto`` stands for in boundary and grid error.
 
         Raises
         ------
         InputError
-            If the boundary must be stated, or the kernel of the body is not accurate on the cells in free space. With
-            periodic and mirror boundaries the transfer function is exact on any cells.
+            If the heights are invalid, the boundary must be stated, a setting has no meaning in the experiment, or the
+            kernel of the body is not accurate on the cells in free space. With periodic and mirror boundaries the
+            transfer function is exact on any cells.
         """
-        found = known_boundary(self.settings, only, partial(boundary_of, self.height))
-        if found is None:
-            name = self.height.attrs.get("source_file", "height")
+        height, settings = checked(self.height, "height", least=1), self.settings
+        boundary = known_boundary(settings, experiment.boundary, partial(boundary_of, height))
+        if boundary is None:
+            name = height.attrs.get("source_file", "height")
             raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
-        if found == "free":
-            self.body.kernel.check_cells(spacing(self.height, "height"))
-        return replace(self, settings=replace(self.settings, boundary=found))
+        if boundary == "free":
+            self.body.kernel.check_cells(spacing(height, "height"))
+        grid_error, (fewest, most) = settings.grid_error, GRID_ERROR_CELLS
+        if grid_error == "auto":  # only if no further field has to be kept
+            needs_pressure = experiment.axis == "time" and "pressure" not in settings.fields
+            grid_error = fewest <= height.size <= most and not needs_pressure
+        settings = replace(settings, boundary=boundary, grid_error=grid_error)
+        for name, found, why in experiment.unsupported(settings):
+            raise InputError(f"{name} is {found!r}: {why}")
+        return replace(self, height=height, settings=settings)
 
 
 @dataclass(frozen=True)

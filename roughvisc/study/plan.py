@@ -172,7 +172,7 @@ def plan(
             if surface not in surfaces:
                 surfaces[surface] = case.height()
             ready = time.thread_time()
-            problem = Problem(surfaces[surface], case.body, case.settings).with_known_boundary(case.experiment.boundary)
+            problem = Problem(surfaces[surface], case.body, case.settings).resolved(case.experiment)
             own = case.experiment.rows(problem, in_memory=False)
             seconds = time.thread_time() - ready
             if is_own:
@@ -456,7 +456,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         texts, end = ", ".join(unit_for(late, "s").text(one) for one in late), case.program.duration
         note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
     seconds += run.seconds * _work(height.size) / _work(run.cells)
-    seconds *= 1 + (_GRID_ERROR if settings.has_grid_error(whole.size, case.experiment.axis) else 0.0)
+    seconds *= 1 + (_GRID_ERROR if own.problem.settings.grid_error else 0.0)
     memory = needed(whole.size)
     return {
         "memory_model": model,
