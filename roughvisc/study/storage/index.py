@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,7 +29,7 @@ from roughvisc.study.storage.folder import (
     warn_once,
     write_json,
 )
-from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.netcdf import ERRORS, NETCDF, foreign, unreadable
 from roughvisc.variables import ROW, STEP, VARIABLES, axis_of
 
 INDEX = ".index.json.gz"
@@ -97,16 +98,22 @@ def read_entry(path: Path) -> Entry:
     """
     require_file(path)
     stamp = _stamp(path)
-    with open_result(path) as result:
-        attributes = {name: one.item() if isinstance(one, np.generic) else one for name, one in result.attrs.items()}
-        histories = {name: result[name].values for name in _HISTORIES if name in result.variables}
-        fields = {str(name): one.dtype.str for name, one in result.variables.items() if one.dims[-2:] == ("x", "y")}
-        needed = {axis_of(histories), "force", "status", "x", "y"}
-        if absent := sorted(needed - result.variables.keys()) + ["case"] * ("case" not in attributes):
-            raise InputError(f"{path}: holds no {', '.join(absent)}: expected a result of roughvisc run")
-        grid = [np.asarray(result[name].values, float) for name in ("x", "y")]
-    kept = {str(name): one for name, one in attributes.items() if isinstance(one, str | int | float)}
-    return Entry(path.name, stamp, kept, fields, histories, grid[0], grid[1])
+    try:
+        with NETCDF, netCDF4.Dataset(path) as file:  # in half the time of open_result
+            file.set_auto_maskandscale(False)
+            stored = file.variables
+            stated = {name: one.item() if isinstance(one, np.generic) else one for name, one in file.__dict__.items()}
+            found = foreign(stated, {name: (one.dimensions, one.dtype) for name, one in stored.items()})
+            histories = {name: stored[name][...] for name in _HISTORIES if name in stored}
+            fields = {name: one.dtype.str for name, one in stored.items() if one.dimensions[-2:] == ("x", "y")}
+            grid = {name: np.asarray(stored[name][...], float) for name in ("x", "y") if name in stored}
+    except ERRORS as error:
+        raise unreadable(path, error) from error
+    absent = [name for name in ("status", "x", "y", "case") if name not in {**histories, **grid, **stated}]
+    if found or absent:
+        raise InputError(f"{path}: {found or f'holds no {absent[0]}'}: expected a result of roughvisc run")
+    attributes = {name: one for name, one in stated.items() if isinstance(one, str | int | float)}
+    return Entry(path.name, stamp, attributes, fields, histories, **grid)
 
 
 def _stamp(path: Path) -> tuple[int, int]:

@@ -59,7 +59,7 @@ class DamagedError(InputError):
     """The content of a file is damaged."""
 
 
-def _unreadable(path: Path, error: Exception, what: str = "") -> InputError:
+def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     """Return the error of a file that the library could not read: the system refused, or its content is broken."""
     if not (isinstance(error, OSError) and (error.errno or 0) > 0):  # errors of the library have negative numbers
         try:
@@ -106,8 +106,8 @@ def open_result(path: str | Path) -> xr.Dataset:
     try:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except ERRORS as error:
-        raise _unreadable(path, error) from error
-    if found := _foreign(dataset):
+        raise unreadable(path, error) from error
+    if found := foreign(dataset.attrs, {str(name): (one.dims, one.dtype) for name, one in dataset.variables.items()}):
         expected = f"a result of roughvisc of format {RESULT_FORMAT}"
         raise InputError(
             f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
@@ -115,19 +115,27 @@ def open_result(path: str | Path) -> xr.Dataset:
     return dataset
 
 
-def _foreign(dataset: xr.Dataset) -> str:
-    """Return what shows that a Dataset is no result of this format; empty if nothing."""
-    attributes, rows = dataset.attrs, axis_of(dataset)
+def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[tuple[Any, ...], np.dtype[Any]]]) -> str:
+    """Return what shows that a file is no result of this format; empty if nothing.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Attributes of the file.
+    variables : mapping
+        Name -> dimensions and dtype of its variables.
+    """
+    rows = axis_of(variables)
     if (stated := attributes.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
         return f"is of format {stated}"
     for name in AXES[rows].needed:
-        if name not in dataset.variables:
+        if name not in variables:
             return f"holds no {name}"
-        if dataset[name].dims != (rows,):
-            return f"holds {name} over {', '.join(map(str, dataset[name].dims)) or 'nothing'}"
-    for name, variable in dataset.variables.items():
-        if name in VARIABLES and variable.dtype.kind not in ("U" if VARIABLES[str(name)].dtype == "str" else "fiub"):
-            return f"holds {name} as {variable.dtype}"
+        if (dims := variables[name][0]) != (rows,):
+            return f"holds {name} over {', '.join(map(str, dims)) or 'nothing'}"
+    for name, (_, dtype) in variables.items():
+        if name in VARIABLES and dtype.kind not in ("U" if VARIABLES[name].dtype == "str" else "fiub"):
+            return f"holds {name} as {dtype}"
     if not isinstance(attributes.get("tolerance", 1.0), float | np.floating):
         return f"has the tolerance {short_repr(attributes['tolerance'])}"
     try:
@@ -199,7 +207,7 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
             file.set_auto_maskandscale(False)
             return np.asarray(file[name][key])
     except ERRORS as error:
-        raise _unreadable(Path(path), error, f"its {name}: ") from error
+        raise unreadable(Path(path), error, f"its {name}: ") from error
 
 
 def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | None = None) -> Path:
