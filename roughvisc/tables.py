@@ -1,6 +1,6 @@
 """Tables of numbers in text files: encoding, separator, decimal mark, heading and units.
 
-All readers of text use these functions, so that no two of them read different numbers from one file.
+All readers of text use these functions, so that they read the same numbers from a file.
 """
 
 from __future__ import annotations

@@ -147,7 +147,7 @@ def number(
     Raises
     ------
     InputError
-        If the value is not such a quantity, or outside the bounds.
+        If the value is not a quantity of this unit, or outside the bounds.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     Raises
     ------
     InputError
-        As for :func:`quantity`, for the first text that is not such a quantity.
+        As for :func:`quantity`, for the first text that is not a quantity of this unit.
 
     Examples
     --------
@@ -288,7 +288,7 @@ def is_quantity(value: Any, unit: str) -> bool:
 
 
 def _parsed(text: str, unit: str, difference: bool) -> float:
-    """Return the value of a text in a unit; a :class:`ValueError` states what is wrong with the text."""
+    """Return the value of a text in a unit; a :class:`ValueError` describes an invalid text."""
     matched = _QUANTITY.fullmatch(text.replace("°C", "degC").replace("°F", "degF")) if len(text) <= 100 else None
     if matched is None:
         raise ValueError("not a quantity")

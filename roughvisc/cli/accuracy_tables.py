@@ -14,7 +14,7 @@ from roughvisc.study.trade import cheapest, pareto_front
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: The words tell the verdicts apart; weight and colour help to find them.
+#: Weight and colour of verdicts that need attention.
 _STYLES = {BROKEN: "bold red", DOUBTFUL: "bold", NOT_KNOWN: "dim"}
 
 

@@ -193,7 +193,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
 
 
 def _problem(outcomes: Mapping[str, Outcome], number: Mapping[str, int], log: Path) -> tuple[str, int]:
-    """Write the messages of the cases that are not done; return what is wrong with the sweep, and its exit status."""
+    """Write the messages of the cases that are not done; return the problem of the sweep, and its exit status."""
     from roughvisc.study.execution.outcome import REFUSED
 
     bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]

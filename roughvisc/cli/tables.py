@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from roughvisc.study.execution.outcome import Outcome
 
-#: What is stated of accuracy, and its parts, each at its worst.
+#: Stated error and its parts, of which the largest are printed.
 _ERRORS = {
     "stated_error": "worst stated error",
     "time_error": "worst error of time steps",
@@ -33,12 +33,12 @@ _ERRORS = {
 
 
 def readable(value: float, unit: str) -> str:
-    """A value in SI with a prefix that reads well: ``readable(2e-5, "m")`` is ``"20 µm"``."""
+    """Return a value in SI with a suitable prefix: ``readable(2e-5, "m")`` is ``"20 µm"``."""
     return unit_for(value, unit).text(value) if np.isfinite(value) else "not known"
 
 
 def result_table(dataset: xr.Dataset) -> Group:
-    """Summary of a result: main results, accuracy, cost."""
+    """Return a summary of a result: main results, accuracy, cost."""
     axis = AXES[axis_of(dataset)]
     row = dataset.isel({axis.name: axis.telling_row(dataset)})
     where = f"at {axis.place(float(row[axis.name]), 3)}" if axis.telling else "at the end"
@@ -66,7 +66,7 @@ def result_table(dataset: xr.Dataset) -> Group:
 
 
 def _remark(dataset: xr.Dataset, row: xr.Dataset, name: str, value: float) -> str:
-    """Return what is printed after a value of a result: its share of the area, the largest value, or its error."""
+    """Return a remark on a value of a result: its share of the area, the largest value, or its error."""
     axis = AXES[axis_of(dataset)]
     if name == axis.telling:
         ordered = dataset[name].sortby(axis.name)
@@ -89,16 +89,16 @@ def _remark(dataset: xr.Dataset, row: xr.Dataset, name: str, value: float) -> st
 
 
 def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
-    """Summary of a sweep: how its cases ended, how accurate they are, what they cost.
+    """Return a summary of a sweep: numbers of cases, accuracy, cost.
 
     Parameters
     ----------
     outcomes : sequence of Outcome
-        One a distinct case.
+        One for each distinct case.
     asked : int
-        Number of cases, those alike counted each.
+        Number of cases, including identical ones.
     title : str
-        Of the study.
+        Title of the study.
     """
     kinds = [outcome.kind for outcome in outcomes]
     entries = [outcome.entry for outcome in outcomes if outcome.entry]
@@ -121,7 +121,7 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
 
 
 def realisations_tables(table: pd.DataFrame) -> Group:
-    """What a sweep's realisations scatter; nothing of one without.
+    """Return the scatter of the realisations of a sweep; empty without realisations.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def realisations_tables(table: pd.DataFrame) -> Group:
 
 
 def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
-    """What is in a scan: its channels, its size, what is missing, how rough it is.
+    """Return channels, size, missing points and areal parameters of a scan.
 
     Parameters
     ----------
@@ -147,9 +147,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     measures : xarray.Dataset
         Of :func:`roughvisc.parameters`.
     name : str
-        Of the file.
+        Name of the file.
     channels : sequence, optional
-        Of :func:`roughvisc.list_channels`; told where there are several.
+        Result of :func:`roughvisc.list_channels`, listed if there are several.
     """
     sides = spacing(height)
     counts = [height.sizes[axis] for axis in ("x", "y")]
@@ -183,7 +183,7 @@ def _channel_row(index: int, channel: Any) -> tuple[str, str]:
 
 
 def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
-    """The largest stated error of some results, and its parts; of a sweep, whose tolerances may differ, without one."""
+    """Return the largest stated error of some results and its parts; without `tolerance` for a sweep."""
     rows = []
     for name, label in _ERRORS.items():
         values = [np.ravel(one[name]) for one in found if name in one]
@@ -194,14 +194,14 @@ def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[
 
 
 def number(values: Any) -> str:
-    """The largest of some numbers that are known."""
+    """Return the largest finite number as text."""
     found = np.asarray(values)
     found = found[np.isfinite(found)]
     return f"{found.max():.2g}" if found.size else "not known"
 
 
 def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
-    """A title and rows of a label and a value."""
+    """Return a title above rows of a label and a value."""
     table = Table(show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
@@ -211,5 +211,5 @@ def two_columns(rows: list[tuple[str, Any]], title: str | None) -> Group:
 
 
 def titled(title: str | None, *parts: Any) -> Group:
-    """A title above what it is of."""
+    """Return a title above its table."""
     return Group(Text(printable(title or "untitled"), style="bold"), *parts)

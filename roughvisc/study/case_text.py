@@ -1,4 +1,4 @@
-"""A case as text: the study file that states it, and its name in titles and files."""
+"""A case as text: its study file, and its name in titles and file names."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from typing import Any
 from roughvisc.study.si_tables import unit_of
 from roughvisc.units import unit_for
 
-#: Longest name of a file without its beginning and end, and number of letters of a key that tells cases apart.
+#: Longest stem of a file name, and number of letters of a key that make it unique.
 _LONGEST, _KEY = 80, 8
 
 
 def study_text(case: Mapping[str, Any]) -> str:
-    """Study file (TOML, SI units) that states a case.
+    """Return the study file of a case, in TOML and SI units.
 
     Parameters
     ----------
     case : mapping
-        The case, as the attribute ``case`` of a result has it in JSON.
+        The case, from the JSON in the attribute ``case`` of a result.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def _toml(value: Any) -> str:
 
 
 def names_of(keys: Sequence[str]) -> dict[str, str]:
-    """Names of dotted keys: the last word, and what stands before it if two would have the same name.
+    """Return names of dotted keys: the last word, with the rest of the key if two names would be equal.
 
     Examples
     --------
@@ -76,13 +76,13 @@ def names_of(keys: Sequence[str]) -> dict[str, str]:
 
 
 def _last_word(key: str) -> str:
-    """Last part of a dotted key; a number with what it counts."""
+    """Return the last part of a dotted key, with the part before if it is a number."""
     parts = key.split(".")
     return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
 
 
 def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
-    """Dotted key -> varied value of a case in JSON, as the study writes it, or in a suitable unit."""
+    """Return dotted key -> varied value of a case, as written in the study, or in a suitable unit."""
     texts = {}
     for key, value in case.get("varied", {}).items():
         if written := case.get("written", {}).get(key):
@@ -96,7 +96,7 @@ def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
 
 
 def case_words(case: Mapping[str, Any]) -> str:
-    """What was varied in a case in JSON, in words; empty if nothing.
+    """Return the varied values of a case in words; empty if there are none.
 
     Examples
     --------
@@ -109,9 +109,9 @@ def case_words(case: Mapping[str, Any]) -> str:
 
 
 def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Names for the files of some cases: what was varied, in letters that every system takes; else their keys.
+    """Return stems of file names of cases: the varied values in portable letters, otherwise the keys.
 
-    A name depends on its case alone; if two are equal apart from capitals, both carry their keys.
+    A stem depends on its case alone; if two are equal apart from capitals, both have their keys added.
 
     Parameters
     ----------
@@ -139,6 +139,6 @@ def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
 
 
 def _safe(text: str) -> str:
-    """Letters, digits, points and dashes alone; a number stands next to its unit."""
+    """Return a text of letters, digits, points and dashes, with numbers next to their units."""
     text = text.replace("µ", "u").replace("μ", "u").replace("%", "percent").replace("/", "_per_", 1) if text else ""
     return re.sub(r"_?[^A-Za-z0-9.+-]+", "_", re.sub(r"(?<=\d) (?=[^\W\d])", "", text)).strip("_.") or "none"

@@ -112,7 +112,7 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
 def _with_files(table: Any, folder: Path) -> Any:
     """Return a table of a sweep with the names of files, sorted, for each pattern such as ``"scans/*.sur"``.
 
-    The name of an existing file is no pattern.
+    The name of an existing file is not taken for a pattern.
     """
     if not isinstance(table, Mapping):
         return table
@@ -139,8 +139,8 @@ def _realisations(
 ) -> list[tuple[dict[str, Any], dict[str, int]]]:
     """Return the changes that make each realisation of a case, and its number.
 
-    Realisation 0 of a scan is the scan itself, the others are its surrogates. Those of generated faces have seeds from
-    the stated ones.
+    Realisation 0 of a scan is the scan itself, the others are its surrogates. Generated faces are made with
+    consecutive seeds, beginning with the stated ones.
     """
     for key, value in change.items():
         data = place(data, key, value) if key.partition(".")[0] == "surface" else data

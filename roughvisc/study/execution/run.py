@@ -47,21 +47,21 @@ _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scal
 
 
 def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool = True) -> Path:
-    """Folder that the results of a study go to.
+    """Return the folder of the results of a study.
 
     Parameters
     ----------
     case : Case
-        Of the study.
+        A case of the study.
     out : path, optional
-        The folder, if it is not the usual one.
+        The folder. Default: ``results/`` and the name of the study, next to the study.
     to_write : bool
-        Refuse it here where nothing could be written there.
+        Refuse a folder that cannot be written to.
 
     Raises
     ------
     InputError
-        If it is no folder, or may not be made or written to.
+        If the path is a file, or the folder cannot be made or written to.
     """
     if out is not None:
         folder = Path(out).expanduser()
@@ -81,7 +81,7 @@ def compute(
 ) -> xr.Dataset:
     """Return the result of a case, with all that is needed to run it again in its attributes.
 
-    The run continues from what the keeper has kept, and the fields of the result are read from there.
+    The run continues from the checkpoint of the keeper, from which the fields of the result are read.
 
     Raises
     ------
@@ -125,46 +125,45 @@ def run_case(
     checkpoint_steps: int | None = None,
     threads: int | None = None,
 ) -> Path:
-    """Bring one case to its file in a folder, and give the file's path.
+    """Run one case unless its file exists, and return the path of the file.
 
-    Finished already: nothing is computed. Interrupted, by whatever means: it goes on from its last checkpoint, and
-    ends with the same numbers, to the last bit, as if it had not been; ``wall_time`` leaves out what was lost. A curve
-    of friction goes on with the speed that was being computed.
+    An interrupted case continues from its last checkpoint, and ends with the same bits as an uninterrupted one;
+    ``wall_time`` does not count lost work. A friction curve continues with the speed at which it was interrupted.
 
     Parameters
     ----------
     case : Case
-        What to compute.
+        The case.
     folder : path
-        Where the file goes; it is named by the case's key. What an unfinished run keeps is in hidden files beside it.
+        Folder of the file, which is named by the key of the case. Checkpoints are hidden folders there.
     progress : bool or callable
-        A progress bar, or a function called with the time reached and the program's length [s], or with the speeds of
-        a curve that are done and their number.
+        Whether to draw a progress bar; or a function of the time reached and the length of the program [s], or of the
+        number of finished speeds and their total number.
     stop : callable, optional
-        Asked at every accepted step, or speed; if it says so, a checkpoint is written and :class:`KeyboardInterrupt`
-        raised.
+        Called at every accepted step, or speed; if it returns true, a checkpoint is written and
+        :class:`KeyboardInterrupt` raised.
     checkpoint_seconds : float
-        Time between checkpoints; longer where they would take a twentieth of the time. [s]
+        Least time between checkpoints, which take at most a twentieth of the run. [s]
     checkpoint_steps : int, optional
-        Accepted steps between checkpoints, whatever these take.
+        Number of accepted steps between checkpoints, in place of that time.
     threads : int, optional
-        As :func:`roughvisc.simulate` has them.
+        As for :func:`roughvisc.simulate`.
 
     Raises
     ------
     InputError, ConvergenceError
-        As :func:`roughvisc.run`. An unconverged result is kept and none of these.
+        As for :func:`roughvisc.run`. An unconverged result is stored and is no error here.
     BlockingIOError
-        If another run is at work on this case in this folder.
+        If another run computes this case in this folder.
     RoughviscError
-        If the surface's file was changed after the study was read.
+        If the file of the surface has changed since the study was read.
     OSError
-        If the disk is full; the last checkpoint stays.
+        If the disk is full; the last checkpoint is kept.
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
     if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
-        return path  # and no run has left behind what it needs no longer
+        return path  # and there are no leftovers to remove
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -206,7 +205,7 @@ def run_case(
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
     finally:
-        for place in made:  # empty only if nothing was kept
+        for place in made:  # removes empty folders only
             with suppress(OSError):
                 place.rmdir()
     return path
@@ -222,7 +221,7 @@ def run_stated(
     path = run_case(case, folder, progress=progress, threads=threads)
     dataset = open_result(path)
     if complaint := unconverged(dataset):
-        raise ConvergenceError(f"{complaint}; the result is kept in {path}, its variable 'status' says which")
+        raise ConvergenceError(f"{complaint}; the result is kept in {path}, see its variable 'status'")
     return dataset
 
 
@@ -267,7 +266,7 @@ def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = No
 
 
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
-    """What to tell about times or speeds that did not converge; empty if all did."""
+    """Return a message about times or speeds that did not converge; empty if all did."""
     rows = axis_of(histories)
     status = np.asarray(histories["status"])
     bad = np.flatnonzero(status == NOT_CONVERGED)
