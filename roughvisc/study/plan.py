@@ -11,7 +11,6 @@ import math
 import shutil
 import time
 from bisect import bisect_left
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -143,14 +142,9 @@ def plan(
     -----
     A case runs on at most 128 cells a side, with its own tolerance and kept times; a friction curve on 48, at some of
     its speeds. Steps and convolutions are extrapolated to the real grid. The contact fraction is that of the coarse
-    run, corrected for the slopes that the coarse grid lacks: contact depends on the pressure over the root mean square
-    slope, ``erf(sqrt(2) p / (E* h'))`` in Persson's theory [1]_. The time follows from a few iterations on the real
-    grid. It is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2. In a sweep with many cases
-    some have no coarse run; their numbers are those of the most similar case.
-
-    References
-    ----------
-    .. [1] B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
+    run, corrected for the slopes that the coarse grid lacks by Persson's theory. The time follows from a few iterations
+    on the real grid. It is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2. In a sweep with
+    many cases some have no coarse run; their numbers are those of the most similar case.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -180,7 +174,7 @@ def plan(
                 expected = len(cases) * float(np.mean([one.seconds for one in runs.values()]))
             similar = min(runs, key=lambda other: _distance(number, other, parameters))
             row |= _costs(case, own, runs[similar], seconds, there)
-        except InputError as error:
+        except (InputError, ConvergenceError) as error:
             row["refusal"] = str(error)
         if not is_own:
             row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
@@ -232,7 +226,7 @@ class CoarseRun(NamedTuple):
 def coarse_run(own: Rows, case: Case) -> CoarseRun:
     """Run a case on few cells, with its own tolerance and kept times, and time a convolution on its own grid.
 
-    A long run ends early. Its steps are then carried on, and an elastic solution gives its contact.
+    A long run ends early. Its steps and its contact are then carried on.
 
     Parameters
     ----------
@@ -276,9 +270,11 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
                     contact.append(float(np.nan_to_num(row.values["contact_area_counted"])) / nominal_area(few))
             if program is not None and (total > _MOST_CONVOLUTIONS or tally[:, 0].sum() > _MOST_STEPS):
                 share = _part_done(program, row.at)
-                if share < 1:
-                    contact.append(_largest_contact(rows))
-                    fraction = max(fraction, contact[-1])
+                compliance = case.body.material.contact_compliance
+                now, end = (float(compliance(one)) for one in (row.at, program.duration))
+                if force * now > 0:  # a load that is still to come, and creep
+                    fraction = scaled_contact(fraction, max(program.largest_load * end / (force * now), 1.0))
+                    contact.append(fraction)
                 break
         seconds = (time.thread_time() - began) / max(before, 1.0)
         beyond, touching = 0.0, float(np.mean(contact or [0.0]))
@@ -295,11 +291,32 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
     else:
         steps, work = tally[0, 0], tally[0, 1] * 2 ** (_CURVE_GROWS * octaves)
         dearer = work * _CURVE_CONVOLUTION
-    slope, coarse_slope, touched = rms_slope(height), rms_slope(few), fraction
-    if slope > 0 and coarse_slope > 0 and fraction < 1:
-        touched = float(erf(erfinv(fraction) * coarse_slope / slope))
+    slope = rms_slope(height)
+    touched = scaled_contact(fraction, rms_slope(few) / slope) if slope > 0 else fraction
     scaled = np.array(contact or [0.0]) * (touched / fraction if fraction > 0 else 1.0)
     return CoarseRun(steps, work, kept_part, scaled, touched, force, work * seconds + dearer * beyond, height.size)
+
+
+def scaled_contact(fraction: float, times: float) -> float:
+    r"""Return a contact fraction under another ratio of pressure to modulus times slope.
+
+    Parameters
+    ----------
+    fraction : float
+        Contact fraction. [-]
+    times : float
+        Factor of the ratio. [-]
+
+    Notes
+    -----
+    Persson's theory has the fraction :math:`\mathrm{erf}(\sqrt 2\, p / (E^* h'))` under a nominal pressure ``p``, with
+    the root mean square slope ``h'`` [1]_.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
+    """
+    return float(erf(erfinv(fraction) * times)) if 0 < fraction < 1 and times > 0 else fraction
 
 
 def solved(rows: Rows) -> xr.DataArray:
@@ -356,36 +373,6 @@ def _part_done(program: Program, now: float) -> float:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
         done, total = done + part * weight, total + weight
     return max(done / total, 1e-6) if total else 1.0
-
-
-def _largest_contact(rows: Any) -> float:
-    """Return the largest contact fraction of a program by elastic solutions. [-]
-
-    While a contact grows, the pressure of a viscoelastic body is that of an elastic one under the load ``integral
-    C(t - s) dF(s)`` over its compliance [1]_. Each segment counts as a jump at its beginning.
-
-    References
-    ----------
-    .. [1] T. C. T. Ting, J. Appl. Mech. 35 (1968) 248.
-    """
-    scene, creep = rows.scene, rows.problem.body.material.contact_compliance
-    corners, jumps, effective, approach = np.array(scene.program.corners), list[float](), 0.0, 0.0
-    for number, segment in enumerate(scene.program.segments):
-        if segment.control == "approach":
-            approach = max(approach, (segment.end or 0.0) + abs(segment.amplitude))
-        jumps.append(0.0 if segment.end is None or segment.control == "approach" else segment.end - sum(jumps))
-        crept = float(creep(corners[number + 1] - corners[: number + 1]) @ jumps)
-        if segment.amplitude:
-            crept += abs(segment.amplitude) * float(creep(segment.period / 4))
-        effective = max(effective, crept)
-    pushes = [{"load": effective / scene.grid.cell_area}] if effective > 0 else []
-    pushes += [{"approach": approach}] if approach > scene.gap.min() else []
-    fraction = 0.0
-    for push in pushes:
-        with suppress(ConvergenceError):
-            found = solve_contact(scene.grid, scene.gap, tolerance=1e-2, present=scene.present, **push)
-            fraction = max(fraction, float((found.pressure > 0).mean()))
-    return fraction
 
 
 def timed_convolution(rows: Rows, touching: float) -> float:
@@ -544,8 +531,9 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
         processes = processes_that_fit(largest, processes, there.size)
     together = float(np.sum(largest[:processes]))
     size = float(np.nansum(dataset["disk"].values))
-    refusals = Counter(str(text) for text in dataset["refusal"].values if text)
-    reasons = [f"{count} of {total} cases: {why}" if total > 1 else why for why, count in refusals.most_common(3)]
+    refusals = [str(text) for text in dataset["refusal"].values if text]
+    several = f"{len(refusals)} of {total} cases: " if total > 1 else ""
+    reasons = [several + "; ".join([*dict.fromkeys(refusals)][:3])] if refusals else []
     if together > PART * there.size >= largest[0]:
         needed = f"{processes} processes need {amount(together)} of memory, and {amount(there.size)} are {there.words}"
         reasons.append(f"{needed}: use --workers {processes_that_fit(largest, processes, there.size)}")
