@@ -1,4 +1,4 @@
-"""What is shown while something is computed."""
+"""Progress on the screen: the time left, and nothing where quiet is asked for."""
 
 import io
 

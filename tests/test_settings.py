@@ -1,4 +1,4 @@
-"""How a contact is computed, as one value: its defaults, what it refuses, and that all its doors agree."""
+"""Settings of a contact: the same defaults and refusals in Python, in a study and in the stored case."""
 
 import inspect
 import json

@@ -1,4 +1,4 @@
-"""Quantities at the door."""
+"""Arguments with units: their conversion to SI units, and what is refused."""
 
 import contextlib
 import math

@@ -1,4 +1,4 @@
-"""A body other than a half-space: whatever is built for a case keeps its kernel."""
+"""Bodies other than a half-space: every grid that a case is solved on has the kernel of its body."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a row states of itself, in the result that a user gets."""
+"""Stated accuracy of each row of a result."""
 
 import numpy as np
 import pytest

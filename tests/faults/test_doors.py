@@ -1,4 +1,4 @@
-"""What is too large, endless, malformed or meant for a terminal is refused or shown, in one sentence."""
+"""Input that is too large, endless, malformed or meant for a terminal is refused in one sentence."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A run that dies, is refused something, or finds its files damaged: the next one ends with the same bits."""
+"""Runs that are killed, refused a file, or find one damaged: the next run ends with the same bits."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""The figure of steady sliding."""
+"""Figures of steady sliding: the values drawn, in the order of the speed."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The pressure of a first study."""
+"""The pressure of a first study brings a stated share of the surface into contact."""
 
 import numpy as np
 import pytest

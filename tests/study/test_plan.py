@@ -164,16 +164,6 @@ def test_memory__is_that_of_the_arrays_of_the_run(study, changes):
     assert 1 / 1.3 < planned / taken < 1.3
 
 
-def test_plan__counts_the_same_on_a_busy_machine(study, monkeypatch):
-    case = study(ROUGH)[0]
-    first = rv.plan([case])
-    clock = iter(range(10**9))
-    monkeypatch.setattr("time.thread_time", lambda: 100.0 * next(clock))  # every look at the clock costs 100 s
-    second = rv.plan([case])
-    for name in ("steps", "convolutions", "rows"):
-        assert first[name].equals(second[name]), name
-
-
 @pytest.mark.parametrize("changes", [{}, CYCLE], ids=["hold", "cycle"])
 def test_coarse_run__is_carried_on_to_the_end(study, monkeypatch, changes):
     case = vary(study(ROUGH)[0], {"keep.times": 6} | changes)
@@ -194,21 +184,6 @@ def test_free_contact__is_solved_on_a_part_of_the_surface(study):
     assert int(planned.solved_cells_x[1]) == 201
     assert float(planned.contact_fraction[0]) == pytest.approx(float(planned.contact_fraction[1]), rel=0.15)
     assert planned.memory[0] < planned.memory[1]
-
-
-@pytest.mark.thorough
-def test_plan__names_what_is_modelled(study):
-    base = study(ROUGH)[0]
-    cases = [
-        base,
-        vary(base, {"material": {"model": "elastic", "shear_modulus": 1e6}}),
-        vary(base, {"material": {"model": "power_law", "glassy": 2e-7, "coefficient": 1e-6, "exponent": 0.3}}),
-        vary(base, {"solve.boundary": "free", "solve.edge": "accept", "keep.fields": ["gap"]}),
-    ]
-    planned = rv.plan(cases)
-    assert list(planned.boundary.values) == ["periodic", "periodic", "periodic", "free"]
-    assert len(set(planned.memory_model.values[:3])) == 3
-    assert planned.attrs["refusal"] == ""
 
 
 def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
@@ -244,12 +219,6 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
     assert list(costs.warning.values != "") == [True, False]
     with pytest.raises(EdgeContactError):
         rv.run(rough, progress=False)
-
-
-def test_late_times__are_named(study):
-    planned = rv.plan(study(BALL.replace('"200 ms"', '"200 ms", "3 s"')))
-    assert str(planned.note[0].values).startswith("3 s left out")
-    assert int(planned.rows[0]) == 3
 
 
 def test_plan__refuses_with_a_reason(study, monkeypatch):

@@ -1,4 +1,4 @@
-"""The xarray engine "roughvisc"."""
+"""The xarray engine "roughvisc" opens scans as ``open_scan`` does, with its options."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Conditioning of scans."""
+"""Conditioning of scans: filters, fits, filling and outliers against closed forms, and what is refused."""
 
 import numpy as np
 import pytest

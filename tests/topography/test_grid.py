@@ -1,4 +1,4 @@
-"""The door for heights: whatever states them is converted to metres or refused, by every public function."""
+"""Heights as arguments: every public function converts them to metres or refuses them."""
 
 import numpy as np
 import pint

@@ -1,4 +1,4 @@
-"""Scans in: instrument files, grid files and surface cards."""
+"""Reading of scans: heights and positions from instrument files, grid files and surface cards."""
 
 import hashlib
 import random

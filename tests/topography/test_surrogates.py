@@ -1,4 +1,4 @@
-"""Random surfaces with the spectrum of a surface."""
+"""Random surfaces with the spectrum of a surface: it is kept on any grid, and its short waves can be left out."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Surfaces from recipes."""
+"""Generated surfaces: shapes, spectra and moments against the recipe, on any grid."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Scans out: conversion, and surface cards for files."""
+"""Writing of scans: conversion without loss, and surface cards that state how a file is read."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Time-temperature shift."""
+"""Time-temperature shift: creep at another temperature is creep at shifted times."""
 
 import numpy as np
 import pytest

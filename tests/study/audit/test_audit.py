@@ -9,7 +9,6 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms as cf
-from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.audit import effects
 from roughvisc.study.audit.audit import VERDICTS, Finding
 from roughvisc.study.audit.limits import LIMITS, STATED
@@ -161,19 +160,6 @@ def test_thickness__predicts_the_approach_of_a_rough_surface(thickness):
     )
     true = 1 - float(sheet.approach[-1] / half_space.approach[-1])  # incompressible: no compression of its own
     assert 0.5 * true < rv.audit(half_space, thickness=thickness)["thickness"].number < 2 * true
-
-
-def test_thickness__of_a_flat_punch_is_by_its_approach():
-    """Its force is proportional to the approach, so that both are off by the same part."""
-    punch = rv.simulate(rv.flat_punch(2e-4, 5e-4, 27), RUBBER, rv.Program().load(1e-3, over=1.0), **QUICK)
-    expected = effects.half_space_excess(Sheet(1e-3).relief * float(punch.force[-1] / punch.approach[-1]) / MODULUS)
-    assert rv.audit(punch, thickness=1e-3)["thickness"].number == pytest.approx(expected, rel=1e-12)
-
-
-def test_thickness__of_a_layer_has_its_unit():
-    body = rv.layer(RUBBER, 5e-5, on=rv.elastic(1e8))
-    ds = rv.simulate(rv.sphere(RADIUS, 4e-4, 16), body, rv.Program().load(1e-4, over=1.0), **QUICK)
-    assert "50 µm" in rv.audit(ds)["thickness"].sentence
 
 
 def test_yielding__is_by_the_largest_pressure(ball):
@@ -361,12 +347,6 @@ def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
     usual = [name for name in LIMITS if name not in ("heating", STATED)]
     assert [one.name for one in rv.audit(rough)] == usual
     assert [one.name for one in rv.audit(ball)] == [name for name in usual if name not in ("stickiness", "border")]
-
-
-def test_audit__is_the_same_of_a_lazy_result(rough):
-    given = {"work_of_adhesion": 0.05, "thickness": 1e-4, "yield_strength": 1e7}
-    whole, lazy = rv.audit(rough, **given), rv.audit(rough.chunk(time=1, x=20), **given)
-    assert [one.number for one in whole] == [one.number for one in lazy]
 
 
 def test_audit__without_fields_or_contact_knows_less(rough):

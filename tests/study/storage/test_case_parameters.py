@@ -9,7 +9,6 @@ import roughvisc as rv
 from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.storage.sweep_cases import identifier
 from roughvisc.study.study_file import TABLES
 from roughvisc.variables import VARIABLES
 
@@ -71,15 +70,6 @@ def test_files__open_together_by_xarray_alone(folder, options):
         theirs = rv.plot.sweep(rv.open_results(folder), "contact_area", along="program.0.load")
         assert [ax.get_xlabel() for ax in ours.axes] == [ax.get_xlabel() for ax in theirs.axes]
         assert ours.axes[0].get_xlabel() == "Load [mN]"
-
-
-def test_open_results__names_each_parameter_once(folder):
-    ds = rv.open_results(folder)
-    assert ds.attrs.get("title") == "A ball"
-    for key in ("program.0.load", "solve.edge"):
-        assert ds[identifier(key)].attrs["long_name"] == key
-        assert key not in ds
-    assert ds.sel(case=ds.program_0_load == 1e-3).sizes["case"] == 2
 
 
 def test_labels__are_apart_from_all_variables():

@@ -1,4 +1,4 @@
-"""The accessor ``ds.roughvisc`` of results."""
+"""The accessor ``ds.roughvisc``: every observable and figure, wherever the result comes from."""
 
 import inspect
 import os

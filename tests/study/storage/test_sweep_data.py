@@ -30,7 +30,6 @@ OWN_TIMES = (
 "program.1.hold" = ["0.1 s", "10 s"]
 """
 )
-KEYS = ["program_0_load", "program_0_over", "program_1_hold"]
 
 
 @pytest.fixture
@@ -71,34 +70,6 @@ def test_own_times__each_case_is_its_result_and_missing_after_it(own_times):
             np.testing.assert_array_equal(ds.height, alone.height)
 
 
-def test_own_times__are_a_cube_groups_and_frames(own_times):
-    _, ds = own_times
-    area = ds.contact_area.where(ds.time == ds.time.max("row")).max("row")
-    cube = ds.set_index(case=KEYS).unstack("case")
-    assert {name: cube.sizes[name] for name in KEYS} == dict.fromkeys(KEYS, 2)
-    one = cube.sel(program_0_load=5e-3, program_0_over=10e-3, program_1_hold=10.0)
-    np.testing.assert_array_equal(one.force, ds.force[5])
-    np.testing.assert_array_equal(one.pressure, ds.pressure[5])
-    means = area.groupby("program_1_hold").mean()
-    assert means.sel(program_1_hold=10.0) > means.sel(program_1_hold=0.1), "the ball creeps"
-    frame = ds[["force", "contact_area"]].to_dataframe().dropna(subset=["force"])
-    assert len(frame) == ds.rows.sum()
-    assert frame.query("program_0_load > 4.5e-3")["force"].max() == pytest.approx(5e-3)
-    slower = ds.sel(case=ds.program_0_over > 20e-3)
-    assert slower.case.values.tolist() == [2, 3, 6, 7]
-
-
-def test_own_times__are_drawn_by_xarray_and_by_the_sweep_figure(own_times):
-    _, ds = own_times
-    lines = ds.contact_area.plot.line(x="time", hue="case")
-    assert len(lines) == 8
-    figure = rv.plot.sweep(ds, "approach", times=-1)
-    drawn = np.concatenate([line.get_ydata() for ax in figure.axes for line in ax.lines])
-    at_end = [float(ds.approach[case, rows - 1]) for case, rows in enumerate(ds.rows.values)]
-    for value in at_end:
-        assert np.isclose(drawn, 1e6 * value, rtol=1e-9).any()
-
-
 @pytest.mark.thorough
 def test_own_times__have_observables_as_each_result(own_times):
     folder, ds = own_times
@@ -116,19 +87,6 @@ def test_own_times__have_observables_as_each_result(own_times):
                 if "time" in wanted[variable].dims:
                     np.testing.assert_allclose(found[variable][:count], wanted[variable], 1e-12, err_msg=name)
                     assert found[variable][count:].isnull().all(), variable
-
-
-def test_own_times__are_opened_by_xarray_alone(own_times):
-    def by_row(result):
-        return result.swap_dims(time="row").assign_coords(row=range(result.sizes["time"]))
-
-    folder, ds = own_times
-    together = {"combine": "nested", "concat_dim": "case", "coords": "different"}
-    how = together | {"data_vars": "all", "compat": "equals", "join": "outer"}
-    with xr.open_mfdataset(f"{folder}/*.nc", preprocess=by_row, **how) as found:
-        found = found.sortby(KEYS)
-        for name in (*KEYS, "time", "force", "contact_area", "pressure"):
-            np.testing.assert_array_equal(found[name], ds[name], name)
 
 
 def test_listed_times__after_the_end_of_a_program_are_left_out(study, tmp_path):
@@ -337,17 +295,6 @@ def test_open_results__index_follows_the_files(sixty, tmp_path, caplog):
     (folder / INDEX).chmod(0o400)
     assert rv.open_results(folder).sizes["case"] == 58
     folder.chmod(0o700)
-
-
-def test_open_results__blocks_of_large_fields(tmp_path, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.storage.sweep_data._BLOCK", 3 * 8 * 6 * 8)
-    ds = rv.open_results(synthetic(tmp_path, loads=2, seeds=1, times=7))
-    assert ds.pressure.chunks[1] == (3, 3, 1)
-    assert ds.height.dims == ("x", "y"), "one surface"
-    for case in range(2):
-        with open_result(tmp_path / f"{case:08x}{0:08x}.nc") as one:
-            np.testing.assert_array_equal(ds.pressure[case].values, one.pressure.values)
-            np.testing.assert_array_equal(ds.height.values, one.height.values)
 
 
 def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog):

@@ -169,17 +169,6 @@ def test_material__table_from_csv(study, tmp_path, rows, keys):
     assert vary(again, {"material.noise": 0.1}).tables["material"]["noise"] == 0.1
 
 
-def test_key__knows_a_creep_table_by_its_content(study, tmp_path):
-    rows = {"a.csv": "0, 1\n1, 2", "b.csv": "0, 1\n1, 2", "c.csv": "0, 1\n1, 3"}
-    for name, text in rows.items():
-        (tmp_path / name).write_text(HEADING + text)
-    sweep = '\n[sweep]\n"material.file" = ["a.csv", "b.csv", "c.csv"]'
-    a, b, c = read_cases(study(with_material('model = "creep_table"\nfile = "a.csv"') + sweep))
-    assert a.key == b.key != c.key
-    assert c.varied == {"material.file": "c.csv"}
-    assert c.material.creep_compliance(1.0) == pytest.approx(3.0, rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("rows", "keys"),
     [
@@ -483,9 +472,3 @@ CASE = {
     "material": {"model": "elastic", "shear_modulus": 1e6},
     "program": [{"load": 1.0, "over": 0.0}],
 }
-
-
-def test_case__prints_as_one_line(study):
-    case = repr(vary(read_study(study()), {"program.1.hold": "3 s"}))
-    assert "\n" not in case
-    assert all(part in case for part in ("'A ball'", "sphere", "zener", "2 N", "program.1.hold = 3 s")), case

@@ -1,4 +1,4 @@
-"""Temperature of a material in a study."""
+"""Temperature of a material in a study: the shift that it gives, and what is refused."""
 
 from pathlib import Path
 
