@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import multiprocessing
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -206,8 +206,8 @@ def require_loading(
     memory, rows = choose_memory(body, **memory_options(program, settings)).memory, least_rows(settings, program)
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
-    needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
-    require_memory(shape, needed, partial(needed, in_memory=False))
+    in_file = partial(march_bytes, settings, memory, rows=rows, part=part)
+    require_memory(shape, partial(in_file, in_memory=in_memory), in_file)
 
 
 def require_surface(shape: Any) -> None:
@@ -218,35 +218,24 @@ def require_surface(shape: Any) -> None:
 def require_memory(
     shape: tuple[int, int], needed: Callable[[float], float], in_file: Callable[[float], float] | None = None
 ) -> None:
-    """Refuse what needs more memory than is available.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Cells of the surface.
-    needed : callable
-        Memory by the number of cells. [byte]
-    in_file : callable, optional
-        The same if the kept fields go to a file. [byte]
+    """Refuse what needs more memory than is available; the parameters are those of :func:`too_large`.
 
     Raises
     ------
     TooLargeError
         Stating what it needs, what is available, and what would fit.
     """
-    cells = math.prod(shape)
-    if cells < WORTH_ASKING:
-        return
-    there = memory_available()
-    if not there.fits(needed(cells)):
-        advice = ["rv.run, which keeps the fields in a file"] if in_file and there.fits(in_file(cells)) else []
-        raise TooLargeError(too_large(shape, needed, there, advice))
+    if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(), in_file)):
+        raise TooLargeError(why)
 
 
 def too_large(
-    shape: tuple[int, int], needed: Callable[[float], float], there: Available, advice: Sequence[str] = ()
+    shape: tuple[int, int],
+    needed: Callable[[float], float],
+    there: Available,
+    in_file: Callable[[float], float] | None = None,
 ) -> str:
-    """Return the message of a case that does not fit.
+    """Return why a case does not fit in memory, and what would fit; empty if it fits.
 
     Parameters
     ----------
@@ -256,19 +245,24 @@ def too_large(
         Memory by the number of cells. [byte]
     there : Available
         Memory that may be taken.
-    advice : sequence of str
-        Changes with which it would fit. The finest grid of whole strides is added.
+    in_file : callable, optional
+        The same if the fields go to a file. [byte]
     """
+    cells, advice = math.prod(shape), []
+    if there.fits(needed(cells)):
+        return ""
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
         few = [math.ceil(count / stride) for count in shape]
         size = needed(math.prod(few))
         if there.fits(size):
             wanted = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(size)}"
-            advice = [f"{wanted} (resample = {few} under [surface], rv.resample in Python)", *advice]
+            advice.append(f"{wanted} (resample = {few} under [surface], rv.resample in Python)")
             break
+    if in_file is not None and there.fits(in_file(cells)):
+        advice.append("rv.run, which keeps the fields in a file")
     fitting = f"what would fit: {'; or '.join(advice)}" if advice else "expected more memory, or a coarser grid"
     return (
-        f"{shape[0]} x {shape[1]} cells need about {amount(needed(math.prod(shape)))} of memory, and "
+        f"{shape[0]} x {shape[1]} cells need about {amount(needed(cells))} of memory, and "
         f"{amount(there.size)} are {there.words}: {fitting}"
     )
 

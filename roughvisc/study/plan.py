@@ -458,7 +458,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         "disk": _VARIABLES[kind] + disk(case, whole.size, rows, run.steps, part * float(run.contact.mean())),
         "note": note.strip(),
         "warning": _warning(own, run.fraction * part),
-        "refusal": "" if there.fits(memory) else too_large((nx, ny), needed, there),
+        "refusal": too_large((nx, ny), needed, there),
     }
 
 
