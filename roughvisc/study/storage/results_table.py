@@ -120,8 +120,9 @@ def _table(
             status = f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"
             found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
             for name in variables_in_table("largest"):
-                known = [value for value in entry.histories.get(name, ()) if np.isfinite(value)]
-                found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
+                values = np.asarray(entry.histories.get(name, ()), float)
+                largest = values.max(where=np.isfinite(values), initial=-np.inf)
+                found[f"largest {heading(name, VARIABLES[name].units)}"] = largest if largest > -np.inf else np.nan
         elif one.key in held:
             status, message = "held by another run", held[one.key]
         else:

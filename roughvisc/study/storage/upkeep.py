@@ -127,21 +127,15 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     removed = [path for path in unused if _remove(path)]
     for key, paths in of_cases.items():
         checkpoint, lock = checkpoint_path(folder, key), lock_path(folder, key)
-        if (checkpoint / STATE).exists() and not (everything or _opens(result_path(folder, key))):
-            paths = [path for path in paths if path != checkpoint]
+        if (checkpoint / STATE).exists() and not everything:
+            try:
+                open_result(result_path(folder, key)).close()
+            except InputError:  # the case is not finished
+                paths = [path for path in paths if path != checkpoint]
         if paths:
             with suppress(OSError), lock_case(lock, patience=0.0):
                 removed += [path for path in paths if path == lock or _remove(path)]
     return removed
-
-
-def _opens(path: Path) -> bool:
-    """Return whether a file is a result, as far as opening it shows."""
-    try:
-        open_result(path).close()
-    except InputError:
-        return False
-    return True
 
 
 def _remove(path: Path) -> bool:
