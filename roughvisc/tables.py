@@ -158,18 +158,8 @@ class Wanted(NamedTuple):
     optional: bool = False
 
 
-class _Row(NamedTuple):
-    """Cells of a row, and the number of its line."""
-
-    line: int
-    cells: list[str]
-
-
-class _Place(NamedTuple):
-    """Position of a column in the rows, and the unit of its numbers."""
-
-    at: int
-    unit: str
+#: Number of a line, and its cells.
+_Row = tuple[int, list[str]]
 
 
 def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
@@ -201,37 +191,34 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     """
     path = Path(path)
     separator, rows = _rows(path)
-    above = next((place for place, row in enumerate(rows[:_FIRST]) if _has(row, wanted)), None)
+    above = next((at for at, (_, cells) in enumerate(rows[:_FIRST]) if _has(cells, wanted)), None)
     if above is None:
         raise _no_heading(path, rows, separator, wanted)
-    heading, below = rows[above], rows[above + 1 :]
+    (line, heading), below = rows[above], rows[above + 1 :]
     if not below:
-        raise InputError(
-            f"{path}: holds no rows below the heading in line {heading.line}: expected {', '.join(wanted)}"
-        )
-    places = _places(path, heading, wanted)
-    for row in below:
-        if any(row.cells[len(heading.cells) :]) or (separator == " " and len(row.cells) != len(heading.cells)):
-            expected = f"{len(heading.cells)}, one for each column"
-            raise InputError(f"{path}, line {row.line}: found {len(row.cells)} cells: expected {expected}")
-    cells = {
-        key: [row.cells[place.at] if place.at < len(row.cells) else "" for row in below]
-        for key, place in places.items()
+        raise InputError(f"{path}: holds no rows below the heading in line {line}: expected {', '.join(wanted)}")
+    places = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
+    factors = {
+        key: _factor(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
     }
+    for number, cells in below:
+        if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
+            expected = f"{len(heading)}, one for each column"
+            raise InputError(f"{path}, line {number}: found {len(cells)} cells: expected {expected}")
+    texts = {key: [cells[at] if at < len(cells) else "" for _, cells in below] for key, (at, *_) in places.items()}
     try:
-        mark = decimal_mark((cell for column in cells.values() for cell in column), separator)
+        mark = decimal_mark((cell for column in texts.values() for cell in column), separator)
     except InputError as error:
         raise error.prefixed(str(path)) from None
     columns = {}
-    for key, place in places.items():
-        factor = _factor(place.unit, wanted[key].unit, f"{path}: unit of {key}")
-        numbers = [float(plain_number(cell, mark) or "nan") for cell in cells[key]]
-        for row, cell, number in zip(below, cells[key], numbers, strict=True):
-            if not math.isfinite(number):
-                where, expected = f"{path}, line {row.line}", f"a number for {key}"
+    for key, column in texts.items():
+        values = [float(plain_number(cell, mark) or "nan") for cell in column]
+        for (number, _), cell, value in zip(below, column, values, strict=True):
+            if not math.isfinite(value):
+                where, expected = f"{path}, line {number}", f"a number for {key}"
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
-        columns[key] = np.array([float(f"{number * factor:.15g}") for number in numbers])
-    return columns, [row.line for row in below]
+        columns[key] = np.array([float(f"{value * factors[key]:.15g}") for value in values])
+    return columns, [number for number, _ in below]
 
 
 def _rows(path: Path) -> tuple[str, list[_Row]]:
@@ -246,7 +233,7 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
         return ",", []
     last = lines[-1][1]  # a row of numbers; the first lines may belong to no table
     if len(_split(last)) > 1 and all(map(_BETWEEN_BLANKS.fullmatch, _split(last))):
-        return " ", [_Row(i, _between_blanks(line)) for i, line in lines]
+        return " ", [(i, _between_blanks(line)) for i, line in lines]
     separator = next((sign for sign in ";\t," if sign in last), ",")
     rows = []
     for i, line in lines:
@@ -254,7 +241,7 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
             (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
         except csv.Error:  # an open quotation mark: no number
             cells = [line]
-        rows.append(_Row(i, [cell.strip() for cell in cells]))
+        rows.append((i, [cell.strip() for cell in cells]))
     return separator, rows
 
 
@@ -268,31 +255,31 @@ def _split(line: str) -> list[str]:
     return re.split(r"[ \t]+", line.strip(" \t"))
 
 
-def _fitting(heading: _Row, one: Wanted) -> list[int]:
-    """Return the positions of a column: those of its very name, or else of its name without the unit."""
-    cells = [_plain(cell) for cell in heading.cells]
-    name = _plain(name_and_unit(one.name)[0])
-    exact = [at for at, cell in enumerate(cells) if cell == _plain(one.name)]
-    return exact or [at for at, cell in enumerate(cells) if name_and_unit(cell)[0] == name]
+def _places(heading: Sequence[str], name: str) -> list[int]:
+    """Return the positions of a column in a heading: by its full name, or else by its name without the unit."""
+    cells, plain = [_plain(cell) for cell in heading], _plain(name_and_unit(name)[0])
+    exact = [at for at, cell in enumerate(cells) if cell == _plain(name)]
+    return exact or [at for at, cell in enumerate(cells) if name_and_unit(cell)[0] == plain]
+
+
+def _has(cells: Sequence[str], wanted: Mapping[str, Wanted]) -> bool:
+    return all(one.optional or _places(cells, one.name) for one in wanted.values())
 
 
 def _plain(name: str) -> str:
     return " ".join(name.split()).casefold()
 
 
-def _has(row: _Row, wanted: Mapping[str, Wanted]) -> bool:
-    return all(one.optional or _fitting(row, one) for one in wanted.values())
-
-
 def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mapping[str, Wanted]) -> InputError:
     """Return the error of a table without a heading; it states the heading to write."""
     sign = {",": ", ", ";": "; "}.get(separator, separator)
     write = sign.join(_example(one.name, one.unit) for one in wanted.values() if not one.optional)
-    numbers = next((at for at, row in enumerate(rows) if sum(map(_is_number, row.cells)) > 1), len(rows))
     found = "holds no rows"
     if rows:
-        widest = max(rows[: max(numbers, 1)], key=lambda row: len(row.cells))
-        found = f"found {sign.join(widest.cells)[:200]!r} in line {widest.line}"
+        has_numbers = (sum(any(plain_number(cell, mark) for mark in ".,") for cell in cells) > 1 for _, cells in rows)
+        numbers = next((at for at, is_numeric in enumerate(has_numbers) if is_numeric), len(rows))
+        line, widest = max(rows[: max(numbers, 1)], key=lambda row: len(row[1]))
+        found = f"found {sign.join(widest)[:200]!r} in line {line}"
     return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
 
 
@@ -300,41 +287,24 @@ def _example(name: str, unit: str) -> str:
     return name if name_and_unit(name)[1] or unit == "1" else f"{name} [{unit}]"
 
 
-def _places(path: Path, heading: _Row, wanted: Mapping[str, Wanted]) -> dict[str, _Place]:
-    """Return the position and the unit of each column that is present."""
-    places = {}
-    for key, one in wanted.items():
-        fitting = _fitting(heading, one)
-        if not fitting:
-            continue
-        names = [heading.cells[at] for at in fitting]
-        where = f"{path}, line {heading.line}"
-        if len(names) > 1:
-            raise InputError(f"{where}: {key} = {one.name!r} fits the columns {', '.join(names)}: expected one")
-        given = name_and_unit(names[0])[1]
-        stated = one.stated or name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
-        if given and stated and given != stated and one.unit != "1":
-            problem = f"the heading says {given!r} and the study {stated!r}"
-            raise InputError(f"{where}: unit of {key}: {problem}: expected one of them")
-        if not (given or stated):
-            raise InputError(
-                f"{where}: found the column {names[0]!r} without a unit: expected a heading, "
-                f"{_example(names[0], one.unit)!r}",
-                found=names[0],
-                expected=_example(names[0], one.unit),
-            )
-        places[key] = _Place(fitting[0], given or stated)
-    return places
-
-
-def _factor(unit: str, wanted: str, where: str) -> float:
-    """Return the factor from one unit to another."""
-    if unit == wanted:
+def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) -> float:
+    """Return the factor from the unit of a column to the wanted one; refuse a column without one unit."""
+    where = f"{path}, line {line}"
+    if len(names) > 1:
+        raise InputError(f"{where}: {key} = {one.name!r} fits the columns {', '.join(names)}: expected one")
+    given = name_and_unit(names[0])[1]
+    stated = one.stated or name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
+    if given and stated and given != stated and one.unit != "1":
+        problem = f"the heading says {given!r} and the study {stated!r}"
+        raise InputError(f"{where}: unit of {key}: {problem}: expected one of them")
+    unit = given or stated
+    if not unit:
+        found, expected = names[0], _example(names[0], one.unit)
+        message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
+        raise InputError(message, found=found, expected=expected)
+    if unit == one.unit:
         return 1.0
-    if wanted in FREQUENCY_UNITS:
-        raise InputError(f"{where}: found {unit!r}: expected {wanted!r}, as stated", found=unit, expected=wanted)
-    return quantity(f"1 {unit}", wanted, where)
-
-
-def _is_number(cell: str) -> bool:
-    return any(plain_number(cell, mark) is not None for mark in ".,")
+    if one.unit in FREQUENCY_UNITS:
+        text = f"{path}: unit of {key}: found {unit!r}: expected {one.unit!r}, as stated"
+        raise InputError(text, found=unit, expected=one.unit)
+    return quantity(f"1 {unit}", one.unit, f"{path}: unit of {key}")

@@ -160,9 +160,10 @@ class Case:
         They are a digest of the tables in SI, of the checksums of the scans, and of :data:`NUMERICS_REVISION`. The
         title, the paths, and the tables ``[observe]`` and ``[audit]`` do not count.
         """
-        stated = {one.name: getattr(self.settings, one.name) for one in fields(self.settings)}
-        settings = {one.name: stated[one.name] for one in fields(self.settings) if stated[one.name] != one.default}
-        settings["fields"] = sorted(self.settings.fields)
+        settings: dict[str, Any] = {"fields": sorted(self.settings.fields)}
+        for one in fields(self.settings):
+            if (value := getattr(self.settings, one.name)) != one.default:
+                settings.setdefault(one.name, value)
         tables = {name: self.tables.get(name) for name in ("material", "program", "friction")}
         surface = [
             {name: value for name, value in face.items() if name not in ("file", "second") and value is not False}

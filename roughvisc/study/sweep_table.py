@@ -142,41 +142,38 @@ def _realisations(
     Realisation 0 of a scan is the scan itself, the others are its surrogates. Generated faces are made with
     consecutive seeds, beginning with the stated ones.
     """
+    where = f"sweep.{REALISATIONS}"
+    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
+        raise InputError(key=where, found=count, expected=f"a whole number from 2 to {MOST}")
     for key, value in change.items():
         data = place(data, key, value) if key.partition(".")[0] == "surface" else data
     surface = a_table("surface", data.get("surface"))
     second = a_table("surface.second", surface.get("second", {}))
-    is_scan = "file" in surface or "file" in second
-    stated = [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface)
-    rough = {
-        key: face
-        for key, face in ((_SEED, surface), (_SECOND_SEED, second))
-        if not is_scan and face.get("generate") == "self_affine"
-    }
-    seeds = {key: face.get("seed") for key, face in rough.items()}
-    found, expected = count, ""
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
-        expected = f"a whole number from 2 to {MOST}"
-    elif stated:
-        expected = f"either realisations or {stated[0]}"
-    elif is_scan:
+    if stated := [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface):
+        raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
+    if "file" in surface or "file" in second:
         card = Path(folder, Path(str(surface.get("file"))).expanduser())
         if is_card(card, None) and card.is_file():
-            found = read_toml(card, "a surface card in TOML").get("generate")
-            expected = "" if found in (None, "self_affine") else "a scan, or a card of roughness"
-    elif not rough:
-        found, expected = f"generate = {surface.get('generate')!r}", "a scan, or generate = 'self_affine'"
-    elif not all(isinstance(seed, int) for seed in seeds.values()):
-        found, expected = list(seeds.values()), f"a whole number as {' and '.join(seeds)}"
-    elif not all("amplitudes" in face for face in rough.values()):
-        expected = "amplitudes, 'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
-    elif 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
-        found, expected = list(seeds.values()), f"seeds of the two faces that are equal, or at least {count} apart"
-    if expected:
-        raise InputError(key=f"sweep.{REALISATIONS}", found=found, expected=expected)
-    if is_scan:
-        surrogates = [(number, {SURROGATE: number} if number != ITSELF else {}) for number in range(count + 1)]
-        return [({**change, **drawn}, {REALISATION: number}) for number, drawn in surrogates]
+            recipe = read_toml(card, "a surface card in TOML").get("generate")
+            if recipe not in (None, "self_affine"):
+                raise InputError(key=where, found=f"a card of generate = {recipe!r}", expected="a scan, or roughness")
+        surrogates = [{SURROGATE: number} for number in range(1, count + 1)]
+        return [({**change, **one}, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
+    seeds: dict[str, int] = {}
+    for key, face in ((_SEED, surface), (_SECOND_SEED, second)):
+        if face.get("generate") == "self_affine":
+            if not isinstance(face.get("seed"), int):
+                raise InputError(key=where, found=face.get("seed"), expected=f"a whole number as {key}")
+            if "amplitudes" not in face:
+                kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
+                raise InputError(key=where, found=count, expected=f"{key.removesuffix('seed')}amplitudes, {kinds}")
+            seeds[key] = face["seed"]
+    if not seeds:
+        made = f"generate = {surface.get('generate')!r}"
+        raise InputError(key=where, found=made, expected="a scan, or generate = 'self_affine'")
+    if 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
+        expected = f"seeds of the two faces that are equal, or at least {count} apart"
+        raise InputError(key=where, found=list(seeds.values()), expected=expected)
     return [
         ({**change, **{key: seed + number - 1 for key, seed in seeds.items()}}, {REALISATION: number})
         for number in range(1, count + 1)
