@@ -132,6 +132,19 @@ def test_fluxes__carry_the_same_through_every_section(wrap):
     assert not across[gap == 0].any()
 
 
+def test_fluxes__turn_with_the_channel():
+    gap = np.zeros((3, 4))
+    gap[0, 0] = gap[1, 0] = gap[1, 1] = gap[1, 2] = gap[2, 2] = 1e-6
+    found = flow(gap, CELL)
+    along, across = fluxes(gap, CELL, found.pressure)
+    expected = np.zeros((3, 4))
+    expected[1, :3] = found.conductance / CELL[0] * np.array([0.5, 1.0, 0.5])  # half of a corner's faces carry it
+    assert_allclose(across, expected, rtol=1e-12, atol=0)
+    expected[:] = 0.0
+    expected[[0, 2], [0, 2]], expected[1, [0, 2]] = found.conductance / CELL[1], found.conductance / CELL[1] / 2
+    assert_allclose(along, expected, rtol=1e-12, atol=0)
+
+
 def unlike_its_inverse(cells):
     """Gap on a unit square whose cube, turned by a right angle, is one over itself; the flow through it is bent."""
     wave = np.cos(2 * np.pi * (np.arange(cells) + 0.5) / cells)
