@@ -103,6 +103,17 @@ def test_strong_materials__agree_with_a_dense_solution(profile, ratio, load):
     assert_strong(rows, 1e-3)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("cells", [256, 512])
+@pytest.mark.parametrize("ratio", [3.0, 30.0, 300.0, 3000.0])
+@pytest.mark.parametrize("profile", ["wave", "rough", "broad"])
+def test_strong_materials__agree_at_all_speeds(profile, ratio, cells, tolerance):
+    for load in (3e-6, 1e-4):
+        rows = strong_errors(line_profiles(cells)[profile], ratio, load, np.geomspace(1e-4, 10, 10), tolerance)
+        assert_strong(rows, tolerance, too_cautious=1)  # one state of all of them
+
+
 def test_power_and_slopes__agree_as_the_grid_is_refined():
     material, load = rubber(), 3e-5
     differences = []
