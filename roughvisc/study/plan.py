@@ -94,14 +94,17 @@ _FIRST_STEP = 0.005
 #: Iterations of a timed solve.
 _ITERATIONS = 3
 #: Coarse runs of a sweep go on for this time, or this part of the expected time of all cases. [s, 1]
-_BUDGET, _SHARE = 1.5, 0.05
+_BUDGET, _SHARE = 1.2, 0.05
 #: Convolutions that take as long as the rest of a step, and further ones for each exponential. Cost of a convolution of
 #: a curve, with all that goes with it, over that of a contact problem, at 256 and 1024 squared.
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
-#: Work of the runs on coarser grids that estimate the grid error, over that of the run.
-_GRID_ERROR = 0.3
+#: Work of the runs on coarser grids that estimate the grid error, over that of the run, and the time to compare a cell
+#: of a kept pressure with that of the coarser grid. [-], [s]
+_GRID_ERROR, _COMPARE = 0.3, 3e-7
 #: Time to write a file, and a byte of a field. [s]
 _FILE, _WRITE = 0.05, 3e-9
+#: Surfaces of fewer cells are made twice, to time it: of more, the time does not matter beside that of the run.
+_QUICK = 512**2
 #: Contact fraction that counts as full contact.
 _FULL = 0.95
 #: Bytes of the variables of a result without their values, of a friction curve, a loading and one with slides.
@@ -153,7 +156,7 @@ def plan(
     folder, there = result_folder(cases[0], out), memory_available()
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
-    surfaces, runs, rows = dict[str, xr.DataArray](), dict[int, CoarseRun](), list[dict[str, Any]]()
+    surfaces, runs, rows = dict[str, tuple[xr.DataArray, float]](), dict[int, CoarseRun](), list[dict[str, Any]]()
     order, began, expected = _spread(len(cases)), time.thread_time(), 0.0
     for number in order:
         case, is_own = cases[number], not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)
@@ -164,11 +167,15 @@ def plan(
         surface = json.dumps({**stated[number]["surface"], "seed": None}, sort_keys=True)
         try:
             if surface not in surfaces:
-                surfaces[surface] = case.height()
+                height, ready = case.height(), time.thread_time()
+                if height.size < _QUICK:  # once more: the first time imports what it needs
+                    case.height()
+                surfaces[surface] = height, time.thread_time() - ready
+            height, seconds = surfaces[surface]
             ready = time.thread_time()
-            problem = Problem(surfaces[surface], case.body, case.settings).resolved(case.experiment)
+            problem = Problem(height, case.body, case.settings).resolved(case.experiment)
             own = case.experiment.rows(problem, in_memory=False)
-            seconds = time.thread_time() - ready
+            seconds += time.thread_time() - ready
             if is_own:
                 runs[number] = coarse_run(own, case)
                 expected = len(cases) * float(np.mean([one.seconds for one in runs.values()]))
@@ -421,7 +428,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     run : CoarseRun
         Of this case or of a similar one.
     seconds : float
-        Time of what a run needs before its first step: kernels, domain, material. [s]
+        Time of what a run needs before its first step: surface, kernels, domain, material. [s]
     there : Available
         Available memory.
     """
@@ -443,7 +450,8 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         texts, end = ", ".join(unit_for(late, "s").text(one) for one in late), case.program.duration
         note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
     seconds += run.seconds * _work(height.size) / _work(run.cells)
-    seconds *= 1 + (_GRID_ERROR if own.problem.settings.grid_error else 0.0)
+    if own.problem.settings.grid_error:
+        seconds += _GRID_ERROR * seconds + (rows * whole.size * _COMPARE if isinstance(own, LoadingRows) else 0.0)
     memory = needed(whole.size)
     return {
         "memory_model": model,
