@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
@@ -32,7 +33,7 @@ from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import contact_area, faces_between
 from roughvisc.mechanics.grid import Boundary
-from roughvisc.mechanics.program import DIRECTIONS, Direction, one_of
+from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import OVER_TIME, Settings
@@ -101,7 +102,7 @@ class SteadySliding(Experiment):
         if speeds.ndim != 1 or not speeds.size or not (np.isfinite(speeds) & (speeds > 0)).all():
             raise InputError(key="speeds", found=self.speeds, expected="positive numbers [m/s]")
         object.__setattr__(self, "speeds", tuple(speeds.tolist()))
-        one_of(self.direction, Direction, DIRECTIONS, "direction")
+        one_of("direction", self.direction, _QUARTERS)
         if self.load is None and self.pressure is None:
             raise InputError(key="load", expected="a load, or a pressure")
         if self.load is not None and self.pressure is not None:

@@ -16,13 +16,12 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.units import Quantity, format_quantity, number
 
 #: In which the profile moves.
 Direction = Literal["x", "-x", "y", "-y"]
-#: in words
-DIRECTIONS = "'x', '-x', 'y' or '-y'"
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Slide:
     def __post_init__(self) -> None:
         if not 0 < self.distance < math.inf:
             raise InputError(key="distance", found=self.distance, expected="a positive number [m]")
-        one_of(self.direction, Direction, DIRECTIONS, "direction")
+        one_of("direction", self.direction, get_args(Direction))
 
     @property
     def axis(self) -> int:
@@ -89,20 +88,11 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
     return end if taken >= cells else began + (end - began) * (taken / cells)
 
 
-def one_of(value: Any, words: Any, expected: str, key: str) -> Any:
-    """Return a value if it is one of the words of a literal type, and refuse it otherwise."""
-    if value not in get_args(words):
-        raise InputError(key=key, found=value, expected=expected)
-    return value
-
-
 Control = Literal["load", "approach", "pressure"]
 #: what may be prescribed -> its unit
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
 #: what contact without adhesion cannot carry below zero
 PUSHING = ("load", "pressure")
-#: in words
-CONTROLS = "'load', 'approach' or 'pressure'"
 
 
 @dataclass(frozen=True)
@@ -131,7 +121,7 @@ class Segment:
     slide: Slide | None = None
 
     def __post_init__(self) -> None:
-        one_of(self.control, Control, CONTROLS, "control")
+        one_of("control", self.control, UNITS)
         if not (math.isfinite(self.duration) and self.duration >= 0):
             raise InputError(f"duration of a {self.control} segment is {self.duration!r}: expected a number >= 0 [s]")
         if self.end is not None and not math.isfinite(self.end):
@@ -240,17 +230,15 @@ class Program:
     note: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        """Return the first segments in words."""
-        return f"Program: {', '.join(self._words() or ['nothing'])}"
-
-    def _words(self) -> list[str]:
         """Return the first segments in words, and the number of others."""
         words = [str(segment) for segment in self.segments[:_LISTED]]
         for place, (before, segment) in enumerate(pairwise(self.segments[:_LISTED]), 1):
             if segment.holds and segment.control == before.control:
                 words[place] = f"hold {format_quantity(segment.duration, 's')}"
         more = len(self.segments) - _LISTED
-        return words + ([f"and {more} more segments, {format_quantity(self.duration, 's')} in all"] if more > 0 else [])
+        if more > 0:
+            words.append(f"and {more} more segments, {format_quantity(self.duration, 's')} in all")
+        return f"Program: {', '.join(words) or 'nothing'}"
 
     def _then(self, *segments: Segment) -> Program:
         return replace(self, segments=self.segments + segments)
@@ -364,7 +352,7 @@ class Program:
         """
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
-        kept = one_of(control, Control, CONTROLS, "control")
+        kept = one_of("control", control, UNITS)
         return self._then(Segment(kept, number(duration, "s", "hold", least=0)))
 
     def slide(
@@ -430,7 +418,7 @@ class Program:
         InputError
             If the lengths differ, or the times do not increase from zero; the message names the row.
         """
-        unit = UNITS[one_of(control, Control, CONTROLS, "control")]
+        unit = UNITS[one_of("control", control, UNITS)]
         if len(times) != len(values) or not len(times):
             expected = f"as many values as times, {len(times)}, at least one"
             raise InputError(key="values", found=len(values), expected=expected)
@@ -474,7 +462,7 @@ class Program:
         InputError
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
-        unit, instead = UNITS[one_of(control, Control, CONTROLS, "control")], INSTEAD[control]
+        unit, instead = UNITS[one_of("control", control, UNITS)], INSTEAD[control]
         middle = number(mean, unit, "mean", least=0 if control in PUSHING else None, instead=instead)
         height = number(amplitude, unit, "amplitude", instead=instead)
         length = number(period, "s", "period", above=0)
