@@ -10,7 +10,7 @@ from functools import partial
 from importlib.util import find_spec
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from roughvisc.errors import printable
@@ -26,7 +26,7 @@ def time_reached(now: float, end: float) -> str:
     return f"t = {now:.3g} of {end:.3g} s"
 
 
-class Bars:
+class Bars(Progress):
     """Progress bars by label, which close when the block ends.
 
     Parameters
@@ -36,71 +36,55 @@ class Bars:
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True)
-        notebook = self._console.is_jupyter and find_spec("ipywidgets") is not None
-        terminal = self._console.is_terminal and not self._console.is_dumb_terminal
-        self._draws = (terminal or notebook) and not self._console.quiet
-        self._progress = Progress(
+        console = console or Console(stderr=True)
+        notebook = console.is_jupyter and find_spec("ipywidgets") is not None
+        terminal = console.is_terminal and not console.is_dumb_terminal
+        super().__init__(
             TextColumn("{task.description}", markup=False),
             BarColumn(20),
             TextColumn("{task.fields[at]}", markup=False),
             TimeRemainingColumn(compact=True),
-            console=self._console,
+            console=console,
             transient=True,
-            disable=not self._draws,
+            disable=console.quiet or not (terminal or notebook),
             speed_estimate_period=_RECENT,
         )
-        self._tasks: dict[str, int] = {}
-        self._lock = threading.Lock()
+        self._labels: dict[str, TaskID] = {}
+        self._moving = threading.Lock()
         self._line_at = time.monotonic()
-
-    def start(self) -> None:
-        """Begin to draw."""
-        self._progress.start()
-
-    def stop(self) -> None:
-        """End drawing: the bars vanish."""
-        self._progress.stop()
-
-    def __enter__(self) -> Bars:
-        self.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
 
     def reached(self, label: str, now: float, end: float, at: str = "") -> None:
         """Move the bar of a computation, from any thread; both are zero at its start, and `at` describes them."""
-        with self._lock:
-            if label not in self._tasks:
-                self._tasks[label] = self._progress.add_task(printable(label), at="")
-            self._progress.update(self._tasks[label], completed=now, total=end or None, at=at or "starting")
+        with self._moving:
+            if label not in self._labels:
+                self._labels[label] = self.add_task(printable(label), at="")
+            self.update(self._labels[label], completed=now, total=end or None, at=at or "starting")
 
     def only(self, label: str, now: float, end: float, at: str = "") -> None:
         """Move the bar of one of several measurements in turn, and close the other bars."""
-        for other in [other for other in self._tasks if other != label]:
+        for other in [other for other in self._labels if other != label]:
             self.close(other)
-        if label not in self._tasks and not self._draws:
+        if label not in self._labels and self.disable:
             self.say(f"measuring {label}")
         self.reached(label, now, end, at)
 
     def close(self, label: str) -> None:
         """Remove the bar of a computation, if there is one."""
-        with self._lock:
-            if label in self._tasks:
-                self._progress.remove_task(self._tasks.pop(label))
+        with self._moving:
+            if label in self._labels:
+                self.remove_task(self._labels.pop(label))
 
     def line(self, label: str) -> None:
         """Write a line on a computation if nothing is drawn and the last line is old."""
-        if not self._draws and label in self._tasks and time.monotonic() - self._line_at >= LINE_EVERY:
+        if self.disable and label in self._labels and time.monotonic() - self._line_at >= LINE_EVERY:
             self._line_at = time.monotonic()
-            task = next(task for task in self._progress.tasks if task.id == self._tasks[label])
+            task = next(task for task in self.tasks if task.id == self._labels[label])
             left = "" if task.time_remaining is None else f", about {clock(task.time_remaining)} left"
             self.say(f"{label}: {task.fields['at']}{left}, {clock(task.elapsed or 0.0)} so far")
 
     def say(self, line: str) -> None:
         """Write a line, above the bars if there are any."""
-        self._console.print(Text(printable(line)), soft_wrap=True)
+        self.console.print(Text(printable(line)), soft_wrap=True)
 
 
 @contextmanager

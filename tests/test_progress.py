@@ -25,7 +25,7 @@ def shown(monkeypatch):
 def test_time_left__follows_the_pace(pace, shown):
     console, now, start = shown(False), [1000.0], {"steady": 0.0, "resumed": 300.0}[pace]
     with Bars(console) as bars:
-        bars._progress.get_time = lambda: now[0]
+        bars.get_time = lambda: now[0]
         for spent in range(51):
             now[0] = 1000.0 + spent
             bars.reached("creep", start + spent, start + 100.0, "half")
