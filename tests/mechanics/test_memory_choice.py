@@ -1,4 +1,4 @@
-"""Which memory models a material, and what it says of itself."""
+"""Which memory models a material, and the error that it states."""
 
 import re
 
@@ -64,6 +64,25 @@ def test_table_shorter_than_the_program__is_refused():
     material = rv.creep_table(tuple(ROWS), tuple(0.5 + ROWS**0.4))
     with pytest.raises(rv.InputError, match="the table ends at 10 s"):
         choose_memory(material, 11.0, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        rv.power_law(0.1, 1.0, 0.3, poisson=0.2),
+        rv.power_law(0.0, 1.0, 0.3),
+        rv.creep_table((0.0, 1.0, 2.0), (0.3, 1.0, 2.0)),
+        rv.pair(rv.power_law(0.1, 1.0, 0.3, poisson=0.3), rv.zener(1.0, 1.0, 1.0)),
+    ],
+    ids=["power law", "no compliance at once", "table", "pair"],
+)
+def test_jumps_alone__need_the_instantaneous_compliance_only(material):
+    choice = choose_memory(material, 0.0, 1e-3)
+    assert choice.series_error == 0
+    exact = float(material.contact_compliance(0.0))
+    assert choice.material.contact_compliance(0.0) == pytest.approx(exact, rel=1e-15)
+    if exact:
+        assert choice.material.contact_compliance(1.0) == pytest.approx(exact, rel=1e-15)
 
 
 def test_table_far_from_any_passive_material__is_warned_of():
