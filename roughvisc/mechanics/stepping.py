@@ -98,7 +98,7 @@ CLOSING = 1e-9
 AT_ONCE = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass
 class Scene:
     """What is prescribed.
 
@@ -120,6 +120,10 @@ class Scene:
         Fixed step; None: the tolerance controls the steps. [s]
     present : array of bool or None
         Cells with material; None: all.
+    can_jump : bool
+        Whether the body has an instantaneous compliance.
+    stated : tuple of float
+        Part of the difference between both solutions that is stated, of pressure and force, and of the approach.
     """
 
     grid: Grid
@@ -130,25 +134,17 @@ class Scene:
     tolerance: float = 1e-3
     time_step: float | None = None
     present: Array | None = None
+    can_jump: bool = field(init=False)
+    stated: tuple[float, float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.can_jump = self.memory.compliance(0.0) > 0
+        soft = self.is_soft(self.program.duration)
+        self.stated = (STATED_SOFT, STATED_APPROACH_SOFT) if soft else (STATED, STATED_APPROACH)
 
     def lowest(self, values: Array) -> float:
         """Return the least value over the present cells."""
         return float(values.min() if self.present is None else values[self.present].min())
-
-    @cached_property
-    def can_jump(self) -> bool:
-        """Whether the body has an instantaneous compliance."""
-        return self.memory.compliance(0.0) > 0
-
-    @cached_property
-    def hardly_jumps(self) -> bool:
-        """Whether hardly any of the compliance after all of the program is instantaneous."""
-        return self.is_soft(self.program.duration)
-
-    @property
-    def stated(self) -> tuple[float, float]:
-        """Part of the difference between both solutions that is stated, of pressure and force, and of the approach."""
-        return (STATED_SOFT, STATED_APPROACH_SOFT) if self.hardly_jumps else (STATED, STATED_APPROACH)
 
     def prescribed(self, number: int, time: float, point: Point) -> float:
         """Return what a segment prescribes at a time [s], of a solution that has a point in it. [N or m]"""
@@ -157,9 +153,11 @@ class Scene:
     @cached_property
     def motions(self) -> tuple[Slide, ...]:
         """Slide of each segment that friction refers to: its own, the last one, or the first; empty if none slides."""
-        slides = [segment.slide for segment in self.program.segments]
-        last = next((slide for slide in slides if slide is not None), None)
-        return () if last is None else tuple(last := slide or last for slide in slides)
+        slides: list[Slide | None] = []
+        for segment in self.program.segments:
+            slides.append(segment.slide or (slides[-1] if slides else None))
+        first = next(filter(None, slides), None)
+        return tuple(slide or first for slide in slides) if first else ()
 
     def is_soft(self, step: float) -> bool:
         """Return whether hardly any compliance of a step is instantaneous. [s]"""
@@ -246,8 +244,14 @@ class Difference:
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
         """Return the larger error of each kind: of this one, or a part of the other."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Difference(*(max(one, part * two) for one, two in pairs))
+        return Difference(
+            max(self.pressure, part * other.pressure),
+            max(self.force, part * other.force),
+            max(self.approach, part * other.approach),
+            max(self.inside, part * other.inside),
+            max(self.outside, part * other.outside),
+            max(self.friction, part * other.friction),
+        )
 
 
 @dataclass(frozen=True)
@@ -399,21 +403,20 @@ def jump(scene: Scene, state: State, segment: Segment) -> State:
 def entered(scene: Scene, state: State) -> State:
     """Return the state at the start of the next segment."""
     segments, index = scene.program.segments, state.segment + 1
-    joined = segments[index - 1 : index + 1]
-    controls = {segment.control for segment in joined}
+    last, following = segments[index - 1], segments[index] if index < len(segments) else None
+    changes = following is not None and following.control != last.control
     # a corner of the approach is a jump of the load if the body cannot follow at once
-    jumps = "approach" in controls and not scene.can_jump
-    given = segments[index].control if index < len(segments) else "load"
-
-    def enter(point: Point) -> Point:
-        start = point.force if given == "load" else point.approach
-        return replace(without_past(point), start=start, is_late=jumps and point.force > 0)
-
+    jumps = not scene.can_jump and (changes or last.control == "approach")
+    by_approach = following is not None and following.control == "approach"
+    points = []
+    for point in (state.fine, state.coarse):
+        start, is_late = point.approach if by_approach else point.force, jumps and point.force > 0
+        points.append(replace(without_past(point), start=start, is_late=is_late))
     # a corner bends the histories and does not break them: the pairs may stay as long
-    smooth = len(controls) == 1 and all(segment.duration > 0 and segment.slide is None for segment in joined)
-    smooth = smooth and state.fine.force > 0 and not jumps
-    twice = state.twice and enter(state.twice)
-    return replace(state, fine=enter(state.fine), twice=twice, segment=index, length=state.length if smooth else 0.0)
+    smooth = not changes and last.duration > 0 and last.slide is None and state.fine.force > 0 and not jumps
+    smooth = smooth and (following is None or (following.duration > 0 and following.slide is None))
+    twice = points[1] if state.twice else None
+    return replace(state, fine=points[0], twice=twice, segment=index, length=state.length if smooth else 0.0)
 
 
 def without_past(point: Point) -> Point:
@@ -424,17 +427,16 @@ def without_past(point: Point) -> Point:
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine, coarse, grid, number = state.fine, state.coarse, scene.grid, state.segment
-    spent = grid.convolutions
-
-    def step(here: Point, guess: Guess | None = None) -> Point:
-        # of surfaces that stay apart the linear rule is exact
-        return take_step(scene, here, time, number, guess=guess, rule="linear" if here.is_open else None)
-
-    new = step(fine)
-    other = new if coarse is fine else step(coarse, moved(scene, new, coarse, fine))
+    memory, spent = scene.memory, grid.convolutions
+    rule: Rule | None = "linear" if fine.is_open else None  # exact as long as the surfaces stay apart
+    new = other = take_step(scene, fine, time, number, rule=rule)
+    if coarse is not fine:
+        rule = "linear" if coarse.is_open else None
+        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
     work = trapezoid(scene, fine, new)
-    if scene.memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all of it
-        before, after = (float((at.pressure * scene.memory.at_once(at.history)).sum()) for at in (fine, new))
+    if memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all of it
+        before = float((fine.pressure * memory.at_once(fine.history)).sum())
+        after = float((new.pressure * memory.at_once(new.history)).sum())
         work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
     apart, reached, coarse = difference(scene, new, other), new, other
     if fine.is_open and new.force == 0:
@@ -470,10 +472,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         middle, last = pair_ends(fine.time, length, event, next_event)
         taken = last - fine.time
         is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
-        shares = [MAGNIFIED if is_soft and scene.keeps(time) else 1.0 for time in (middle, last)]
-        first = take_step(scene, fine, middle, number, share=shares[0])
-        second = take_step(scene, first, last, number, share=shares[1])
-        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine), share=shares[1])
+        first = take_step(scene, fine, middle, number, share=MAGNIFIED if is_soft and scene.keeps(middle) else 1.0)
+        share = MAGNIFIED if is_soft and scene.keeps(last) else 1.0
+        second = take_step(scene, first, last, number, share=share)
+        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine), share=share)
         half, whole, other = first, second, once
         if is_soft:
             half, whole = end_value(scene, fine, first, number), end_value(scene, first, second, number)
@@ -593,37 +595,39 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
     # errors are relative to the largest values, those of the next kept time included
     end = scene.program.corners[state.segment + 1]
-    now, then = (scene.prescribed(state.segment, time, second) for time in (second.time, min(following, end)))
+    now = scene.prescribed(state.segment, second.time, second)
+    then = scene.prescribed(state.segment, min(following, end), second)
     ahead = max(then / now, 1.0) if now > 0 else 1.0
     force, approach = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
     soft = scene.is_soft(taken)
     receding = bool(((fine.pressure > 0) & (second.pressure == 0)).any())
 
+    # What the difference between both solutions changes by, as the pair would leave it or as relaxation does.
     after, before = second.pressure - once.pressure, fine.pressure - coarse.pressure
-    decays = {1.0} if soft else {1.0, memory.remaining(taken)}
-    change = min(float(abs(after - part * before).sum()) for part in decays) * scene.grid.cell_area / force
+    change = float(abs(after - before).sum())
     if soft:
-        remains = scene.memory.compliance(taken) / scene.memory.compliance(following - second.time + taken)
+        remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
+        change = min(change, float(abs(after - memory.remaining(taken) * before).sum()))
         remains = max(memory.remaining(following - second.time), RECEDING if receding else LEAST_REMAINING)
-    stated = scene.stated
-    fades = 1.0 if soft or receding else remains
-
-    def over_budget(change: float, carried: float) -> float:
-        budget = max(BUDGET * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
-        return change / max(min(SHARE * scene.tolerance, budget), LEAST_CHANGE * carried)
-
+    change *= scene.grid.cell_area / force
     # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
-    carried = 0.0 if soft else state.difference.pressure / stated[0] / force * memory.remaining(following - fine.time)
-    ratio = over_budget(change * remains, carried)
+    of_pressure, of_approach = scene.stated
+    carried = 0.0 if soft else state.difference.pressure / of_pressure / force * memory.remaining(following - fine.time)
+    changes = [(change * remains, carried)]
     if control == "load":
         change = abs((second.approach - once.approach) - (fine.approach - coarse.approach)) / approach
-        ratio = max(ratio, over_budget(change, state.difference.approach / stated[1] / approach))
+        changes.append((change, state.difference.approach / of_approach / approach))
     if control == "approach" or second.force == 0 or soft:
-        surfaces = [memory.displacement(point.history)[0] for point in (second, once, fine, coarse)]
-        surface = (surfaces[0] - surfaces[1]) - (surfaces[2] - surfaces[3])
-        ratio = max(ratio, over_budget(float(abs(surface).max()) / approach * fades, 0.0))
+        surface = memory.displacement(second.history)[0] - memory.displacement(once.history)[0]
+        surface -= memory.displacement(fine.history)[0] - memory.displacement(coarse.history)[0]
+        changes.append((float(abs(surface).max()) / approach * (1.0 if soft or receding else remains), 0.0))
+
+    ratio = 0.0
+    for change, carried in changes:
+        budget = max(BUDGET * scene.tolerance - carried, LEAST_SHARE * scene.tolerance)
+        ratio = max(ratio, change / max(min(SHARE * scene.tolerance, budget), LEAST_CHANGE * carried))
     return ratio
 
 
@@ -658,7 +662,8 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Poi
     apart = difference(scene, shown, other)
     if not scene.keeps(fine.time) or fine is coarse:
         return apart
-    gap, near = (scene.gap + scene.memory.displacement(one.history)[0] - one.approach for one in (fine, coarse))
+    gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
+    near = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
     pressure, coarse_pressure = shown.pressure, other.pressure
     inside = (pressure > 0) & (pressure <= abs(pressure - coarse_pressure))
     outside = (pressure == 0) & ((coarse_pressure > 0) | (gap <= abs(gap - near)))
@@ -717,15 +722,17 @@ def after_steps(
     distance : float
         Of a slide. [m]
     """
-    fine = points[-1]
+    fine, force, approach = points[-1], state.largest_force, state.largest_approach
+    for point in points:
+        force, approach = max(force, point.force), max(approach, abs(point.approach))
     reached = State(
         fine,
         None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
         state.segment,
         length,
         apart,
-        max(state.largest_force, *(point.force for point in points)),
-        max(state.largest_approach, *(abs(point.approach) for point in points)),
+        force,
+        approach,
         state.work + work,
         state.distance + distance,
         state.convolutions + scene.grid.convolutions - spent,
@@ -903,7 +910,8 @@ def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
 
 def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
     """Return a first guess of the coarse solution: the fine one, apart by as much as before the pair."""
-    unit, of_coarse, of_fine = (scene.memory.unit(point.history) for point in (second, coarse, fine))
+    memory = scene.memory
+    unit, of_coarse, of_fine = memory.unit(second.history), memory.unit(coarse.history), memory.unit(fine.history)
     if coarse is fine or unit is None or of_coarse is None:
         return second.pressure, unit
     return second.pressure + (coarse.pressure - fine.pressure), unit + (of_coarse - of_fine)

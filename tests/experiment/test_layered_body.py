@@ -99,7 +99,7 @@ def far_apart(ratio, creeps):
 @pytest.mark.parametrize("ratio", [1e-5, 1e-3, 1e3])
 @pytest.mark.parametrize(
     ("creeps", "boundary"),
-    [(False, "free"), (False, "periodic"), (True, "periodic"), pytest.param(True, "free", marks=pytest.mark.thorough)],
+    [(creeps, boundary) for creeps in (False, True) for boundary in ("free", "periodic", "mirror")],
 )
 def test_moduli_far_apart__converge(boundary, ratio, creeps):
     """The pressure at two tolerances differs by less than the larger one states."""
