@@ -1,4 +1,4 @@
-"""The front door: a surface, a material or a body, and what is done with it, give one Dataset."""
+"""Entry points of the package: loading, steady sliding and a case of a study, each with one Dataset as its result."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def simulate(
         grid, absent cells included.
     boundary : {"auto", "free", "periodic", "mirror"}
         ``free`` for an indenter; ``mirror`` for a nominally flat scan, which then repeats with its mirror images;
-        ``periodic`` for one that repeats as it is. ``auto`` is ``free`` for the indenters of
+        ``periodic`` for a surface that repeats without mirror images. ``auto`` is ``free`` for the indenters of
         this package, and ``periodic`` for its waves, its self-affine roughness and any surface with its mirror images
         (:func:`roughvisc.mirror`), as long as their heights are unchanged; any other surface needs an explicit choice.
     tolerance : float
@@ -76,7 +76,7 @@ def simulate(
         Whether missing heights are an error, or cells without material that never touch.
     edge : {"error", "accept"}
         Whether contact may reach the border of the grid in free space. With "accept" the scan outline is treated as a
-        punch; the attribute ``warnings`` of the result says so if contact reached the border.
+        punch, and the attribute ``warnings`` of the result reports contact at the border.
     grid_error : "auto" or bool
         Whether to estimate the grid error from one more run, on cells twice as long: ``grid_error``,
         ``grid_error_area`` and others at the output times. ``auto``: from 256 x 256 to 512 x 512
@@ -98,9 +98,9 @@ def simulate(
     Raises
     ------
     InputError
-        If the input is invalid; the message says what was found and what was expected.
+        If the input is invalid; the message states the invalid value and the valid ones.
     TooLargeError
-        If it needs more memory than is available; raised before any is allocated.
+        If the computation needs more memory than is available; raised before any memory is allocated.
     EdgeContactError
         If contact reached the border of a free-space domain.
     ConvergenceError
@@ -150,7 +150,7 @@ def friction(
     threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
-    """Friction of a rigid profile that slides steadily on a viscoelastic body, with periodic boundaries.
+    """Compute the friction of a rigid profile that slides steadily on a viscoelastic body, with periodic boundaries.
 
     Parameters
     ----------
@@ -160,12 +160,12 @@ def friction(
         Material of a half-space, or a body, as in :func:`roughvisc.simulate`. Its compliance must be finite at long
         times, unless the profile is uniform across the motion. Shift factors of a temperature act as factors of the
         speed.
-    speeds : float or str, or sequence of them
+    speeds : float or str, or sequence of float or str
         Sliding speeds. [m/s]
     load, pressure : float or str
-        Load [N] or nominal pressure [Pa]: one of them.
+        Load [N] or nominal pressure [Pa]; give one.
     direction : {"x", "-x", "y", "-y"}
-        In which the profile moves.
+        Direction of motion of the profile.
     boundary : {"auto", "periodic", "mirror"}
         ``mirror``: the surface is unfolded first, by :func:`roughvisc.mirror`, and the result has four times the cells;
         expects a nominal pressure. ``auto`` is ``periodic``.
@@ -195,7 +195,8 @@ def friction(
     Warns
     -----
     UserWarning
-        If the contact at a speed is not solved. Its values are NaN and its ``status`` says so; the others are valid.
+        If the contact at a speed is not solved. The values at this speed are NaN, and its ``status`` is not
+        ``converged``; values at other speeds are valid.
 
     Notes
     -----
@@ -253,7 +254,7 @@ def run(
     want : dict, optional
         Wanted relative errors of numbers at 95 %, such as ``{"friction_coefficient": "1 %"}``, and known errors as
         :func:`roughvisc.budget` takes them, such as ``{"modulus_error": "5 %"}``. The grid and the tolerance are then
-        chosen, and those of the case are not used. Default: the case is computed as it is stated.
+        chosen, and the grid and tolerance of the case are not used. Default: the case is not changed.
     progress : bool or callable
         A progress bar, or a function called with the current time and the length of the program. [s]
     threads : int, optional
@@ -264,14 +265,14 @@ def run(
     xarray.Dataset
         The result over ``(time, x, y)``; fields are read from its file when they are needed. The file is
         ``ds.encoding["source"]``, named by the key of the case. A finished case is not computed again, and an
-        interrupted one is resumed. Where something was wanted, it is the result of the case that was chosen: the
-        attribute ``choice`` says what and why, and the budgets are in the folder ``budget`` beside it.
+        interrupted one is resumed. With `want` it is the result of the chosen case: the attribute ``choice`` states
+        the choice and its reasons, and the budgets are in the folder ``budget`` next to the file.
 
     Raises
     ------
     InputError
-        If the input is invalid; nothing is written. If a wanted error cannot be reached: the message says how accurate
-        the number is at best, and by which sources.
+        If the input is invalid; nothing is written. If a wanted error cannot be reached: the message states the
+        smallest error that can be reached, and its sources.
     TooLargeError
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.

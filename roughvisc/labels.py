@@ -1,8 +1,8 @@
 """Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps.
 
-A result holds rows at its kept times. The history of every accepted step is a Dataset of its own, the group ``steps``
-of the file. A Dataset carries it in ``encoding``: xarray keeps that through selections and copies and writes it to no
-file.
+A result contains rows at its kept times. The history of every accepted step is a second Dataset, the group ``steps`` of
+the file. The first Dataset contains it in ``encoding``, which xarray keeps in selections and copies and does not write
+to files.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) ->
     Parameters
     ----------
     dataset : xarray.Dataset
-        Holds declared variables only, and coordinates of any name: what was varied in a case. Extra leading dimensions
-        (``case``) are allowed.
+        Contains declared variables only, and coordinates of any name, for the varied parameters of a case. Extra
+        leading dimensions (``case``) are allowed.
     variables : mapping
         Declarations by name.
 
@@ -115,14 +115,14 @@ def own_rows(case: xr.Dataset) -> xr.Dataset:
 
 
 def expect_history(dataset: xr.Dataset) -> None:
-    """Refuse a result over another axis than time, where what happened before a row matters."""
+    """Refuse a result over another axis than time, for quantities that depend on the history."""
     axis = axis_of(dataset.dims)
     if axis != "time":
         raise InputError(f"the result lies over {axis}: expected a history over time")
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:
-    """Refuse a result that was converted to other units: what is derived from it and drawn is counted in SI.
+    """Refuse a result that was converted to other units: derived quantities and figures need SI units.
 
     Raises
     ------
@@ -153,17 +153,17 @@ def with_steps(result: xr.Dataset, steps: xr.Dataset) -> xr.Dataset:
 
 
 def steps_of(result: xr.Dataset) -> xr.Dataset | None:
-    """Return the history of the accepted steps that a result carries; None if it carries none of its own.
+    """Return the history of the accepted steps that a result carries; None if it carries none, or another result's.
 
-    xarray keeps the encoding of the first of several Datasets that it combines. Therefore the rows are compared with
-    the steps.
+    When xarray combines several Datasets, it keeps the encoding of the first. Therefore the rows are compared with the
+    steps.
     """
     steps = result.encoding.get(_CARRIED)
     return steps if steps is not None and _are_rows_of(result, steps) else None
 
 
 def _are_rows_of(result: xr.Dataset, steps: xr.Dataset) -> bool:
-    """Whether time and force of every row are those of a step."""
+    """Return whether every row has the time and the force of a step."""
     if not {"time", "force"} <= result.variables.keys() or result["force"].dims not in ((), ("time",)):
         return False
     rows, known = (

@@ -30,11 +30,11 @@ WORDS: dict[str, tuple[str, ...]] = {
 }
 #: Settings without a meaning in steady sliding.
 OVER_TIME = ("times", "missing", "edge", "time_step")
-#: Rounding leaves so much of the numbers that are compared with a tolerance: a run to a finer one would not end.
+#: Smallest tolerance. Rounding errors are of this order, and a run with a smaller tolerance would not end.
 FINEST_TOLERANCE = 1e-12
-#: Numbers of cells, from and up to which the grid error is estimated by default. On fewer cells the coarser run takes
-#: more than a third of the time of the first one: 0.4 to 0.5 of it at 128 x 128, 0.8 to 0.9 at 32 x 32; at 256 x 256 it
-#: takes 0.25 to 0.3, at 512 x 512 0.2.
+#: Smallest and largest number of cells for which the grid error is estimated by default. The coarser run takes 0.8 to
+#: 0.9 of the time of the first run at 32 x 32 cells, 0.4 to 0.5 at 128 x 128, 0.25 to 0.3 at 256 x 256, and 0.2 at
+#: 512 x 512: more than a third on fewer cells than the smallest number.
 GRID_ERROR_CELLS = 256 * 256, 512 * 512
 #: Largest number of kept times.
 MOST_TIMES = 1_000_000
@@ -74,7 +74,7 @@ class Numerics:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(Numerics):
-    """Settings of a solve: how an experiment is computed and what is kept; see :func:`roughvisc.simulate`.
+    """Settings of a solve: numerical method and kept quantities; see :func:`roughvisc.simulate`.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ class Settings(Numerics):
     Raises
     ------
     InputError
-        If a value is invalid. What depends on the program or on the surface is checked where these are known, in
-        :func:`roughvisc.experiment.loading.check_program`.
+        If a value is invalid. :func:`roughvisc.experiment.loading.check_program` checks the settings that depend on the
+        program or the surface.
 
     Examples
     --------
@@ -144,7 +144,7 @@ repeats as it is
 def known_boundary(
     stated: Any, only: Literal["free", "periodic"] | None, made_for: Callable[[], Literal["free", "periodic"] | None]
 ) -> Literal["free", "periodic", "mirror"] | None:
-    """Return the boundary that is stated, or the one that ``auto`` stands for; None if it must be stated.
+    """Return the stated boundary, with ``auto`` resolved; None if the user has to state one.
 
     Parameters
     ----------

@@ -43,15 +43,15 @@ class Checkpoint:
     Attributes
     ----------
     state : Any
-        From which the rows of the experiment continue; None at the start.
+        State from which the rows of the experiment continue; None at the start.
     done : float
-        Progress, of the end of the rows.
+        Progress, in the unit of the end of the rows.
     rows : int
-        Number of recorded rows, those of steps that are not kept included.
+        Number of recorded rows, including rows of steps that are not kept.
     wall_time : float
-        Spent so far. [s]
+        Wall time spent so far. [s]
     transforms : str
-        Libraries that it was computed with, one after the other.
+        Transform libraries of the solve, in the order of their use.
     """
 
     state: Any = None
@@ -72,7 +72,7 @@ class Recorder:
     Attributes
     ----------
     latest : Checkpoint
-        From which the solve continues.
+        Checkpoint from which the solve continues.
     plain : list of dict
         Values of the rows, with ``kept`` and ``place``.
     in_memory : bool
@@ -87,12 +87,12 @@ class Recorder:
         self._arrays: list[Mapping[str, Array]] = []
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Record the values and the fields of a row; the arrays are not changed any more."""
+        """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
         self.plain.append(plain)
         self._arrays.append(arrays)
 
     def update(self, reached: Checkpoint) -> None:
-        """Record the progress; the solve may be stopped here. In memory a state is not needed again."""
+        """Record the progress, from which a stopped solve can continue. Rows in memory need no state."""
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""
@@ -102,7 +102,7 @@ class Recorder:
         return frames
 
     def restart(self) -> None:
-        """Forget all rows: the solve begins again."""
+        """Delete all rows, because the solve starts again."""
         self.plain, self._arrays = [], []
 
 
@@ -123,7 +123,7 @@ def solve(
     experiment : Experiment
         A loading or steady sliding.
     recorder : Recorder, optional
-        Records the rows, and knows from where the run continues. Default: in memory, from the beginning.
+        Records the rows, and contains the checkpoint from which the run continues. Default: in memory, from the start.
     progress : bool or callable
         A progress bar, or a function called with the progress and its end.
     threads : int, optional
@@ -137,9 +137,9 @@ def solve(
     Raises
     ------
     InputError
-        If the input is invalid; nothing has been computed then.
+        If the input is invalid; raised before anything is computed.
     ConvergenceError
-        If there is no row.
+        If the result has no rows.
     """
     problem = problem.resolved(experiment)
     height, settings = problem.height, problem.settings
@@ -157,14 +157,14 @@ def solve(
                 report = bar.enter_context(reporting(True, doing, at=experiment.progress))
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         if settings.grid_error and isinstance(experiment, Loading):
-            # coarser grids may be of other sizes: the loads are those of the given area
+            # coarser grids may have another area: convert nominal pressures to loads on the given area
             loads = Loading(experiment.program.on_area(nominal_area(height)))
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
                 with _without_log():
                     found = solve_on_grid(coarse, loads, Recorder())
-                apart = np.abs(found["time"].values[:, None] - times)  # a slide has others, by half a longer cell
+                apart = np.abs(found["time"].values[:, None] - times)  # in a slide times differ by half a coarser cell
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
@@ -173,7 +173,7 @@ def solve(
 
 @contextmanager
 def _without_log() -> Iterator[None]:
-    """Drop the log of a solve on a coarser grid, which repeats the warnings of the first one; in this thread alone."""
+    """Drop the log messages of this thread: a solve on a coarser grid repeats the warnings of the first solve."""
     here = threading.get_ident()
 
     def is_of_another_thread(record: logging.LogRecord) -> bool:
@@ -222,7 +222,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     experiment : Experiment
         A loading or steady sliding.
     rows : Rows
-        Rows of the experiment, all of them found.
+        Rows of the experiment, complete.
     recorder : Recorder
         Recorder of these rows.
 
@@ -234,7 +234,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     Raises
     ------
     ConvergenceError
-        If there is no row.
+        If there are no rows.
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = pd.DataFrame(recorder.plain)

@@ -36,12 +36,12 @@ _BETWEEN_BLANKS = re.compile(r"[+-]?((\d+|[1-9]\d{0,2}(['\u00a0\u202f]\d{3})+)(\
 _HEADING = re.compile(r"(?P<name>.*?)\s*(\[\s*(?P<square>[^\[\]]*?)\s*\]|\(\s*(?P<round>[^()]*?)\s*\))")
 #: The same in a file whose separator is a blank.
 _HEADING_BETWEEN_BLANKS = re.compile(r"[^ \t\[(]+(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))?")
-#: Number of rows in which the heading is searched.
+#: Number of rows in which the heading is sought.
 _FIRST = 200
 
 
 def regular(path: Path) -> None:
-    """Refuse a device or a pipe, whose reading need not end."""
+    """Refuse a device or a pipe, because reading it may never end."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise InputError(f"{path}: is a device or a pipe: expected a file")
 
@@ -180,14 +180,14 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     Raises
     ------
     InputError
-        If the file cannot be read or holds no rows, a column or its unit is absent or does not fit, a row has more
+        If the file cannot be read or contains no rows, a column or its unit is absent or does not fit, a row has more
         cells than the heading, or a cell is not a finite number. The message names the file, the line or the column,
-        what was found and what was expected.
+        the invalid value and the valid ones.
 
     Notes
     -----
     The heading is the first line with all columns, each as ``name [unit]`` or ``name (unit)``, in any order and next to
-    others. Lines above it are skipped. A pure number needs no unit.
+    others. Lines above it are skipped. A column of pure numbers may omit its unit.
     """
     path = Path(path)
     separator, rows = _rows(path)
@@ -251,7 +251,7 @@ def _between_blanks(line: str) -> list[str]:
 
 
 def _split(line: str) -> list[str]:
-    """Return what stands between blanks and tabs; a no-break space groups the digits of a number."""
+    """Split a line at blanks and tabs; a no-break space groups the digits of a number and does not separate."""
     return re.split(r"[ \t]+", line.strip(" \t"))
 
 
@@ -296,7 +296,7 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
     stated = one.stated or name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
     if given and stated and given != stated and one.unit != "1":
         problem = f"the heading says {given!r} and the study {stated!r}"
-        raise InputError(f"{where}: unit of {key}: {problem}: expected one of them")
+        raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")
     unit = given or stated
     if not unit:
         found, expected = names[0], _example(names[0], one.unit)

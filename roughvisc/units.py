@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError, short_repr
 
 if TYPE_CHECKING:
-    # mypy cannot express that the decorator converts text: inside a function it takes a quantity for a number
+    # mypy cannot express that the decorator converts text: inside a function a quantity has the type of a number
     Quantity = float | Any
 else:
     #: An argument that :func:`quantities` converts: a number in SI, or text with a unit.
@@ -33,7 +33,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
 # A grammar in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would not end.
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
-# of "0.31/MPa" the number is 0.31: the 1 of an inverse stands apart
+# in "0.31/MPa" the number is 0.31: the 1 of an inverse unit has to be separated by a blank
 _INVERSE = rf"(?:(?<=\s)1\s*)?/\s*(?:{_FACTOR}|\({_PRODUCT}\))"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_PRODUCT}|{_INVERSE})?\s*")
 # pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
@@ -172,7 +172,7 @@ def number(
         raise
     inside = (
         (above is None or found > above)
-        and (above != 0 or found >= sys.float_info.min)  # whose reciprocal a double can hold
+        and (above != 0 or found >= sys.float_info.min)  # otherwise the reciprocal overflows
         and (least is None or found >= least)
         and (most is None or found <= most)
         and (below is None or found < below)
@@ -279,7 +279,7 @@ def number_and_unit(text: str) -> tuple[float, str]:
 
 
 def is_quantity(value: Any, unit: str) -> bool:
-    """Whether a value is a number, or text that converts to this unit."""
+    """Return whether a value is a number, or text that converts to this unit."""
     try:
         quantity(value, unit)
     except InputError:
@@ -415,7 +415,7 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
             if largest >= least:
                 return Unit(factor, symbol)
     head, _, tail = si.partition("/")
-    name = head.rstrip("^0123456789")  # results of old have m2
+    name = head.rstrip("^0123456789")  # old results have m2
     power = int(head[len(name) :].strip("^") or 1)
     least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
     exponent = 0

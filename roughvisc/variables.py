@@ -1,4 +1,4 @@
-"""All variables that a result may hold or that is derived from one, each declared once, and the axes of their rows.
+"""Declarations of all variables of results and of quantities derived from results, and the axes of their rows.
 
 :func:`roughvisc.labels.label` writes units and names on a Dataset. The rows of a result lie over ``time`` or over
 ``speed``: a variable over rows is declared once for both.
@@ -28,7 +28,7 @@ LEAK_MEANINGS = ("flows", "closed", "not_certified")
 ROW, ROWS = "row", "rows"
 #: Dimension of all accepted steps.
 STEP = "step"
-#: Dimensions that a result of one case may have beside the dimension of its rows.
+#: Dimensions that a result of one case may have in addition to the dimension of its rows.
 OTHER_DIMS = ("x", "y", "bnds")
 
 _GRID = ("x", "y")
@@ -44,8 +44,8 @@ class Variable:
     Attributes
     ----------
     dims : tuple of str
-        ``row`` stands for the axis of the rows. ``step`` does too, of a history that is also known at all accepted
-        steps between the rows.
+        ``row`` means the axis of the rows. So does ``step``, for a history that is also known at all accepted steps
+        between the rows.
     units, long_name, comment, dtype : str
         As in the file of a result.
     meanings : tuple of str
@@ -451,7 +451,7 @@ VARIABLES: dict[str, Variable] = {
     ),
 }
 
-#: Fields that the user may ask for in ``fields``: those that the solver finds.
+#: Fields that the user may request in ``fields``; the solver computes them.
 FIELDS = ("pressure", "gap", "displacement")
 #: Histories that are known at all accepted steps.
 STEPPED = tuple(name for name, one in VARIABLES.items() if one.dims == _STEPS and name != "time")
@@ -532,7 +532,7 @@ AXES: dict[str, Axis] = {
 
 
 def axis_of(names: Container[str]) -> str:
-    """Return the axis of the rows of a result, which the names of its variables tell.
+    """Return the axis of the rows of a result from the names of its variables.
 
     Examples
     --------

@@ -1,9 +1,9 @@
 """Quantities derived from a result: contact spots, distributions, leakage, conductance, theories.
 
-Every function takes a result and returns a Dataset of the new variables alone; ``xarray.merge`` or ``Dataset.update``
-adds them to the result. Leading dimensions other than time, such as ``case``, are kept. Fields on Dask or in a file are
-processed frame by frame, lazily unless a docstring states otherwise. :mod:`roughvisc.variables` declares names and
-units.
+Every function takes a result and returns a Dataset that contains only the new variables; ``xarray.merge`` or
+``Dataset.update`` adds them to the result. Leading dimensions other than time, such as ``case``, are kept. Fields on
+Dask or in a file are processed frame by frame, lazily unless a docstring states otherwise. :mod:`roughvisc.variables`
+declares names and units.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
-#: Table of ``[observe]`` -> what derives it from a result; the keys of the table are its keyword arguments.
+#: Table of ``[observe]`` -> function that computes its variables; the keys of the table are its keyword arguments.
 OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conductance": conductance}
 
 
@@ -52,8 +52,8 @@ def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None =
     dataset : xarray.Dataset
         A result.
     observe : mapping, optional
-        Name of each observable -> its keyword arguments. Default: those of ``[observe]`` in the study, as the
-        attribute ``case`` states it.
+        Name of each observable -> its keyword arguments. Default: the table ``[observe]`` of the study, from the
+        attribute ``case``.
 
     Returns
     -------
@@ -68,6 +68,6 @@ def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None =
     if observe is None:
         observe = json.loads(dataset.attrs.get("case", "{}")).get("observe", {})
     if unknown := set(observe) - set(OBSERVABLES):
-        raise InputError(f"observe: {min(unknown)!r} is no observable: expected some of {', '.join(OBSERVABLES)}")
+        raise InputError(f"observe: unknown observable {min(unknown)!r}: expected some of {', '.join(OBSERVABLES)}")
     found = [OBSERVABLES[name](dataset, **arguments) for name, arguments in observe.items()]
     return xr.merge(found, compat="equals", join="exact") if found else xr.Dataset()

@@ -24,7 +24,7 @@ _UNITS: dict[str, str] = {"thermal": "K m/W", "electrical": "ohm m"}
 def conductance(
     dataset: xr.Dataset, resistivity: Sequence[float | str], *, kind: Literal["thermal", "electrical"] | None = None
 ) -> xr.Dataset:
-    r"""Conductance of the contact spots at every kept time.
+    r"""Compute the conductance of the contact spots at every kept time.
 
     Parameters
     ----------
@@ -40,21 +40,22 @@ def conductance(
     -------
     xarray.Dataset
         Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], and its error. Zero without contact;
-        infinite in full contact unless space is free. The attribute ``resistivity`` states those of the two bodies.
+        infinite in full contact unless space is free. The attribute ``resistivity`` states both resistivities.
 
     Raises
     ------
     InputError
-        If the result holds neither ``pressure`` nor ``gap``, or the resistivities are not two of one kind, not
-        negative, and not both zero.
+        If the result contains neither ``pressure`` nor ``gap``. If there are not two resistivities of one kind, one is
+        negative, or both are zero.
 
     Notes
     -----
-    All spots are at one potential, and far away each body is at its own potential: :math:`G = 2k / (\rho_1 + \rho_2)`
-    with the stiffness :math:`k` of a flat punch of the same spots over the contact modulus [1]_; a single disc has
-    :math:`4a / (\rho_1 + \rho_2)`. Each body conducts like a half-space, even if it is a sheet. With periodic
-    or mirror boundaries the conductance is that of the constriction alone, for these cells; the resistance of the bulk
-    is not included. Nothing flows through the gap, and films on the spots have no resistance.
+    All spots have one potential, and each body is at a constant potential far from the spots. The conductance is
+    :math:`G = 2k / (\rho_1 + \rho_2)`, where :math:`k` is the stiffness of a flat punch with the shape of the spots,
+    over the contact modulus [1]_; for a single disc :math:`G = 4a / (\rho_1 + \rho_2)`. Each body conducts like a
+    half-space, even if it is a sheet. With periodic or mirror boundaries only the constriction resistance of the cells
+    of the grid counts, without the resistance of the bulk. Nothing flows through the gap, and films on the spots have
+    no resistance.
 
     References
     ----------
@@ -82,7 +83,7 @@ def conductance(
 def incremental_stiffness(
     dataset: xr.Dataset, contact_modulus: Quantity, *, kernel: Kernel | None = None
 ) -> xr.Dataset:
-    r"""Stiffness of the contact for a fast increment of load at constant contact area.
+    r"""Compute the stiffness of the contact for a fast increment of load at constant contact area.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def incremental_stiffness(
         relaxed modulus for a slow increment that does not change the area, the instantaneous modulus :math:`1/C(0)` for
         a fast one. [Pa]
     kernel : Kernel, optional
-        Kernel of the body if it is no half-space, such as ``rv.sheet(material, thickness).kernel``.
+        Kernel of the body if it is not a half-space, such as ``rv.sheet(material, thickness).kernel``.
 
     Returns
     -------
@@ -104,8 +105,8 @@ def incremental_stiffness(
     Raises
     ------
     InputError
-        If the result holds neither ``pressure`` nor ``gap``, or is of another body than a half-space and no kernel is
-        given; if the modulus is not positive.
+        If the result contains neither ``pressure`` nor ``gap``. If its body is not a half-space and no kernel is given.
+        If the modulus is not positive.
 
     Notes
     -----
@@ -116,7 +117,7 @@ def incremental_stiffness(
     if kernel is None and (named := {"kernel", "thickness"} & dataset.attrs.keys()):
         name = min(named)
         raise InputError(
-            key="kernel", found=dataset.attrs[name], expected=f"the kernel of the body, which has a {name}"
+            key="kernel", found=dataset.attrs[name], expected=f"the kernel of the body, because it has a {name}"
         )
     modulus = number(contact_modulus, "Pa", "contact_modulus", above=0)
     stiffness, error = _frozen(dataset, kernel or HALF_SPACE)
@@ -130,7 +131,7 @@ def incremental_stiffness(
 
 
 def _frozen(dataset: xr.Dataset, kernel: Kernel) -> Any:
-    """Return the stiffness of the contact over the contact modulus at every kept time, and its error. [m]"""
+    """Return the stiffness of the contact over the contact modulus, and its error, at every kept time. [m]"""
     touching = contact(dataset)
     present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
     cells, boundary = spacing(dataset, "spots"), dataset.attrs.get("boundary", "free")

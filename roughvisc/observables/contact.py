@@ -19,7 +19,7 @@ from roughvisc.variables import VARIABLES, axis_of
 
 
 def contact(dataset: xr.Dataset) -> xr.DataArray:
-    """Cells in contact: those that carry pressure or, where no pressure is stored, those with no gap.
+    """Return the mask of cells in contact: cells with pressure or, if pressure is not stored, cells without a gap.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     Raises
     ------
     InputError
-        If the result holds neither ``pressure`` nor ``gap``.
+        If the result contains neither ``pressure`` nor ``gap``.
     """
     if "pressure" in dataset:
         need(dataset, "pressure")
@@ -44,19 +44,19 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def clusters(dataset: xr.Dataset) -> xr.Dataset:
-    """Number and size of the contact clusters. Cells that share only a corner are not connected.
+    """Count and measure the contact clusters. Cells that share only a corner are not connected.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``pressure`` or ``gap``. If its attribute ``boundary`` is ``"periodic"``, clusters continue across
-        opposite borders. If it is ``"mirror"``, a cluster counts with its part inside the border.
+        opposite borders. If it is ``"mirror"``, only the part of a cluster inside the border counts.
 
     Returns
     -------
     xarray.Dataset
-        ``cluster_count``, ``cluster_area_mean`` and ``cluster_area_largest`` over time; areas are missing while
-        there is no contact. [1], [m2], [m2]
+        ``cluster_count``, ``cluster_area_mean`` and ``cluster_area_largest`` over time; areas are missing without
+        contact. [1], [m2], [m2]
 
     Raises
     ------
@@ -81,7 +81,7 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
-    """Area of every contact cluster; computed immediately, with one frame in memory at a time.
+    """Return the area of every contact cluster; computed immediately, with one frame in memory at a time.
 
     Parameters
     ----------
@@ -91,13 +91,13 @@ def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``cluster_area`` with dimensions ``(time, cluster)``, or those of another axis, largest first, missing beyond
-        the number of clusters. [m2]
+        ``cluster_area`` with dimensions ``(time, cluster)`` or ``(speed, cluster)``, largest first, missing beyond the
+        number of clusters. [m2]
 
     Raises
     ------
     InputError
-        If the result holds neither ``pressure`` nor ``gap``, or is not of one case.
+        If the result contains neither ``pressure`` nor ``gap``, or several cases.
     """
     touching = contact(dataset)
     rows = axis_of(touching.dims)
@@ -155,7 +155,7 @@ def cluster_sizes(mask: np.ndarray, periodic: bool = False) -> np.ndarray:
 def distribution(
     dataset: xr.Dataset, name: Literal["pressure", "gap"] = "pressure", bins: int | Sequence[float | str] = 60
 ) -> xr.Dataset:
-    """Probability density of the pressure over the cells in contact, or of the gap over the present cells outside.
+    """Return the probability density of the pressure in the contact, or of the gap outside it, over present cells.
 
     Parameters
     ----------
@@ -170,13 +170,13 @@ def distribution(
     Returns
     -------
     xarray.Dataset
-        ``pressure_density`` over time and ``pressure_bin`` [1/Pa], missing while there is no contact; or
-        ``gap_density`` over time and ``gap_bin`` [1/m], missing in full contact.
+        ``pressure_density`` over time and ``pressure_bin`` [1/Pa], missing without contact; or ``gap_density`` over
+        time and ``gap_bin`` [1/m], missing in full contact.
 
     Raises
     ------
     InputError
-        If the result does not hold the field, or edges do not increase.
+        If the result does not contain the field, or edges do not increase.
     """
     if name not in ("pressure", "gap"):
         raise InputError(key="name", found=name, expected="'pressure' or 'gap'")

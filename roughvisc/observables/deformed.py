@@ -12,20 +12,20 @@ from roughvisc.variables import AXES, axis_of
 
 @quantities(time="s")
 def deformed(dataset: xr.Dataset, time: Quantity = -1) -> xr.DataArray:
-    """Heights of the deformed surface of the body, as any surface over (x, y).
+    """Return the heights of the deformed surface of the body.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result with ``height``, and ``gap`` or ``displacement``.
     time : float or str
-        The nearest kept time [s] is taken, or speed [m/s]; a negative whole number counts rows from the end.
+        Time [s] or speed [m/s], of which the nearest row is used; a negative whole number counts rows from the end.
 
     Returns
     -------
     xarray.DataArray, dims (x, y)
-        Height of the surface in the frame of the pressed profile: equal to the profile's where they touch, above
-        it elsewhere; missing above missing cells unless ``displacement`` was kept. [m]
+        Height of the surface in the frame of the pressed profile: equal to the height of the profile in contact, above
+        the profile elsewhere; missing at absent cells unless ``displacement`` was kept. [m]
 
     Raises
     ------
@@ -38,7 +38,7 @@ def deformed(dataset: xr.Dataset, time: Quantity = -1) -> xr.DataArray:
     height, place = at["height"], AXES[axis].place(float(at[axis]), 3)
     if "displacement" not in at:
         surface = height + at["gap"]
-    elif "gap" in at:  # the displacement lies below the surface by the same distance everywhere
+    elif "gap" in at:  # displacement and surface differ by one distance everywhere
         surface = at["displacement"] + float(np.nanmedian(height + at["gap"] - at["displacement"]))
     else:
         surface = at["displacement"] + float((height - at["displacement"]).max())

@@ -12,7 +12,7 @@ from roughvisc.labels import expect_declared_units
 
 
 def need(dataset: xr.Dataset, *names: str) -> None:
-    """Refuse a result that lacks variables, or was converted to other units; say how to get them."""
+    """Refuse a result that lacks variables or was converted to other units; the message states the remedy."""
     for name in names:
         if name not in dataset:
             stored = ", ".join(str(known) for known in dataset.data_vars)
@@ -35,12 +35,13 @@ def frame_by_frame(
 ) -> tuple[xr.DataArray, ...]:
     """Apply a function of the (x, y) arrays of one frame to every frame.
 
-    Lazily on Dask, also if the fields are not read from their file yet; otherwise immediately.
+    The result is lazy if the fields are on Dask or are not read from their file yet, and computed immediately
+    otherwise.
 
     Parameters
     ----------
     function : callable
-        Gives a tuple of as many numbers or arrays as there are `outputs`.
+        Returns a tuple with one number or array for each of `outputs`.
     *fields : xarray.DataArray
         Over x and y and any other dimensions.
     outputs : sequence of sequence of str
@@ -48,7 +49,7 @@ def frame_by_frame(
     sizes : dict, optional
         Sizes of the dimensions that the fields do not have.
     over : sequence of str
-        Dimensions of a frame, in the order in which the function takes them.
+        Dimensions of a frame, in the order of the axes that the function takes.
     """
     found = xr.apply_ufunc(
         function if len(outputs) > 1 else lambda *frame: function(*frame)[0],

@@ -13,12 +13,12 @@ from roughvisc.mechanics.program import Program
 from roughvisc.observables.frames import need
 from roughvisc.variables import STEPPED
 
-#: Times closer than this part of a period are the same.
+#: Times closer than this part of a period count as equal.
 _SAME = 1e-9
 
 
 def history(dataset: xr.Dataset) -> xr.Dataset:
-    """Histories of every accepted step, under the names of those at the kept times.
+    """Return the histories at every accepted step, under the names of the histories at the kept times.
 
     Parameters
     ----------
@@ -48,10 +48,10 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
-    r"""Work done by the force in every cycle of the program, :math:`W = \oint F \, d\delta`.
+    r"""Return the work done by the force in every cycle of the program, :math:`W = \oint F \, d\delta`.
 
-    If force and approach at the end of a cycle equal those at its start, this is the energy dissipated in the cycle.
-    Otherwise a part of it is stored, or was stored before.
+    If force and approach are equal at the start and the end of a cycle, the work is the energy dissipated in the cycle.
+    Otherwise a part of the work is stored, or was stored before.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
 
     Notes
     -----
-    The work of a cycle is the change of the variable ``work`` over it, which counts every accepted step. Between steps
-    it is interpolated linearly.
+    The work of a cycle is the change of the variable ``work`` in the cycle, over all accepted steps. Between steps
+    ``work`` is interpolated linearly.
     """
     steps = history(dataset)
     need(steps, "work")
@@ -92,7 +92,7 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
     covered = (times[0] <= begin + slack) & (end <= times[-1] + slack)
 
     def work_at(at: np.ndarray) -> np.ndarray:
-        """Return the work of the step there, after a jump if there is one; else interpolated."""
+        """Return the work at some times: of the step at this time, after any jump, or else interpolated."""
         last = np.searchsorted(times, at + slack, side="right") - 1
         return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
 

@@ -16,7 +16,7 @@ from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import LEAK_MEANINGS, axis_of
 
-#: Distance of the bounds, relative, up to which a leak rate counts as known.
+#: Relative distance of the bounds up to which a leak rate counts as known.
 _CERTIFIED = 1e-6
 
 
@@ -30,7 +30,7 @@ def leakage(
     sides: Literal["closed", "periodic"] | None = None,
     flow: bool = False,
 ) -> xr.Dataset:
-    r"""Leak rate of a fluid through the gap, from one side of the map to the opposite one.
+    r"""Compute the leak rate of a fluid through the gap, from one side of the map to the opposite one.
 
     The fluid pressure does not deform the surfaces.
 
@@ -46,8 +46,8 @@ def leakage(
     along : {"x", "y"}
         Direction of the flow.
     sides : {"closed", "periodic"}, optional
-        Whether the other two sides are walls or joined. Default: joined if the attribute ``boundary`` of the result is
-        ``"periodic"``; only then may they be joined.
+        Whether the other two sides are walls or joined. They may be joined only if the attribute ``boundary`` of the
+        result is ``"periodic"``, which is also the default then.
     flow : bool
         Whether to return the flow field, too.
 
@@ -99,8 +99,8 @@ def leakage(
             return (np.array([np.nan, np.nan, np.nan, 0]), field, field)[: len(outputs)]
         if missing:
             raise InputError(
-                f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: what "
-                "the fluid finds there is not known: expected a surface that is cropped, or filled"
+                f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: the "
+                "flow through these cells is unknown: expected a surface that is cropped, or filled"
             )
         found = flow_through(field, sides_of_cell, wrap=wrap)
         known = found.upper - found.lower <= _CERTIFIED * found.upper
@@ -138,7 +138,7 @@ def leakage(
 
 
 def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
-    """The last kept time at which fluid flows, and the first after it, from which on the contact is closed. [s]"""
+    """Return the last kept time with flow and the next kept time, from which on the contact is closed. [s]"""
     closed = dataset["leak_status"].values == LEAK_MEANINGS.index("closed")
     if not closed[-1] or closed.all():
         return None

@@ -1,4 +1,4 @@
-"""Theories of rough contact: the area by Persson's theory and by asperities, and Persson's rubber friction."""
+"""Theories of rough contact: area by Persson's theory and by asperity theory, and rubber friction by Persson's."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Array = NDArray[np.float64]
 
 #: Tolerance of the series that replaces a material without a complex compliance in closed form.
 _TOLERANCE = 1e-4
-# Waves whose numbers differ by less than this, relative, are of one magnification.
+# Waves whose wavenumbers differ by less than this, relative, have one magnification.
 _SAME = 1e-9
 
 
 def persson_fraction(strain: ArrayLike) -> Any:
-    r"""Contact area over nominal area by Persson's theory, :math:`\mathrm{erf}(\sqrt2 \, p / (E^* h'))`.
+    r"""Return contact area over nominal area by Persson's theory, :math:`\mathrm{erf}(\sqrt2 \, p / (E^* h'))`.
 
     Parameters
     ----------
@@ -42,39 +42,38 @@ def persson_fraction(strain: ArrayLike) -> Any:
 
 
 def asperity_fraction(strain: ArrayLike) -> Any:
-    r"""The same by the theory of asperities at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`: 1.57 times Persson's."""
+    r"""Return it by asperity theory at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`, 1.57 times Persson's value."""
     return math.sqrt(2 * math.pi) * np.asarray(strain, dtype=float)
 
 
 def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
-    r"""Contact area of a rough surface by Persson's theory and by asperity theory, for a load that does not fall.
+    r"""Return the contact area of a rough surface by Persson's theory and by asperity theory, for a rising load.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result with ``force`` and ``height``, of a half-space and periodic boundaries.
+        One case's result with ``force`` and ``height``, for a half-space and periodic boundaries.
     material : Prony or Creep
         Material of the half-space.
 
     Returns
     -------
     xarray.Dataset
-        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing from the time at which the load falls.
-        [m2]
+        ``persson_contact_area`` and ``asperity_contact_area`` over time, missing once the load has fallen. [m2]
 
     Raises
     ------
     InputError
-        If the boundaries are not periodic, the body is no half-space, or the result is not of one case.
+        If the boundaries are not periodic, the body is not a half-space, or the result contains several cases.
 
     Notes
     -----
     On an elastic half-space Persson's theory [1]_ gives :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
-    the nominal pressure :math:`p`, and asperities at low loads [2]_ :math:`A = A_0 \sqrt{2\pi} \, p / (E^* h')`; both
-    for a Gaussian surface with the root-mean-square slope :math:`h'` on the grid. A growing viscoelastic contact is
-    equivalent to an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`: under a constant
-    pressure by :math:`C(t) \, p`. The load is interpolated linearly between accepted steps, so a jump after the start
-    becomes a ramp over the step before it.
+    the nominal pressure :math:`p`. Asperity theory at low loads [2]_ gives :math:`A = A_0 \sqrt{2\pi} \, p / (E^* h')`.
+    Both are for a Gaussian surface with the root-mean-square slope :math:`h'` on the grid. A growing viscoelastic
+    contact is equivalent to an elastic one with :math:`p / E^*` replaced by :math:`\int C(t - s) \, dp(s)`, which is
+    :math:`C(t) \, p` under a constant pressure. The load is interpolated linearly between accepted steps, so a jump
+    after the start becomes a ramp over the step before it.
 
     References
     ----------
@@ -84,13 +83,13 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     need(dataset, "force", "height")
     steps, kept = history(dataset), dataset["time"].values
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
-        raise InputError("the theories are of surfaces without borders: expected boundary = 'periodic' or 'mirror'")
+        raise InputError("the theories are for surfaces without borders: expected boundary = 'periodic' or 'mirror'")
     for body in ("thickness", "kernel"):
         if body in dataset.attrs:
-            raise InputError(f"the theories are of a half-space: found a result with the {body} {dataset.attrs[body]}")
+            raise InputError(f"the theories are for a half-space: found a result with the {body} {dataset.attrs[body]}")
     material = check_material(material)
     area, times, force = nominal_area_of(dataset), steps["time"].values, steps["force"].values
-    # int C(t - s) dp(s) of a pressure that is linear between the steps
+    # int C(t - s) dp(s) for a pressure that is linear between the steps
     since = np.maximum(kept[:, None] - times[None], 0.0)
     integral = material.contact_integral(since)
     strain = material.contact_compliance(since[:, 0]) * (force[0] / area)
@@ -115,7 +114,7 @@ def nominal_area_of(dataset: xr.Dataset) -> float:
 
 
 def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
-    r"""Return friction coefficient and contact fraction by Persson's theory, for the waves of the same surface.
+    r"""Return friction coefficient and contact fraction by Persson's theory, for the surface of a friction curve.
 
     Parameters
     ----------
@@ -172,22 +171,22 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     friction_coefficient : float
         [-]
     contact_fraction : float
-        Contact area over the nominal one, with all waves of the surface. [-]
+        Contact area over nominal area, with all waves of the surface. [-]
 
     Notes
     -----
     A wave :math:`h_\mathbf{q}` in full contact has the stress :math:`\sigma_\mathbf{q} = E^*_\mathbf{q}
-    h_\mathbf{q}`, on a half-space with :math:`E^*_\mathbf{q} = \tfrac12 |\mathbf q| E^*(q_x V)`. The theory takes
-    that for the waves up to a magnification, and counts with each wave the part of the surface that is still in contact
-    there:
+    h_\mathbf{q}`, on a half-space with :math:`E^*_\mathbf{q} = \tfrac12 |\mathbf q| E^*(q_x V)`. The theory assumes
+    this stress for the waves up to a magnification. It weights each wave by the fraction of the surface that is still
+    in contact at its magnification:
 
     .. math:: P(q) = \operatorname{erf} \frac{\sigma_0}{\sqrt{2 v(q)}}, \quad
               v(q) = \sum_{|\mathbf q'| < q} |\sigma_{\mathbf q'}|^2, \quad
               \mu = \frac{1}{\sigma_0} \sum_\mathbf{q} P(q)\, q_x |h_\mathbf{q}|^2 \operatorname{Im} E^*_\mathbf{q} .
 
     With the spectrum of an isotropic surface and :math:`G = v / 2 \sigma_0^2` these are the integrals of [1]_ over
-    :math:`q^3 C(q)`. Waves of one length share their ``P``, for which half of their own variance is counted. The
-    correction of later papers for the share of the contact in the dissipation is left out.
+    :math:`q^3 C(q)`. Waves of one length have one :math:`P`, which includes half of their variance. Later papers
+    correct the contact's share in the dissipation; this correction is not included.
 
     References
     ----------
@@ -195,7 +194,7 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     """
     ny, waves = height.shape[1], fft.rfft2(height, norm="forward")
     length = np.broadcast_to(np.hypot(sliding.qx, sliding.qy), waves.shape)
-    twice = np.full(ny // 2 + 1, 2.0)  # waves of which the conjugates are not stored
+    twice = np.full(ny // 2 + 1, 2.0)  # conjugate waves are not stored
     twice[0] = 1.0
     if ny % 2 == 0:
         twice[-1] = 1.0

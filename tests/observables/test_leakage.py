@@ -124,5 +124,5 @@ def test_asked__is_what_the_study_has():
     assert not asked(ds).data_vars
     ds.attrs["case"] = '{"observe": {"leakage": {"viscosity": 0.002, "along": "y"}}}'
     xr.testing.assert_identical(asked(ds), leakage(ds, viscosity=2e-3, along="y"))
-    with pytest.raises(InputError, match="observe: 'noise' is no observable: expected some of leakage"):
+    with pytest.raises(InputError, match="observe: unknown observable 'noise': expected some of leakage"):
         rv.observables.asked(ds, {"noise": {}})
