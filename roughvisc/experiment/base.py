@@ -1,6 +1,6 @@
-"""Base of the experiments: what is done with a surface, as rows along one axis.
+"""Base classes of the experiments. An experiment on a surface yields rows along one axis.
 
-The driver (:mod:`roughvisc.solve`), files, sweeps, tables and figures know no kind of experiment. They take rows.
+The driver (:mod:`roughvisc.solve`), files, sweeps, tables and figures treat the rows of all experiments equally.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ Array = NDArray[np.float64]
 
 
 def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
-    """Boundary that a surface was made for; None where it has to be said: of scans, plain arrays, and all others.
+    """Return the boundary that a surface was made for; None for scans, plain arrays and all other surfaces.
 
-    The recipe of an indenter is believed if it gives the heights again, because the grid may have to grow. The recipe
-    of waves and roughness, and mirror images, are believed if the attribute ``period`` gives the sides of the grid and
-    the borders meet (:func:`is_periodic`).
+    The user must state the boundary if this function returns None. The recipe of an indenter counts only if it
+    reproduces the heights, because the grid may have to grow. The recipe of waves or roughness, and the record of
+    mirroring, count only if the attribute ``period`` gives the sides of the grid and the borders meet
+    (:func:`is_periodic`).
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     Returns
     -------
     {"free", "periodic"} or None
-        ``free`` of an indenter, ``periodic`` of waves, self-affine roughness, and surfaces with their mirror images.
+        ``free`` for an indenter; ``periodic`` for waves, self-affine roughness and mirrored surfaces.
 
     Examples
     --------
@@ -69,7 +70,7 @@ class Problem:
     body : Body
         The body under it.
     settings : Settings
-        How it is computed and what is kept.
+        Numerical settings and the fields to keep.
     """
 
     height: xr.DataArray
@@ -77,7 +78,7 @@ class Problem:
     settings: Settings
 
     def resolved(self, experiment: Experiment) -> Problem:
-        """Return the problem as an experiment computes it: with what ``auto`` stands for in boundary and grid error.
+        """Return the problem that an experiment computes: ``auto`` is replaced in boundary and grid error.
 
         Raises
         ------
@@ -112,17 +113,17 @@ class Row:
     at : float
         Position on the axis, in its units.
     values : dict
-        Variables of the row. If empty, the experiment has come so far and leaves no row.
+        Variables of the row. If empty, the row only reports progress and state.
     fields : dict
         Kept fields.
     kept : bool
-        Whether it is a row of the result, or of the history of all steps only.
+        Whether the row belongs to the result; otherwise only to the history of all steps.
     place : int
-        Rows of the result are sorted by it; rows with equal places stay in the order in which they are found.
+        Sort key of the rows of the result; rows with equal keys stay in the order of computation.
     state : Any
         Plain value from which the rows continue after this one; None if they cannot.
     done : float
-        Progress, of :attr:`Rows.end`.
+        Progress, on the scale of :attr:`Rows.end`.
     """
 
     at: float
@@ -135,12 +136,12 @@ class Row:
 
 
 class Outgrown(Exception):
-    """Contact has outgrown the domain of a solve, which must begin again on a larger one.
+    """Contact has outgrown the domain of a solve; the solve must restart on a larger domain.
 
     Parameters
     ----------
     state : Any
-        From which the rows begin again.
+        State from which the rows restart.
     """
 
     def __init__(self, state: Any) -> None:
@@ -154,7 +155,7 @@ class Rows(ABC):
     Attributes
     ----------
     problem : Problem
-        As it is computed; its surface may be larger than that of the given problem.
+        The problem solved; its surface may be larger than the surface of the given problem.
     end : float
         End of the experiment, in the unit of :attr:`Row.done`.
     """
@@ -178,14 +179,14 @@ class Rows(ABC):
 
 
 class Experiment(ABC):
-    """What is done with a surface; a frozen value.
+    """Experiment on a surface; a frozen value.
 
     Attributes
     ----------
     axis : str
         Name of the axis of its rows, one of :data:`roughvisc.variables.AXES`.
     boundary : {"free", "periodic"} or None
-        Boundary that ``auto`` stands for. None: that of the surface.
+        Boundary used for ``auto``. None: the boundary that the surface was made for.
     """
 
     axis: ClassVar[str]
@@ -207,7 +208,7 @@ class Experiment(ABC):
         Raises
         ------
         InputError
-            If problem and experiment do not go together; nothing has been computed then.
+            If the problem does not fit the experiment; raised before any computation.
         """
 
     @abstractmethod
@@ -215,5 +216,5 @@ class Experiment(ABC):
         """Return the progress in words."""
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
-        """Yield the settings that have no meaning here: their names, their values, and what is expected."""
+        """Yield the settings that this experiment does not support: name, value and expected value."""
         yield from ()

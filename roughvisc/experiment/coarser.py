@@ -1,4 +1,4 @@
-"""A surface on a coarser grid, and pressures of one grid seen on another."""
+"""Resampling of surfaces to coarser grids, and comparison of pressures on two grids."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ Array = NDArray[np.float64]
 
 
 def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> tuple[int, int]:
-    """Numbers of cells of a grid whose cells are about so many times longer, at least two each way.
+    """Return the shape of a grid with cells longer by about a factor, at least two cells along each axis.
 
-    An indenter's apex lies in a cell or between cells as their number is odd or even; ``same_parity`` keeps that.
+    The apex of an indenter lies in a cell if the number of cells is odd, and between cells if it is even;
+    ``same_parity`` keeps the position.
 
     Examples
     --------
@@ -34,18 +35,19 @@ def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> t
 
 
 def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataArray:
-    """A surface on cells about so many times longer. [m]
+    """Return a surface on cells longer by about a factor. [m]
 
-    An indenter is made anew. Any other surface keeps the waves that the cells can hold, by :func:`on_fewer_cells`.
+    An indenter is generated again. Any other surface keeps the waves that the new cells can resolve, see
+    :func:`on_fewer_cells`.
 
     Parameters
     ----------
     height : xarray.DataArray
-        Of the surface. [m]
+        Heights of the surface. [m]
     factor : float
-        How many times longer the cells are.
+        Ratio of the new cell side to the old one.
     boundary : {"free", "periodic", "mirror"}
-        Of the run: with "periodic" every surface repeats, with "mirror" it does with its mirror images.
+        Boundary of the run. With "periodic" the surface repeats, with "mirror" it repeats with its mirror images.
     """
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
@@ -53,42 +55,42 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
 
 
 def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Boundary) -> xr.DataArray:
-    """A surface with the waves that a coarser grid can hold. [m]"""
+    """Return a surface with the waves that a coarser grid can resolve. [m]"""
     return resample(height, shape, periodic={"periodic": True, "mirror": False}.get(boundary))
 
 
 def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:
-    """Means of a field over the cells of another grid; it is zero outside its own.
+    """Return the means of a field over the cells of another grid; the field is zero outside its grid.
 
     Parameters
     ----------
     field : ndarray, shape (..., nx, ny)
         Constant in each cell.
     cells, onto : tuple of ndarray
-        Borders of its cells and of the other grid's, along x and along y. [m]
+        Edges of the cells of the field and of the other grid, along x and along y. [m]
     """
     along_x, along_y = (_shares(a, b) for a, b in zip(cells, onto, strict=True))
     return np.asarray(along_x @ field @ along_y.T)
 
 
 def _shares(cells: Array, onto: Array) -> Array:
-    """Which part of each new cell (rows) lies in each old one (columns)."""
+    """Return the fraction of each new cell (rows) that lies in each old cell (columns)."""
     common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
     return np.asarray(np.maximum(common, 0.0) / np.diff(onto)[:, None])
 
 
 def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
-    """Largest part of the force that pressures of two grids do not share, at each common time. [N]
+    """Return the L1 distance of the pressures on two grids, at each common time. [N]
 
     Parameters
     ----------
     found, wanted : xarray.Dataset
-        Results at the same times with ``pressure``; the pressures of both are taken as means over the coarser cells.
+        Results at the same times with ``pressure``. Both pressures are averaged over the coarser cells.
 
     Returns
     -------
     ndarray, shape (time,)
-        The integral of the absolute difference (L1).
+        Integral of the absolute difference.
     """
     grids = [tuple(cell_edges(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
     fields = [ds["pressure"].values for ds in (found, wanted)]
@@ -102,7 +104,7 @@ def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
 
 
 def _extended(edges: Array, low: float, high: float) -> Array:
-    """Cell borders with further cells of the same side, until both ends are reached."""
+    """Return cell edges, extended by cells of the same side until they cover both limits."""
     side = edges[1] - edges[0]
     before, after = (max(0, math.ceil(gap / side - 1e-9)) for gap in (edges[0] - low, high - edges[-1]))
     return np.concatenate(

@@ -1,8 +1,8 @@
 """Error of the grid in each quantity, from a solution on cells twice as long and from the edge of the contact.
 
-Both grids may agree by chance, and do so if the contact is too small for either to resolve its shape. Therefore no
-error is stated that is smaller than what the finer grid alone leaves open: the edge of the contact, which lies anywhere
-in its cells, and the peak between the highest cells.
+Both grids may agree by chance, and they do so if the contact is too small for either grid to resolve its shape.
+Therefore the stated error is never smaller than the uncertainty of the finer grid alone. The edge of the contact may
+lie anywhere in its cells, and the peak of the surface may lie between the highest cells.
 
 Steady sliding and trades have three grids, which show the order of convergence (:func:`grid_uncertainty`). With two, on
 24 rough surfaces at three pressures and three speeds, the error would be below 0.8 of the true one in 27 of 216 areas,
@@ -28,11 +28,11 @@ from roughvisc.topography.indenters import is_indenter
 from roughvisc.variables import GRID_ERROR, axis_of
 
 Array = NDArray[np.float64]
-#: Powers of the cell's side with which the error of a quantity vanishes: no lower one is believed, and no higher one
-#: expected. Measured: of the pressure's L1 norm; the mean gap follows the displacements, but in free space more slowly;
-#: the counted area the cells at its edge; of the contact area the scatter of the count is left. Friction shows the
-#: power 2 or more; with 1.5 what is stated is 1.1 times the true error or more on 24 rough surfaces, and 10 times that
-#: in the median.
+#: Orders of convergence in the cell side: lowest accepted order and expected order. They are measured; for the pressure
+#: in the L1 norm. The mean gap converges like the displacements, but more slowly in free space. The counted area
+#: converges like the number of cells at its edge. The contact area keeps the scatter of the count. Friction shows order
+#: 2 or more. With order 1.5 the stated error is at least 1.1 times the true error on 24 rough surfaces, and 10 times
+#: the true error in the median.
 ORDERS = {
     "pressure": (1.0, 1.5),
     "force": (1.0, 1.5),
@@ -46,7 +46,7 @@ ORDERS = {
     "thermal_conductance": (1.0, 1.5),
     "incremental_stiffness": (1.0, 1.5),
 }
-#: Safety factor and order for one coarser grid, which cannot show the order. On the 456 contacts of
+#: Safety factor and order for one coarser grid, from which the order cannot be estimated. On the 456 contacts of
 #: ``workflows/benchmarks/grid_accuracy.py`` the error is then below 0.8 of the true one in 1 of 446 pressures, 1 of 299
 #: approaches, 1 of 155 forces, 5 of 142 mean gaps and 16 of 454 areas; with a third grid in 1, 0, 1, 2 and 10.
 _ONE_COARSER = {
@@ -57,33 +57,33 @@ _ONE_COARSER = {
     "mean_gap": (3.0, 1.0),
     "friction_force": (3.0, 1.5),
 }
-#: The area of a sliding contact settles more slowly than that of one at rest.
+#: The area of a sliding contact converges more slowly than the area of a contact at rest.
 _MOVING = {"contact_area": (1.0, 1.0)}
 #: Roache's safety factors: with three grids, and with two.
 _THREE, TWO_GRIDS = 1.25, 3.0
 
 
 def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *, moving: bool = False) -> Array:
-    """What the grid leaves unknown of a quantity, from the runs on three grids.
+    """Return the error of a quantity due to the grid, from runs on three grids.
 
     Parameters
     ----------
     name : str
-        The quantity.
+        Name of the quantity.
     near, far : array_like
-        Differences between the runs on the first and the second, and on the second and the third grid; the latter
-        may be missing.
+        Differences between the runs on the first and second grid, and on the second and third grid. `far` may be
+        missing.
     ratio : float
-        How many times longer the cells are from one grid to the next.
+        Ratio of the cell sides of one grid and the next finer grid.
     moving : bool
         Whether the surface slides.
 
     Notes
     -----
-    With an error that vanishes with the power ``p`` of the cell's side the finest run is off by
-    ``near / (ratio^p - 1)``. The power seen, ``log(far / near) / log(ratio)``, is taken where it is below the one
-    expected. Where it is above, the two finer grids agree by chance: then ``far / ratio^p`` with the power expected
-    stands for ``near``. The safety factor is 1.25 with three grids and 3 with two (the grid convergence index of
+    If the error is proportional to the cell side to the power ``p``, the error of the finest run is
+    ``near / (ratio^p - 1)``. The observed order ``p = log(far / near) / log(ratio)`` is used if it is below the
+    expected order. If it is above, the two finer grids agree by chance; ``near`` is then replaced by ``far / ratio^p``
+    with the expected order. The safety factor is 1.25 with three grids and 3 with two (the grid convergence index of
     Roache [1]_).
 
     References
@@ -96,7 +96,7 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
         seen = np.log(far / near) / math.log(ratio)
     order = np.where(np.isnan(seen), expected, np.clip(seen, lowest, expected))
     factor = np.where(np.isnan(far), TWO_GRIDS, _THREE)
-    # a missing near makes it missing, a missing far does not
+    # the error is missing if near is missing, but not if far is
     difference = np.maximum(near, np.where(np.isnan(far), 0.0, far) / ratio**expected)
     return np.asarray(factor * difference / (ratio**order - 1))
 
@@ -104,14 +104,14 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
 def grid_uncertainties(
     runs: Sequence[Mapping[str, ArrayLike]], ratio: float, *, moving: bool = False
 ) -> dict[str, Array]:
-    """The same of several quantities, relative to the largest value of the first run.
+    """Return the errors of several quantities due to the grid, relative to the largest value of the first run.
 
     Parameters
     ----------
     runs : sequence of mapping
         Quantity -> values over the rows, on two or three grids, the finest first.
     ratio, moving
-        As :func:`grid_uncertainty` has them.
+        See :func:`grid_uncertainty`.
     """
     found = {}
     for name, first in runs[0].items():
@@ -126,41 +126,41 @@ def grid_uncertainties(
 
 log = logging.getLogger("roughvisc")
 Mask = NDArray[np.bool_]
-#: Error of the pressure (L1) for each newton on cells at the edge of the contact, at most: where contact ends on the
-#: material (measured 0.2 in the median, 0.5 in 5 % of the cases), and where the material ends, with pressure infinite.
-#: With all of the force at the edge, nothing is known.
+#: Largest error of the pressure (L1) per unit force on cells at the edge of the contact. The first is for edges on the
+#: material (measured 0.2 in the median, 0.5 in 5 % of the cases), the second for edges of the material, where the
+#: pressure is infinite. If the edge carries all of the force, the pressure is unknown.
 _AT_EDGE, _AT_END = 0.45, 0.9
-#: Error of the counted cells over the square root of the number of faces at the contact's edge, as edges lie at random
-#: between the cells; what is mirrored doubles the same error.
+#: Error of the number of contact cells over the square root of the number of faces at the edge of the contact, since
+#: the edge lies at random between the cells. Each mirror symmetry of the contact doubles the same error.
 _COUNTING = 0.5
-#: Area that full contact may hide over that of the cells of small pressure: an opening between the centres of cells may
-#: be wider than one of them. At 0.999 of the pressure of full contact this is 2.3 times the open area of a wave on 64
-#: cells, and 4.7 times that on 32.
+#: Open area that a grid in full contact may hide, over the area of the cells with small pressure: an opening between
+#: cell centres may be wider than one cell. At 0.999 of the pressure of full contact the hidden area is 2.3 times the
+#: open area of a wave on 64 cells, and 4.7 times the open area on 32 cells.
 _HIDDEN = 1.5
-#: Approaches that differ by less of the largest one were given.
+#: Approaches of both grids that differ by less than this part of the largest approach were prescribed.
 _GIVEN = 1e-12
 
 
 def with_grid_error(
     dataset: xr.Dataset, height: xr.DataArray, press_again: Callable[[xr.DataArray, list[float]], xr.Dataset]
 ) -> xr.Dataset:
-    """A result with the errors of its grid, one for each quantity, and bounds on the contact area in its rows.
+    """Return a result with the error of each quantity due to the grid.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         A result with ``pressure``.
     height : xarray.DataArray
-        The surface that it was computed from, before the grid grew. [m]
+        Surface of the result, before the grid grew. [m]
     press_again : callable
-        Computes the same on another surface, at given places of the axis, with ``pressure``.
+        Repeats the experiment on another surface, with rows at given positions on the axis and ``pressure``.
 
     Notes
     -----
-    Errors are relative to the largest value, that of the pressure (L1) to the largest force; ``grid_error`` is the
-    largest of pressure, force and approach. All runs have an error in time within the tolerance, so that these are no
-    estimates much below it. Missing where there is no coarser solution. The coarser grid has all waves that it can
-    hold: see :func:`~roughvisc.experiment.coarser.coarser`.
+    Errors are relative to the largest value of the quantity, the error of the pressure (L1) to the largest force.
+    ``grid_error`` is the largest error of pressure, force and approach. All runs have an error in time within the
+    tolerance, so the estimates are meaningless far below the tolerance. They are missing if the coarser run fails. The
+    coarser grid has all waves that it can resolve, see :func:`~roughvisc.experiment.coarser.coarser`.
     """
     axis = axis_of(dataset.variables)
     places = dataset[axis].values.tolist()
@@ -193,14 +193,14 @@ def with_grid_error(
 
 
 def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the errors of the grid by the variables that state them: of two the larger one, of quantities the largest.
+    """Return the errors due to the grid by result variable, each the largest error of its quantities.
 
     Parameters
     ----------
     found : mapping
-        Quantity -> error by the difference between the grids; missing (NaN) if there is no coarser solution.
+        Quantity -> error from the difference between the grids; NaN if the coarser run failed.
     least : mapping
-        Quantity -> error that the finest grid alone leaves open.
+        Quantity -> least error to state, from the finest grid alone.
     """
     errors: dict[str, Array] = {}
     for name, error in found.items():
@@ -210,9 +210,9 @@ def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[
 
 
 def _peak(height: xr.DataArray) -> float:
-    """How much higher than the highest cell a surface may be in that cell; zero where it is known. [m]
+    """Return the possible height of the peak above the centre of the highest cell; zero for indenters. [m]
 
-    Half of the way down to the lower neighbour along each axis: the flanks of a cone meet no higher.
+    The bound is half of the descent to the lower neighbour, summed over both axes: the flanks of a cone meet no higher.
     """
     if is_indenter(height):
         return 0.0
@@ -226,7 +226,7 @@ def _peak(height: xr.DataArray) -> float:
 def _least_errors(
     dataset: xr.Dataset, row: int, largest: Mapping[str, float], given: bool, peak: float
 ) -> dict[str, float]:
-    """Return the errors of a row by quantity, relative to the largest, that its own grid leaves open.
+    """Return the least errors to state for a row, by quantity, from its own grid, relative to the largest values.
 
     Parameters
     ----------
@@ -235,18 +235,18 @@ def _least_errors(
     row : int
         Number of the row.
     largest : mapping
-        Largest values of force [N], approach [m], contact area [m2] and, if it is known, mean gap. [m]
+        Largest values of force [N], approach [m], contact area [m2] and, if known, mean gap. [m]
     given : bool
-        Whether the approach is given, and not the load.
+        Whether the approach is prescribed, not the load.
     peak : float
-        How much higher the surface may be between the highest cells. [m]
+        Possible height of the peak above the highest cell, see :func:`_peak`. [m]
     """
     here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
     wide = largest.get("mean_gap", math.inf)
     force, area = here["force"] / largest["force"], here["contact_area"] / largest["contact_area"]
 
-    # The peak: under a given approach the gap is wider by as much, and force and area follow from it; under a cone both
-    # with its square, under a ball with lower powers. Under a given load the approach is less.
+    # The peak: under a given approach the gap is too wide by its height. Force and area grow with the square of the
+    # approach under a cone, and with lower powers under a ball. Under a given load the approach is too small.
     depth = abs(here["approach"])
     part = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
     least = {"pressure": part * force, "force": part * force, "contact_area": part * area}
@@ -264,40 +264,41 @@ def _least_errors(
     at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"])
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
-    unknown = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # all of it where no cell lies inside
+    unknown = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # 1 if all contact cells lie at the edge
     unknown += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
     counted = here["contact_area_counted"] / largest["contact_area"]
     least["pressure"] = max(least["pressure"], unknown * force)
     least["contact_area"] = max(least["contact_area"], counting_error(contact, faces) * counted)
-    # The outline where the material ends: a wider punch sinks in less, or carries more.
+    # The edge of the material: a wider punch sinks in less, or carries more.
     found = "force" if given else "approach"
     least[found] = max(least[found], counting_error(contact, ends))
     return least
 
 
 def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[float, float]:
-    """Return the area and the mean gap of openings too small for a grid in full contact; zero if all pressure is high.
+    """Return the area and mean gap of openings that a grid in full contact may hide; zero if all pressures are high.
 
     Parameters
     ----------
     pressure : ndarray, shape (nx, ny)
         [Pa]
     height : ndarray, shape (nx, ny)
-        Of the profile; NaN where there is none. [m]
+        Heights of the profile; NaN at absent cells. [m]
     periodic : bool
         Whether the surface repeats.
 
     Returns
     -------
     area : float
-        Part of the contact area.
+        Open area, as a fraction of the contact area.
     gap : float
         Mean gap. [m]
 
     Notes
     -----
-    The surface may open between the centres of cells whose pressure is less than it changes from the cell of least
-    pressure to the next one. Such an opening is at most as high as the profile changes there.
+    Let ``dp`` be the largest change of the pressure from the cell of least pressure to a neighbouring cell. The
+    surfaces may separate between the centres of cells whose pressure is at most ``dp``. The height of this opening is
+    at most the change of the profile between the same neighbours.
     """
     present = np.isfinite(height)
     if not (pressure[present] > 0).all():
@@ -316,13 +317,13 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
 
 
 def counting_error(contact: Mask, faces: int) -> float:
-    """Relative error of an area that is counted, from the number of faces at its edge."""
+    """Return the relative error of a counted area, from the number of faces at its edge."""
     images = math.prod(2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis)))
     return _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
 
 
 def _edge(contact: Mask, free: Mask, boundary: Boundary) -> tuple[Mask, Mask, int, int]:
-    """Cells in contact beside present cells out of contact, and beside none at all; faces to either."""
+    """Return the contact cells next to free cells and those next to absent cells, and the number of faces to each."""
     at_edge, at_end, faces, ends = np.zeros_like(contact), np.zeros_like(contact), 0, 0
     for beside, material in zip(neighbours(free, boundary), neighbours(free | contact, boundary), strict=True):
         here = contact & beside

@@ -45,28 +45,28 @@ Array = NDArray[np.float64]
 
 #: Times and loads whose squares and products stay far from overflow. [s], [N]
 LARGEST = 1e100
-#: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: time steps of a
-#: millionth of it must move the time.
+#: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: adding a millionth
+#: of its length, the shortest time step, must change the time.
 LEAST_ROUNDINGS = 4e6
-#: Displacements of a periodic surface may exceed its heights by this factor before their rounding exceeds a tenth of
-#: these.
+#: Largest ratio of displacements to heights of a periodic surface: beyond, the rounding of the displacements exceeds a
+#: tenth of the heights.
 MOST_HEIGHTS = 1e15
 
 
 @dataclass(frozen=True)
 class LoadingState:
-    """Where a march through a program stands after a step.
+    """State of a loading after a step.
 
     Attributes
     ----------
     march : State or None
-        Of the march itself; None at the start.
+        State of the time stepping; None at the start.
     largest : tuple of float
         Largest force [N] and approach [m] of the kept rows.
     enlarged, outgrown : int
-        How many times the surface of an indenter has been made larger, and the domain has been outgrown.
+        Number of times that the surface of an indenter was enlarged, and that contact outgrew the domain.
     border : float or None
-        When contact was first found at the border of a free surface, if that is accepted. [s]
+        Time at which contact first reached the border of a free surface, if this is accepted. [s]
     """
 
     march: State | None = None
@@ -76,13 +76,13 @@ class LoadingState:
     border: float | None = None
 
 
-#: Dataclasses that the state of a row is made of, beside plain values, tuples and arrays: for checkpoints.
+#: Dataclasses in the state of a row, for checkpoints. Its other parts are plain values, tuples and arrays.
 STATES = (LoadingState, State, Point, History, Difference)
 
 
 @dataclass(frozen=True)
 class Loading(Experiment):
-    """A surface is pressed through a program, and slid where that has slides.
+    """Contact of a surface under a program of load, pressure or approach, and of slides.
 
     Parameters
     ----------
@@ -98,17 +98,17 @@ class Loading(Experiment):
         return repr(self.program)
 
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
-        """Every accepted step, those to keep as rows of the result."""
+        """Return all accepted steps; the kept ones are rows of the result."""
         return LoadingRows(problem, self.program, state, in_memory=in_memory)
 
     def progress(self, done: float, end: float) -> str:
-        """The time reached. [s]"""
+        """Return the time reached, in words."""
         unit = unit_for(end, "s")
         return f"t = {unit(done):.3g} of {unit.text(end)}"
 
 
 class LoadingRows(Rows):
-    """Accepted steps of a run, in order: histories of all of them, fields of those that are kept.
+    """Accepted steps of a run, in order: values of all steps, and fields of the kept steps.
 
     Parameters
     ----------
@@ -117,20 +117,20 @@ class LoadingRows(Rows):
     program : Program
         The loading program.
     state : LoadingState, optional
-        From which the run continues. Default: from rest.
+        State from which the run continues. Default: rest.
     in_memory : bool
         Whether the kept fields stay in memory.
 
     Attributes
     ----------
     scene : Scene
-        What the time steps need: grid, gap, memory, program, kept times.
+        Input of the time stepping: grid, gap, memory, program, kept times.
     choice : Choice
         Memory of the body, and its distance from the material.
     domain : Domain
-        Part of the surface that is solved on.
+        Part of the surface on which the contact is solved.
     area : float
-        Nominal area, of the stated surface. [m2]
+        Nominal area of the given surface. [m2]
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
     """
@@ -177,9 +177,9 @@ class LoadingRows(Rows):
         Raises
         ------
         Outgrown
-            If contact outgrows the domain, or reaches the border of an indenter's surface: the run must begin again.
+            If contact outgrows the domain, or reaches the border of an indenter's surface: the run must restart.
         EdgeContactError
-            If contact reaches the border of another free surface, unless that is accepted.
+            If contact reaches the border of another free surface, unless the settings accept it.
         """
         scene, start, largest, domain = self.scene, self._start, self._start.largest, self.domain
         every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
@@ -201,8 +201,8 @@ class LoadingRows(Rows):
             state, values, fields = None, {}, {}
             if step.is_end:
                 state = LoadingState(step.state, largest, start.enlarged, start.outgrown, self._border)
-            # with hardly any instantaneous compliance a pressure that is not kept belongs to the whole step; a given
-            # load is right all the same
+            # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
+            # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
             if kept or (not every and (by_load or not scene.is_soft(length_of(step, scene)))):
                 values, fields = self._row(step, stated, kept)
@@ -232,7 +232,7 @@ class LoadingRows(Rows):
         stated : dict
             Its stated errors.
         kept : bool
-            Whether it is a row of the result, or of the histories of all steps only.
+            Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
         """
         scene, profile, domain, point = self.scene, self._profile, self.domain, step.point
         contact, grid, is_whole = point.pressure > 0, scene.grid, domain.is_whole
@@ -241,9 +241,9 @@ class LoadingRows(Rows):
         gap = np.maximum(scene.gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0
 
-        # The count is too large by a part of the strip along the perimeter, where contact ends although the material
-        # goes on. Where the material itself ends, at an absent cell or at the border of a scan in free space, the edge
-        # of the contact is known, and the count exact. A cell at a mirror neighbours its own image: no edge either.
+        # Counting cells overestimates the area by a part of the strip along the perimeter, where contact ends within
+        # the material. If the material itself ends, at an absent cell or at the border of a scan in free space, the
+        # edge of the contact is known and the count is exact. A mirror plane is not an edge: cells adjoin their images.
         free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not is_whole
         counted, area = contact_area(contact, free, grid.cell_area, grid.boundary == "periodic", goes_on, goes_on)
 
@@ -310,7 +310,7 @@ class LoadingRows(Rows):
             if text and subject not in ("accuracy", "tolerance", "material"):
                 log.warning("%s", text)
         attributes = body.facts(self.end) | {"time_scale": scene.program.time_scale}
-        if body.separates:  # of what was pressed, a series or not; of layers those of the top one
+        if body.separates:  # of the series that was solved; for layers the values of the top layer remain
             attributes["compliance_at_once"] = scene.memory.compliance(0.0)
             attributes["compliance_at_end"] = scene.memory.compliance(self.end)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
@@ -320,19 +320,19 @@ class LoadingRows(Rows):
 
 
 def check_program(profile: Profile, body: Body, program: Program, settings: Settings) -> None:
-    """Refuse surface, material, program and settings that do not go together.
+    """Check that surface, material, program and settings are compatible.
 
     Parameters
     ----------
     profile : Profile
         The surface.
     body, program, settings
-        Of the case; the program has loads in place of nominal pressures.
+        Body, program and settings of the case. Nominal pressures of the program are converted to loads.
 
     Raises
     ------
     InputError
-        Naming the segment or the setting, and what is expected.
+        If they are not. The message names the segment or the setting, and the expected value.
     """
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
@@ -375,7 +375,7 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
     if load > LARGEST:
         raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
     if boundary != "free" and heights > 0:
-        # as if the whole surface gave way like a punch of its longer side
+        # estimate: the displacement of a punch with the longer side of the surface
         compliance = float(body.material.contact_compliance(duration))
         sides = profile.gap.shape[0] * profile.spacing[0], profile.gap.shape[1] * profile.spacing[1]
         displaced = load / math.prod(sides) * compliance * max(sides)
@@ -385,8 +385,8 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
                 f"surface has: rounding would hide the variation of the pressure; expected at most "
                 f"{load * MOST_HEIGHTS * heights / displaced:.1g} N"
             )
-    # Beyond full contact an approach has no pressure. Where cells are absent the body bulges into them, and every
-    # approach has its force.
+    # Beyond full contact the approach does not determine the pressure. If cells are absent, the body bulges into
+    # them, and every approach has a definite force.
     if boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):
         for number, segment in enumerate(program.segments):
             largest = (segment.end or 0.0) + abs(segment.amplitude)

@@ -1,9 +1,9 @@
-"""The surface of a run as plain arrays, and its domain: the part that is solved on.
+"""The surface of a run as plain arrays, and its domain: the part on which the contact is solved.
 
-In free space nothing outside the contact matters. An elastic estimate with the final compliance and the largest load
-says how far the surfaces approach. Only cells whose undeformed gap is smaller can touch. A run uses the rectangle
-around them; the surface of an indenter is made larger if the estimated contact reaches its border. A run whose contact
-outgrows its domain is started again on a larger one.
+In free space the surface outside the contact has no influence. An elastic estimate with the final compliance and the
+largest load gives the largest approach. Only cells whose undeformed gap is smaller can touch. A run uses the rectangle
+around these cells. The surface of an indenter is enlarged if the estimated contact reaches its border. A run whose
+contact outgrows its domain restarts on a larger domain.
 """
 
 from __future__ import annotations
@@ -28,17 +28,19 @@ from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.indenters import grown, highest, is_indenter
 
 Array = NDArray[np.float64]
-#: Cells of the longer side of the estimate, and its tolerance.
+#: Number of cells along the longer side of the grid of the estimate, and tolerance of the estimate.
 ESTIMATED_ON, ESTIMATE_TOLERANCE = 64, 1e-2
-#: Estimated approach, and approach of a run, over which cells must be apart: estimate and end of a step have errors.
+#: Factors of the estimated approach and of the approach of a run: the undeformed gap outside the domain must be larger,
+#: because the estimate and the end of a step have errors.
 MARGIN, BEYOND = 1.2, 1.05
 #: Cells around the domain.
 RIM = 2
-#: Cells of the shorter side from which a part of a surface pays, and largest part of the cells.
+#: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
 WORTH_CROPPING, LARGEST_PART = 96, 0.8
-#: Factor by which an indenter's surface becomes larger, and the approach that an outgrown domain is made for.
+#: Factor by which the surface of an indenter grows, and the approach for which a new domain is chosen after contact has
+#: outgrown the last one.
 GROWTH = 1.5
-#: An indenter's surface gets no more cells than these.
+#: Largest number of cells of an enlarged indenter.
 MOST_CELLS = 4096**2
 
 
@@ -50,7 +52,7 @@ class Profile:
     height : xarray.DataArray
         Profile, peaks up. [m]
     missing : {"refuse", "absent"}
-        What missing heights mean.
+        Meaning of missing heights: an error, or absent material.
     kernel : Kernel
         Kernel of the body under it.
 
@@ -70,7 +72,7 @@ class Profile:
     Raises
     ------
     InputError
-        If heights are infinite, all missing, or missing where neither the settings nor the surface say what that means.
+        If heights are infinite, all missing, or missing without a stated meaning in the settings or the surface.
     """
 
     def __init__(self, height: xr.DataArray, missing: Missing = Settings.missing, kernel: Kernel = HALF_SPACE) -> None:
@@ -100,18 +102,18 @@ class Profile:
 
 @dataclass(frozen=True)
 class Domain:
-    """Rectangle of a surface that is solved on.
+    """Rectangle of a surface on which the contact is solved.
 
     Attributes
     ----------
     cells : tuple of slice
         Cells of the rectangle along x and y.
     shape : tuple of int
-        Cells of the whole surface.
+        Numbers of cells of the whole surface.
     spacing : tuple of float
         Cell sides. [m]
     outside : float
-        Least undeformed gap of the surface beyond the rectangle; infinite if there is none. [m]
+        Least undeformed gap outside the rectangle; infinite if the rectangle is the whole surface. [m]
     kernel : Kernel
         Kernel of the body.
     """
@@ -124,7 +126,7 @@ class Domain:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is all of the surface."""
+        """Whether the rectangle is the whole surface."""
         return math.isinf(self.outside)
 
     def padded(self, field: Array) -> Array:
@@ -159,10 +161,10 @@ def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> D
     profile : Profile
         The surface.
     body : Body
-        Body under it. The domain is all of the surface unless the body separates space and time and does not raise the
-        surface next to a load.
+        Body under it. The domain is the whole surface unless space and time separate in the body and a load never
+        raises the surface next to it.
     approach : float
-        Estimated largest approach. Default: the domain is all of the surface. [m]
+        Estimated largest approach. Default: the domain is the whole surface. [m]
     """
     gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
     whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
@@ -186,9 +188,9 @@ class Surface(NamedTuple):
     profile : Profile
         The surface; an indenter is enlarged until the expected contact does not reach its border.
     domain : Domain
-        Part of it that is solved on.
+        Part of the surface on which the contact is solved.
     enlarged : int
-        How many times it was enlarged.
+        Number of times that the surface was enlarged.
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
     """
@@ -207,7 +209,7 @@ def choose_surface(
     Parameters
     ----------
     profile : Profile
-        The stated surface.
+        The given surface.
     problem : Problem
         Surface, body and settings.
     program : Program
@@ -215,7 +217,7 @@ def choose_surface(
     enlarged : int, optional
         Number of times to enlarge the surface. Default: as often as the estimate requires.
     outgrown : int
-        How many times contact has outgrown the domain.
+        Number of times that contact has outgrown the domain.
     """
     body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
     times = enlarged or 0
@@ -232,26 +234,26 @@ def choose_surface(
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
-    """Return an indenter on a grid that is 1.5 times as large; None if no recipe gives it, or it has too many cells."""
+    """Return an indenter on a grid 1.5 times as large; None without a recipe, or if the grid has too many cells."""
     larger = grown(height, GROWTH)
     return None if larger is None or larger.size > MOST_CELLS else larger
 
 
 def estimated(profile: Profile, compliance: float, program: Program) -> tuple[float, bool]:
-    """Return the largest approach of a program [m], and whether contact reaches the border then.
+    """Return the estimated largest approach of a program [m], and whether contact then reaches the border.
 
     Parameters
     ----------
     profile : Profile
         The surface.
     compliance : float
-        Contact compliance after all of the program. [1/Pa]
+        Contact compliance at the end of the program. [1/Pa]
     program : Program
         Loads and approaches.
 
     Notes
     -----
-    Infinite for a load that is found in the run and held.
+    The approach is infinite if the program holds a load that it does not state.
     """
     stride = math.ceil(max(profile.gap.shape) / ESTIMATED_ON)
     gap, present = profile.gap[::stride, ::stride], profile.present[::stride, ::stride]

@@ -29,7 +29,7 @@ from roughvisc.topography.grid import counts
 PART = 0.9
 #: Interpreter and libraries, measured. [byte]
 PROCESS = 190e6
-#: Number of cells from which the memory is checked: on fewer a run takes less than 100 MB.
+#: Number of cells from which the memory is checked: a smaller run takes less than 100 MB.
 WORTH_ASKING = 512**2
 #: Cells of the shorter side of the smallest grid that a refusal recommends.
 _FEWEST = 64
@@ -37,26 +37,26 @@ _FEWEST = 64
 
 @dataclass(frozen=True)
 class Available:
-    """Memory that may yet be taken.
+    """Memory available to this process.
 
     Attributes
     ----------
     size : float
-        [byte]
+        Size. [byte]
     words : str
-        Whose limit that is, as the end of a sentence that begins with the size.
+        Origin of the limit, as the end of a sentence that begins with the size.
     """
 
     size: float
     words: str
 
     def fits(self, needed: float) -> bool:
-        """Return whether a case that needs this much memory fits. [byte]"""
+        """Return whether a case fits that needs a size of memory. [byte]"""
         return needed <= PART * self.size
 
 
 def memory_available() -> Available:
-    """Return the memory that this process may yet take, and what limits it."""
+    """Return the memory available to this process, and the origin of the limit."""
     import psutil
     from distributed import get_worker  # slow to import
     from distributed.system import MEMORY_LIMIT
@@ -81,18 +81,18 @@ def cores() -> int:
 
 
 def threads_for(asked: int | None) -> int:
-    """Return the number of threads of a case that is computed here.
+    """Return the number of threads of a case that this process computes.
 
     Parameters
     ----------
     asked : int or None
-        None: the value of ``scipy.fft.set_workers``. If that is not set, all cores for a case in the main thread of a
-        process that no other has started, and else one.
+        Requested number. None: the value of ``scipy.fft.set_workers``. If it is not set either: all cores in the main
+        thread of a process that ``multiprocessing`` did not start, otherwise one.
 
     Raises
     ------
     InputError
-        If it is not a positive whole number.
+        If the request is not a positive whole number.
     """
     if asked is not None:
         if isinstance(asked, bool) or not isinstance(asked, int) or asked < 1:
@@ -103,21 +103,21 @@ def threads_for(asked: int | None) -> int:
     return cores() if stated == 1 and alone else stated
 
 
-# ---------------------------------------------------------------------------------------------------- what a run needs
+# ---------------------------------------------------------------------------------------------------- memory of a run
 
 #: Fields of a surface in a run (heights, gaps and the mask of present cells), and of one that is generated or read.
 _SURFACE, _MADE = 2.1, 4.0
-#: Fields of a contact problem and of the step around it, and further ones of a contact on all cells.
+#: Fields of a contact problem and its time step, and additional fields for contact on all cells.
 _SOLVE, _IN_CONTACT = 8.0, 12.0
-#: Operator and spectrum, and those of the whole surface if a part of it is solved on.
+#: Fields of operator and spectrum, and of both on the whole surface if the domain is smaller.
 _TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
-#: Solutions at the peak, a pressure and its displacement each, and copies of each exponential: without memory; of a
-#: pair of steps with its coarse solution and first guesses; of a pair of soft steps, with the ends of its steps and
-#: the exponentials one step ago.
+#: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
+#: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
+#: ends of its steps and the exponentials of the step before.
 _ELASTIC, _PAIR, _SOFT_PAIR = (4, 0), (5, 4), (7, 9)
-#: Fields of an exponential if each wave has its own compliances: a spectrum, padded in free space.
+#: Fields of an exponential if the compliances depend on the wave: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
-#: Fields of a curve of friction, measured at 256 x 250: operators, the last steps that are mixed, the contact solver's.
+#: Fields of a friction curve, measured at 256 x 250: operators, the last steps that are mixed, the contact solver.
 _CURVE = 27.0
 #: Contact fraction below which a contact is sparse.
 SPARSE = 0.05
@@ -138,19 +138,19 @@ def march_bytes(
     Parameters
     ----------
     settings : Settings
-        Of the solve.
+        Settings of the solve.
     memory : Memory
-        Of the body.
+        Memory of the body.
     cells : float
-        Of the surface.
+        Number of cells of the surface.
     contact : float
         Largest contact fraction.
     rows : float
-        Kept times.
+        Number of kept times.
     part : float
-        Part of the cells that is solved on.
+        Part of the cells that the domain covers.
     in_memory : bool
-        Whether the kept fields stay in memory, as those of :func:`roughvisc.simulate` do; else they go to a file.
+        Whether the kept fields stay in memory, as in :func:`roughvisc.simulate`; otherwise they go to a file.
 
     Returns
     -------
@@ -159,11 +159,11 @@ def march_bytes(
 
     Notes
     -----
-    The numbers of fields are measured by ``workflows/benchmarks/memory.py``. Kept fields in memory are copied into one
-    array in the end.
+    The numbers of fields are measured by ``workflows/benchmarks/memory.py``. At the end the fields kept in memory are
+    copied into one array.
     """
     exponentials, layered = memory.times.size, isinstance(memory, LayerMemory)
-    # a part of the surface keeps the pressure that causes the displacement too
+    # a smaller domain also keeps the pressure that causes the displacement
     kept = _SPECTRUM[settings.boundary] if layered else 1.0 if part == 1 else 2.0
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if memory.glassy <= SOFT * crept else _PAIR
@@ -183,7 +183,7 @@ def least_rows(settings: Settings, program: Program) -> float:
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:
-    """Return the memory of a curve of friction at its peak, without interpreter and libraries. [byte]"""
+    """Return the memory of a friction curve at its peak, without interpreter and libraries. [byte]"""
     unfolded = 4 if settings.boundary == "mirror" else 1
     return (_CURVE + len(settings.fields)) * 8.0 * cells * unfolded
 
@@ -194,12 +194,12 @@ def curve_bytes(settings: Settings, cells: float) -> float:
 def require_loading(
     shape: tuple[int, int], program: Program, settings: Settings, body: Body, *, in_memory: bool
 ) -> None:
-    """Refuse a loading that does not fit in memory even if its contact stays sparse.
+    """Check that a loading fits in memory if its contact stays sparse.
 
     Raises
     ------
     TooLargeError
-        Stating what it needs, what is available, and what would fit.
+        If it does not. The message gives the needed and the available memory, and cases that fit.
     """
     if math.prod(shape) < WORTH_ASKING:
         return
@@ -211,19 +211,19 @@ def require_loading(
 
 
 def require_surface(shape: Any) -> None:
-    """Refuse a surface that has too many cells, or cannot be made in the available memory. [cells]"""
+    """Check that a surface can be made in the available memory. [cells]"""
     require_memory(counts("shape", shape), lambda cells: 8.0 * _MADE * cells)
 
 
 def require_memory(
     shape: tuple[int, int], needed: Callable[[float], float], in_file: Callable[[float], float] | None = None
 ) -> None:
-    """Refuse what needs more memory than is available; the parameters are those of :func:`too_large`.
+    """Check that a case fits in the available memory; see :func:`too_large` for the parameters.
 
     Raises
     ------
     TooLargeError
-        Stating what it needs, what is available, and what would fit.
+        If it does not. The message gives the needed and the available memory, and cases that fit.
     """
     if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(), in_file)):
         raise TooLargeError(why)
@@ -235,18 +235,18 @@ def too_large(
     there: Available,
     in_file: Callable[[float], float] | None = None,
 ) -> str:
-    """Return why a case does not fit in memory, and what would fit; empty if it fits.
+    """Return a message that a case does not fit in memory, with cases that would; empty if it fits.
 
     Parameters
     ----------
     shape : tuple of int
-        Cells of the surface.
+        Numbers of cells of the surface.
     needed : callable
-        Memory by the number of cells. [byte]
+        Needed memory by the number of cells. [byte]
     there : Available
-        Memory that may be taken.
+        Available memory.
     in_file : callable, optional
-        The same if the fields go to a file. [byte]
+        Needed memory by the number of cells if the fields go to a file. [byte]
     """
     cells, advice = math.prod(shape), []
     if there.fits(needed(cells)):

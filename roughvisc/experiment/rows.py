@@ -1,4 +1,4 @@
-"""Rows of a loading: at which times they are kept, and which errors they state."""
+"""Rows of a loading: the times of the kept rows, and their stated errors."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings
 
 Array = NDArray[np.float64]
-#: Times that differ by at most this many units in the last place are one: sums and logarithms of times err by a few.
+#: Times that differ by at most this many units in the last place are equal: rounding of sums and logarithms of times.
 _ROUNDING = 64
-#: The first kept time of a hold lies no later than this part of it. [-]
+#: Latest first kept time of a hold, as a part of the hold. [-]
 _FIRST = 1e-3
 #: Relative numbers of kept times of a ramp or a slide, a hold, and a period of a cycle.
 _RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
-#: Errors that former steps of the contact solver leave: of a pressure, over the tolerance, and of an approach. Measured
-#: on rows whose other errors are small.
+#: Errors inherited from the contact solver in earlier steps: of the pressure, over the tolerance, and of the approach.
+#: Measured on rows whose other errors are small.
 INHERITED, INHERITED_APPROACH = 0.02, 0.005
-#: Least stated error of a pressure without a past, over the tolerance. Measured there too.
+#: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
-#: Error of a pressure at the edge of contact, over the mean one.
+#: Error of the pressure at the edge of contact, over the mean error of the pressure.
 SOLVER_AT_EDGE = 3.0
 
 
@@ -37,15 +37,15 @@ def kept_times(
 ) -> tuple[float, ...] | None:
     """Return the times to keep, ascending. [s]
 
-    Times within rounding of a corner of the program become the corner. In a slide they become the nearest time after a
-    whole number of cells.
+    Times within rounding of a corner of the program are moved to the corner. Times in a slide are moved to the nearest
+    time at which a whole number of cells has been slid.
 
     Parameters
     ----------
     program : Program
         The loading program.
     times : int, sequence of float or None
-        A count, see :func:`spread_times`; a list; None for every accepted step.
+        Number of times, see :func:`spread_times`; or the times [s]; or None for every accepted step.
     *spacings : tuple of float
         Cell sides of each grid that slides. [m]
 
@@ -78,14 +78,14 @@ def kept_times(
 
 
 def spread_times(program: Program, count: int) -> Array:
-    """Return as many times as requested, where the result changes most.
+    """Return a number of times, spread over the program; they are denser where the result changes faster.
 
     Parameters
     ----------
     program : Program
         The loading program.
     count : int
-        Number of times. If the program has more corners, some of them, evenly, the end of the program among them.
+        Number of times. If the program has more corners, an even selection of corners is kept, with the last one.
 
     Returns
     -------
@@ -94,9 +94,10 @@ def spread_times(program: Program, count: int) -> Array:
 
     Notes
     -----
-    Kept are all corners of the program, and between them in proportion two times in a ramp or a slide, three in a hold
-    and sixteen in a period of a cycle. In a hold they lie evenly in the logarithm of the time since its start, from a
-    third of the segment before it or a thousandth of its own length, whichever is less; elsewhere evenly in time.
+    All corners of the program are kept. The other times are distributed in the proportion of two per ramp or slide,
+    three per hold and sixteen per period of a cycle. In a hold they are spaced evenly in the logarithm of the time
+    since its start. This spacing begins at a third of the segment before or a thousandth of the hold, whichever is
+    less. In other segments the times are spaced evenly.
     """
     corners = np.unique(program.corners)
     further = count - len(corners)
@@ -130,12 +131,12 @@ def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
 
     Notes
     -----
-    ``shortest`` is the shortest age, next to zero, at which the compliance matters to the kept rows; zero for a program
-    of jumps alone. The shortest interval ``h`` lies between a corner of the program and the kept time after it. Ages
-    below ``f h`` only belong to pressure that came in the last part ``f`` of the interval. There a compliance that
-    starts from the right value is wrong by at most the creep, which is less than ``f C(h)`` over the interval. With a
-    tenth of the tolerance for ``f`` this is as large as the error allowed beyond. No step is shorter than a millionth
-    of a segment, so a smaller ``f`` is not needed.
+    ``shortest`` is the shortest age above zero at which the compliance affects the kept rows; zero for a program of
+    jumps alone. Let ``h`` be the shortest interval between a corner of the program and the next kept time. Only
+    pressure applied in the last part ``f`` of the interval has an age below ``f h``. If the compliance is exact at age
+    zero, its error at these ages is at most the creep, which is less than ``f C(h)`` over the interval. With ``f`` a
+    tenth of the tolerance this equals the error allowed at longer ages. No step is shorter than a millionth of a
+    segment, so a smaller ``f`` is not needed.
     """
     shortest, kept = math.inf, kept_times(program, settings.times)
     for segment in program.segments:
@@ -155,7 +156,7 @@ def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
 
 
 def length_of(step: Step, scene: Scene) -> float:
-    """Return the length of a step, zero of a jump. [s]"""
+    """Return the length of a step; zero for a jump. [s]"""
     point = step.point
     return max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
 
@@ -175,13 +176,14 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     Returns
     -------
     dict
-        ``time_error``, of the time steps alone, ``stated_error`` and ``residual``, relative; ``approach_error`` [m].
+        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``approach_error`` [m].
 
     Notes
     -----
-    The errors of time steps, contact solver, now and before, and series add up. The solver's error of the approach
-    under a given load is of second order in that of the pressure: the duality gap over the load. The series' error is
-    one of the largest values of all steps: what is left after unloading is a difference of such values.
+    The stated error is the sum of the errors of the time steps, of the contact solver in this and earlier steps, and
+    of the series. Under a given load the solver's error of the approach is the duality gap over the load, which is of
+    second order in the error of the pressure. The error of the series is relative to the largest values of all steps:
+    values left after unloading are differences of large values.
     """
     point, apart, control = step.point, step.difference, scene.program.segments[step.segment].control
     given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
@@ -214,10 +216,10 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
 
 
 def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float) -> float:
-    """Return the error of the contact area, by the cells that time steps and contact solver leave uncertain. [m2]
+    """Return the error of the contact area due to time steps and contact solver. [m2]
 
-    The solver's error may put a cell on the other side if its pressure is below the error of the mean one, or if such a
-    pressure in it would close its gap.
+    The solver may misjudge a contact cell if its pressure is below the error of the pressure at the edge. It may
+    misjudge an open cell if this pressure would close the gap of the cell.
 
     Parameters
     ----------
@@ -244,9 +246,9 @@ def area_error(step: Step, scene: Scene, gap: Array, counted: float, area: float
 
 
 def meets_tolerance(step: Step, scene: Scene, stated: float) -> bool:
-    """Return whether a step is a row if every step is kept: one that states at most the tolerance.
+    """Return whether a step is a row if every step is kept: its stated error is within the tolerance.
 
-    Steps of a given length, and those of a slide, are all rows: no others can be had.
+    Steps of a fixed length and steps of a slide are always rows, because their length cannot be reduced.
     """
     is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
     return is_given or stated <= scene.tolerance

@@ -46,39 +46,39 @@ log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
-#: Variables of a speed whose contact is not solved; the others are missing.
+#: Variables of a speed at which the contact is not solved; the others are missing.
 _OF_UNSOLVED = ("force", "nominal_pressure", "residual", "status")
 #: Fields that a row may have.
 _FIELDS = ("pressure", "gap")
 #: Direction -> quarter turns of the grid, counter-clockwise, after which the profile moves along +x.
 _QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
-# A profile whose change across the motion is below this fraction of its range does not change there.
+# A profile is constant across the motion if its change there is below this fraction of its range.
 _ROUNDING = 1e-12
 #: Quantities with a grid error.
 _QUANTITIES = ("friction_force", "contact_area", "approach", "mean_gap")
-#: Stated error of the area over that of counting at rest. On 24 rough surfaces, at three pressures and three speeds,
-#: the stated error is then at least 0.8 of the true one, and 4.8 times as large in the median; with 1 and the orders
-#: of a contact at rest it was below 0.8 in 15 of these 216.
+#: Stated error of the area over the counting error at rest. On 24 rough surfaces, at three pressures and three speeds,
+#: the stated error is then at least 0.8 of the true one, and 4.8 times as large in the median. With 1 and the orders of
+#: a contact at rest the ratio was below 0.8 in 15 of these 216 cases.
 _COUNTING_CAUTION = 1.5
-#: The friction force by the slope is meaningful if it differs by at most this fraction from that by the power. At low
-#: speed on a rough surface it is the difference of two large forces.
+#: The friction force from the slope is meaningful if it differs from the force from the power by at most this fraction.
+#: At low speed on a rough surface it is the difference of two large forces.
 _MEANINGFUL = 0.1
 
 
 @quantities(speeds="m/s", load="N", pressure="Pa")
 @dataclass(frozen=True, kw_only=True)
 class SteadySliding(Experiment):
-    """What is asked of steady sliding, beside a surface, a material and settings; see :func:`roughvisc.friction`.
+    """Steady sliding at given speeds under a given load; see :func:`roughvisc.friction`.
 
     Parameters
     ----------
     speeds, load, pressure, direction
-        As :func:`roughvisc.friction` has them; the speeds become a tuple, in the order given.
+        See :func:`roughvisc.friction`. The speeds become a tuple, in the order given.
 
     Raises
     ------
     InputError
-        If a value is none of those expected.
+        If a value is invalid, or both or neither of load and pressure are given.
 
     Examples
     --------
@@ -119,9 +119,9 @@ class SteadySliding(Experiment):
         return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
-        """Return the steady states, from the lowest speed to the highest; the state counts those that are found.
+        """Return the steady states, from the lowest speed to the highest; the state is their number so far.
 
-        Under the mirror boundary the surface is unfolded first: sliding breaks the symmetry.
+        With mirror boundaries the surface is unfolded first: sliding breaks the symmetry.
         """
         if problem.settings.boundary == "mirror":
             log.info("the surface is unfolded: it slides with its mirror images, on four times as many cells")
@@ -130,7 +130,7 @@ class SteadySliding(Experiment):
         return SlidingRows(problem, self, state or 0)
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
-        """What has no meaning where a whole surface slides, repeats without end, and never started."""
+        """Yield the settings that steady sliding does not support: name, value and expected value."""
         if settings.boundary not in ("periodic", "mirror"):
             yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic' or 'mirror'"
         if settings.boundary == "mirror" and self.load is not None:
@@ -145,7 +145,7 @@ class SteadySliding(Experiment):
                 yield name, found, "a result over speed has none: expected the usual"
 
     def progress(self, done: float, end: float) -> str:
-        """The number of speeds that are found."""
+        """Return the number of solved speeds, in words."""
         return f"speed {done:.0f} of {end:.0f}"
 
 
@@ -156,9 +156,9 @@ class SlidingGrid:
     Attributes
     ----------
     gap : ndarray, shape (nx, ny)
-        Undeformed gap, turned into the motion; one row if it does not change across the motion. [m]
+        Undeformed gap, with axis 0 along the motion; ``ny = 1`` if it does not change across the motion. [m]
     spacing : tuple of float
-        Cell sides, turned likewise; the only row is as wide as the surface. [m]
+        Cell sides along and across the motion; if ``ny = 1`` the cell is as wide as the surface. [m]
     """
 
     gap: Array
@@ -166,7 +166,7 @@ class SlidingGrid:
 
     @classmethod
     def of(cls, gap: Array, spacing: tuple[float, float], direction: str) -> SlidingGrid:
-        """Return the cells of a surface with a gap [m] and cell sides [m] that slides in a direction."""
+        """Return the cells of a surface that slides in a direction, from its gap [m] and cell sides [m]."""
         turned = np.rot90(gap, _QUARTERS[direction])
         dx, dy = spacing[::-1] if _QUARTERS[direction] % 2 else spacing
         if float(np.ptp(turned, axis=1).max()) <= _ROUNDING * float(np.ptp(turned)):
@@ -179,11 +179,11 @@ class SlidingGrid:
         return self.gap.shape[0] * self.spacing[0]
 
     def law(self, body: Body, speed: float, tolerance: float) -> Body:
-        """Return the body with materials that have a complex compliance at the frequencies of a speed. [m/s]"""
+        """Return the body with materials that represent its own at the frequencies of a speed. [m/s]"""
         return body.over_frequencies(speed * 2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]), tolerance)
 
     def coarser(self, factor: float) -> SlidingGrid:
-        """Return the same waves on cells longer by about a factor, as far as these can hold the waves."""
+        """Return the gap on cells longer by about a factor, with the waves that these cells can resolve."""
         nx, ny = self.gap.shape
         shape = coarser_shape((nx, ny), factor, False)
         gap = resample_periodic(self.gap, shape, first_kept=True)
@@ -209,7 +209,7 @@ class SlidingRows(Rows):
     curve : SteadySliding
         Speeds, load and direction.
     found : int
-        Number of speeds found already, the lowest ones.
+        Number of speeds already solved, the lowest ones.
     """
 
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
@@ -220,7 +220,7 @@ class SlidingRows(Rows):
             raise InputError("height is missing at some points: expected none, because the surface repeats")
         self.problem, self.end, self._profile = replace(problem, height=profile.height), len(curve.speeds), profile
         self._force = float(curve.load) if curve.load is not None else float(curve.pressure or 0.0) * profile.area
-        #: The cells, and up to two grids of longer ones for the error of the grid.
+        #: The grid of the surface, and up to two coarser grids for the error of the grid.
         self._grids = [SlidingGrid.of(profile.gap, profile.spacing, curve.direction)]
         if problem.settings.grid_error:
             for factor in (2.0, 4.0):
@@ -235,7 +235,7 @@ class SlidingRows(Rows):
         grid, tolerance = self._grids[0], self._settings.tolerance
         for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
             speed = self._curve.speeds[number]
-            law = grid.law(self._body, speed, 0.1 * tolerance)  # once a speed: a table takes a fit
+            law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
             slides, states = [], []
             for cells in self._grids:
                 slides.append(Sliding(law, cells.gap.shape, cells.spacing, speed))
@@ -253,11 +253,11 @@ class SlidingRows(Rows):
                     crept = float(one.contact_compliance(grid.period / speed))
                     creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
             row["convolutions"] = slides[0].convolutions
-            row["creep_left"] = creep  # where the next contact comes
+            row["creep_left"] = creep  # left when the next contact arrives
             yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
-        """Return the numbers of a state, and its fields in the frame of the surface."""
+        """Return the variables of a steady state, and its fields in the frame of the surface."""
         force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
         counted, contact_area = self._grids[0].areas(found.pressure > 0)
         gap = self._grids[0].opening(found)
@@ -308,14 +308,14 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
     Parameters
     ----------
     grids : sequence of SlidingGrid
-        The grid of the surface, and none to two coarser ones, the finest first.
+        Grid of the surface, and up to two coarser grids, the finest first.
     states : sequence of SteadyState
         Steady states on these grids.
 
     Returns
     -------
     dict
-        Name of a variable -> error; missing (NaN) if no coarser grid has a solution or there is no friction.
+        Name of a variable -> error; NaN without friction, or if no coarser grid has a solution.
     """
     grid, found = grids[0], states[0]
     if len(grids) == 1 or not (found.converged and found.power_force > 0):
@@ -330,8 +330,8 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
     contact = found.pressure > 0
     hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
     counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
-    # By pressure times slope of the profile: the surface follows the profile at the centres of the cells in contact and
-    # not at the edges of contact, which is an error of the grid.
+    # Friction from pressure times slope of the profile. The surface follows the profile at the centres of the contact
+    # cells but not at the edges of contact; this is an error of the grid.
     inclined = float(np.sum(found.pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]
     apart = abs(inclined / found.power_force - 1)
     least = {

@@ -20,19 +20,19 @@ from roughvisc.units import format_quantity
 from roughvisc.variables import NOT_CONVERGED
 
 Array = NDArray[np.float64]
-#: Part of all creep that is still to recover after a period, from which on a result says so. Friction of a sphere on a
-#: period of 6 to 11 contact radii, with 1 and 9 times the instantaneous compliance retarded: 0.4 to 0.6 % off where
-#: 1e-6 of the creep is left, 5 to 6 % where 1 to 2 % are left, 26 % where 7 to 12 % are left.
+#: Unrecovered part of the creep after a period from which a result warns. Measured error of the friction of a sphere on
+#: a period of 6 to 11 contact radii, with a retarded compliance of 1 and 9 times the instantaneous one: 0.4 to 0.6 % if
+#: 1e-6 of the creep is left, 5 to 6 % if 1 to 2 % are left, 26 % if 7 to 12 % are left.
 _LEFT = 0.01
-#: The distance of a slide differs from the requested one by more than this part of it if a result says so.
+#: A result warns if the distance of a slide differs from the requested distance by more than this fraction.
 _SAME_DISTANCE = 1e-9
-#: Part of the period over which nothing touches, in one piece along the motion, from which on a contact stands alone.
+#: A contact is a single one if a gap without contact spans at least this part of the period along the motion.
 _FREE = 0.25
-#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat: what that
-#: leaves out is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, 4.5 % here (K. L.
-#: Johnson, Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat. The error
+#: is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, here 4.5 % (K. L. Johnson,
+#: Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
 LARGEST_SLOPE = 0.3
-#: Part of the compliance that must be there at once for the pressure's tolerance to be promised without a word.
+#: A result warns about the accuracy of the pressure if less than this part of the compliance is instantaneous.
 _AT_ONCE = 0.1
 
 
@@ -46,12 +46,12 @@ def loading_warnings(
     loaded: xr.DataArray,
     border: float | None,
 ) -> dict[str, str]:
-    """Return the warnings about a loading by subject; a text is empty if there is nothing to say.
+    """Return the warnings about a loading by subject; a text is empty if it does not apply.
 
     Parameters
     ----------
     scene, profile : Scene, Profile
-        As they were computed.
+        Input of the time stepping, and the surface.
     dataset : Dataset
         The result.
     choice : Choice
@@ -59,7 +59,7 @@ def loading_warnings(
     materials : sequence of Material
         Materials of the body.
     loaded : DataArray
-        Heights of the part of the surface that was solved on. [m]
+        Heights of the domain, the part of the surface on which the contact was solved. [m]
     border : float or None
         End of the first step in which contact reached the border of a free surface. [s]
     """
@@ -116,7 +116,7 @@ def loading_warnings(
                 slides.append(f"program.{number} slides {done}, {cells} whole cells, of {wanted}")
     for axis, runs in sorted(strokes.items()):
         period = profile.height.shape[axis] * profile.spacing[axis]
-        if sum(distance for distance, _ in runs) < period / 2:  # it does not come as far as the next wake
+        if sum(distance for distance, _ in runs) < period / 2:  # the contact does not reach the next wake
             continue
         pressure = dataset["pressure"][-1].values if "pressure" in dataset else None
         if stands_alone(profile.height, pressure, axis):
@@ -138,7 +138,7 @@ def loading_warnings(
 
 
 def speeds_warning(dataset: xr.Dataset) -> str:
-    """Name the speeds whose contact is not solved; empty if there are none."""
+    """Return a warning with the speeds at which the contact is not solved, else ''."""
     missing = dataset["speed"].values[dataset["status"].values == NOT_CONVERGED]
     if not missing.size:
         return ""
@@ -150,20 +150,20 @@ def speeds_warning(dataset: xr.Dataset) -> str:
 
 
 def table_warning(materials: Sequence[Material]) -> str:
-    """Return the warnings of creep tables, such as rows more than a decade apart; empty if there are none."""
+    """Return the warnings of creep tables, such as rows more than a decade apart, else ''."""
     found = [one.warning for one in materials if isinstance(one, Creep)]
     return " ".join(dict.fromkeys(filter(None, found)))
 
 
 def border_warning(height: xr.DataArray, dataset: xr.Dataset) -> str:
-    """Return a warning if a periodic surface has a step where it repeats, else ''.
+    """Return a warning if opposite borders of a periodic surface do not meet, else ''.
 
     Parameters
     ----------
     height : DataArray, dims (x, y)
         The rigid profile. [m]
     dataset : Dataset
-        The result. If it holds the pressure, the warning states the part that the outermost cells carry.
+        The result. If it has the pressure, the warning gives the pressure of the outermost cells.
     """
     borders = border_mismatch(height)
     if not borders.jumps:
@@ -189,9 +189,9 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
     height : DataArray, dims (x, y)
         The rigid profile. [m]
     boundary : {"free", "periodic", "mirror"}
-        In free space no cell can touch whose undeformed gap exceeds the approach: slopes are taken where one may.
+        In free space only cells whose undeformed gap is at most the approach can touch, and only their slopes count.
     approach : float
-        The largest at kept times, from the highest cell. [m]
+        Largest approach at kept times, from the highest cell. [m]
     """
     slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else np.inf)
     if not slope > LARGEST_SLOPE:
@@ -203,14 +203,15 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
 
 
 def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> bool:
-    """Return whether a periodic contact is a single one: by the recipe of its surface, or by its pressure.
+    """Return whether a periodic contact is a single one, from the recipe of its surface or from its pressure.
 
     Parameters
     ----------
     height : DataArray, dims (x, y)
-        An indenter is single, a regular wave is not. [m]
+        Heights. The contact of an indenter is single, the contact of a regular wave is not. [m]
     pressure : ndarray, shape (nx, ny), or None
-        Of any other surface the contact is single if a gap without contact spans at least a quarter of the period. [Pa]
+        Pressure. The contact of any other surface is single if a gap without contact spans a quarter of the period or
+        more. [Pa]
     axis : {0, 1}
         Axis of the motion.
     """
@@ -228,12 +229,12 @@ def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> boo
 
 
 def unrecovered(after_a_period: float, in_the_end: float) -> float:
-    """Return the part of the creep that has not recovered after a period; 1 for a material that creeps without end.
+    """Return the unrecovered part of the creep after a period; 1 for a material that creeps without end.
 
     Parameters
     ----------
     after_a_period, in_the_end : float
-        Contact compliance. [1/Pa]
+        Contact compliance after a period, and at the end of the creep. [1/Pa]
     """
     return 1.0 - after_a_period / in_the_end if math.isfinite(in_the_end) else 1.0
 
@@ -244,9 +245,9 @@ def wake_warning(left: Mapping[float, float], period: float) -> str:
     Parameters
     ----------
     left : mapping
-        Speed of a contact that stands alone [m/s] -> :func:`unrecovered` there.
+        Speed of a single contact [m/s] -> unrecovered part of the creep, see :func:`unrecovered`.
     period : float
-        Along the motion. [m]
+        Period along the motion. [m]
     """
     speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
     if not speeds:
