@@ -1,1 +1,1 @@
-"""What the model leaves out, and whether that matters in a scene: a number, a verdict and a sentence each."""
+"""Audit of a result: size of each effect that the model neglects, as a number, a verdict and a sentence."""

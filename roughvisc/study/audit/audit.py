@@ -1,4 +1,4 @@
-"""``audit``: estimates of what the model leaves out, compared with limits."""
+"""``audit``: estimates of the effects that the model neglects, compared with limits."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN = VERDICTS = ("holds", "doubtful", "broken", 
 _WIDTH = 98
 #: Numbers below it are shown as zero.
 _LEAST = 1e-9
-#: Contact fraction from which on spots have grown together.
+#: Contact fraction above which the contact spots have merged.
 _MERGED = 0.5
-#: A profile is flat if its radius of curvature exceeds so many times the width of the contact.
+#: Radius of curvature over width of the contact, above which a profile counts as flat.
 _FLAT = 1e4
 #: Tabor parameter up to which attraction does not change the shape of the spots.
 _STIFF = 1.0
-#: Exponent of the force over the approach up to which a contact is taken for a flat one, whose force is proportional to
-#: the approach. It is 3/2 for a sphere and 2 for a cone.
+#: Largest exponent of the force, as a power of the approach, of a contact that counts as flat. The exponent is 1 for a
+#: flat contact, 3/2 for a sphere and 2 for a cone.
 _PROPORTIONAL = 1.25
 #: Poisson's ratio with the smallest shear modulus for a contact modulus.
 _SOFTEST = 0.5
-#: Number of a surface that has only form: 1 - sqrt(0.99).
+#: Number of the resolution check for a surface without roughness: 1 - sqrt(0.99).
 _ONLY_FORM = 0.005
 
 
@@ -79,7 +79,7 @@ class Finding:
 
     @property
     def shown(self) -> str:
-        """The number to two digits, next to nothing as 0; empty if it is not known."""
+        """The number to two digits, tiny numbers as 0; empty if it is not known."""
         return "" if math.isnan(self.number) else f"{float(f'{max(self.number, _LEAST) - _LEAST:.2g}'):g}"
 
 
@@ -87,7 +87,7 @@ class Finding:
 class Audit:
     """Findings on the assumptions of the model for a result.
 
-    It prints as a table. ``audit["thickness"]`` is the finding of one assumption, with ``number``,
+    An audit prints as a table. ``audit["thickness"]`` is the finding of one assumption, with ``number``,
     ``verdict``, ``sentence`` and ``limit``.
 
     Attributes
@@ -114,7 +114,7 @@ class Audit:
         raise KeyError(f"{name!r}: expected one of {', '.join(one.name for one in self.findings)}")
 
     def __repr__(self) -> str:
-        """A table of plain text."""
+        """Return a table of plain text."""
         lines = [self.title] if self.title else []
         for one in self.findings:
             head = f"{one.name:<11} {one.verdict:<9} {one.shown:>7}  "
@@ -140,7 +140,7 @@ Number = tuple[float, str]
 
 
 def adhesion(scene: Scene) -> Number:
-    """Pull-off force of the spots in contact over the largest load."""
+    """Return the pull-off force of the contact spots over the largest load."""
     force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
     is_flat = not curvature * _FLAT * scene.extent > 1
     if scene.boundary != "free" and (is_flat or fraction > _MERGED):
@@ -161,7 +161,7 @@ def adhesion(scene: Scene) -> Number:
 
 
 def stickiness(scene: Scene) -> Number | None:
-    """Adhesion of a rough surface without a load; None for a smooth body in free space."""
+    """Return the adhesion of a rough surface without a load; None for a smooth body in free space."""
     is_free = scene.boundary == "free"
     if is_free and scene.is_smooth:
         return None
@@ -182,16 +182,16 @@ def stickiness(scene: Scene) -> Number | None:
 
 
 def yielding(scene: Scene) -> Number:
-    """Largest pressure of all rows over the yield strength."""
+    """Return the largest pressure of all rows over the yield strength."""
     peak = float(scene.pressure.max())
-    for frame in scene.dataset["pressure"]:  # one after another: they may lie in a file
+    for frame in scene.dataset["pressure"]:  # one frame in memory at a time
         peak = max(peak, float(np.nan_to_num(frame.values).max()))
     [strength] = scene.need("yield_strength")
     return peak / strength, f"The largest pressure is {as_text(peak, 'Pa')}."
 
 
 def thickness(scene: Scene) -> Number:
-    """Relative error of approach or force on a half-space instead of the real sheet."""
+    """Return the relative error of approach or force if a half-space replaces the real sheet."""
     modelled, stated = scene.facts.get("thickness", math.inf), scene.given.thickness
     if modelled < math.inf:
         if stated is not None and not math.isclose(stated, modelled, rel_tol=1e-9):
@@ -200,13 +200,13 @@ def thickness(scene: Scene) -> Number:
     if "kernel" in scene.facts:
         return 0.0, f"Modelled: {scene.facts['kernel']}."
     if len(scene.bodies) != 1 or scene.bodies[0][2] < 0:
-        raise NotKnown("Two bodies, or a Poisson ratio that changes or is negative: there is no sheet to compare with.")
+        raise NotKnown("Two bodies, or a Poisson ratio that changes or is negative: a sheet cannot be compared.")
     [depth] = scene.need("thickness")
     sheet, approach = Sheet(depth, scene.bodies[0][2], scene.given.base or BASE), float(scene.fullest["approach"])
     shortfall = 0.0
     if scene.boundary == "free":
         first = sheet.relief * scene.late * scene.force / approach
-        # the stiffness of a round contact is that of a flat punch of its radius, 2 a / C
+        # stiffness 2 a / C of a round contact, equal to the stiffness of a flat punch of its radius
         if 2 * _half_width(scene) * approach / (scene.late * scene.force) > _PROPORTIONAL:
             shortfall = effects.half_space_shortfall(first)
     else:
@@ -219,19 +219,19 @@ def thickness(scene: Scene) -> Number:
 
 
 def slope(scene: Scene) -> Number:
-    """Root mean square slope of the loaded surface."""
+    """Return the root mean square slope of the loaded surface."""
     more = percent(scene.loaded_slope**2 / 2)
     return scene.loaded_slope, f"The loaded surface has {more} more area than its projection."
 
 
 def strain(scene: Scene) -> Number:
-    """Root mean square slope of the loaded surface over the linear range."""
+    """Return the root mean square slope of the loaded surface over the linear range."""
     largest, [linear] = scene.loaded_slope, scene.need("linear_strain")
     return largest / linear, f"Strains are at most about {percent(largest)}, and on average {percent(0.2 * largest)}."
 
 
 def inertia(scene: Scene) -> Number:
-    """Lag of waves over the time scale of the program, and increase of the displacement under a moving load."""
+    """Return the lag by waves over the time scale of the program, or the excess displacement under a moving load."""
     width, scale, (speed, _) = _half_width(scene), float(scene.facts["time_scale"]), scene.slide
     [density] = scene.need("density")
     bodies = [(late, poisson) for _, late, poisson in scene.bodies] or [(scene.late, _SOFTEST)]
@@ -247,7 +247,7 @@ def inertia(scene: Scene) -> Number:
 
 
 def heating(scene: Scene) -> Number | None:
-    """Temperature rise of the spots by friction; None if nothing slides."""
+    """Return the temperature rise of the spots by friction; None if nothing slides."""
     (speed, power), rubbed = scene.slide, scene.fullest
     if speed == 0:
         return None
@@ -263,7 +263,7 @@ def heating(scene: Scene) -> Number | None:
 
 
 def coupling(scene: Scene) -> Number:
-    """Dundurs' second constant, of the early and of the late compliances."""
+    """Return the larger of Dundurs' second constants for the early and the late compliances."""
     if not scene.bodies:
         raise NotKnown("Poisson's ratio of each body is not known, or changes in time.")
     early, late, poissons = zip(*scene.bodies, strict=True)
@@ -273,7 +273,7 @@ def coupling(scene: Scene) -> Number:
 
 
 def resolution(scene: Scene) -> Number | None:
-    """Contribution of the last octave to the rms slope; None if the recipe states the shortest wavelength."""
+    """Return the part of the rms slope from the last octave; None if the recipe states the shortest wavelength."""
     if scene.stated_wave is not None:
         return None
     _, last, shortest = scene.waves
@@ -288,7 +288,7 @@ def resolution(scene: Scene) -> Number | None:
 
 
 def stated_resolution(scene: Scene) -> Number | None:
-    """Cell size over the shortest wavelength that the recipe states."""
+    """Return the cell size over the shortest wavelength of the recipe; None if the recipe states none."""
     if scene.stated_wave is None:
         return None
     wave, cells = scene.stated_wave
@@ -296,7 +296,7 @@ def stated_resolution(scene: Scene) -> Number | None:
 
 
 def border(scene: Scene) -> Number | None:
-    """Step where the surface repeats; None in free space."""
+    """Return the step at borders where the surface repeats; None in free space."""
     if scene.boundary == "free":
         return None
     number = max(border_mismatch(scene.period).of_neighbours)
@@ -305,7 +305,7 @@ def border(scene: Scene) -> Number | None:
 
 
 def _spots(pressure: Array) -> int:
-    """Return the number of connected regions in contact; one across a border that repeats counts twice."""
+    """Return the number of connected regions in contact; a region across a periodic border counts twice."""
     return int(ndimage.label(pressure > 0, np.ones((3, 3)))[1])
 
 
@@ -314,14 +314,14 @@ def _counted(spots: int) -> str:
 
 
 def _half_width(scene: Scene) -> float:
-    """Return half the width of the loaded part: of the contact in free space, of the longer side otherwise. [m]"""
+    """Return half the width of the contact in free space, otherwise half the longer side of the surface. [m]"""
     width = max(scene.sides) / 2
     if scene.boundary == "free":
         width = math.sqrt(float(scene.fullest["contact_area"]) / math.pi)
         with suppress(NotKnown):
             width = scene.extent
     if not width > 0:
-        raise NotKnown("There was no contact to judge.")
+        raise NotKnown("The result has no contact.")
     return width
 
 
@@ -381,19 +381,19 @@ def audit(
     -------
     Audit
         A number, a verdict and a sentence for each assumption that applies. Values that are not given come from the
-        table ``[audit]`` of the study, if there is one. Without a value the verdict is ``not known``, and the sentence
-        says what to give.
+        table ``[audit]`` of the study, if there is one. If a value is missing, the verdict is ``not known``, and the
+        sentence names the missing input.
 
     Raises
     ------
     InputError
-        If a value has a wrong type or is out of range, or the result is not that of one case.
+        If a value has a wrong type or is out of range, or the result contains several cases.
 
     Notes
     -----
     :data:`roughvisc.study.audit.limits.LIMITS` contains the limits of the verdicts and their sources. The audit uses
-    the lowest modulus: that at the end of the program, or for the longest wavelength at the lowest speed. This is the
-    least favourable choice for neglecting adhesion and inertia.
+    the lowest modulus: the modulus at the end of the program, or for the longest wavelength at the lowest speed. With
+    this modulus adhesion and inertia are largest.
 
     Examples
     --------
@@ -444,10 +444,10 @@ def audit(
 
 
 def as_text(value: float, unit: str, digits: int = 2) -> str:
-    """Return a quantity in SI to so many digits, as 490 kPa and not 4.9e+02 kPa."""
+    """Return a quantity in SI as text with some significant digits, as 490 kPa and not 4.9e+02 kPa."""
     return format_quantity(float(f"{value:.{digits}g}"), unit)
 
 
 def percent(share: float) -> str:
-    """Return a share to two digits, as 100 % and not 1e+02 %; a very small one as a bound."""
+    """Return a fraction as text with two digits, as 100 % and not 1e+02 %; a very small fraction as a bound."""
     return "less than 0.1 %" if 0 < share < 1e-3 else f"{float(f'{100 * share:.2g}'):g} %"

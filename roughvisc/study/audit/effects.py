@@ -1,4 +1,4 @@
-"""Size of effects that the model leaves out: adhesion, a base under the body, waves, and the heat of friction."""
+"""Size of effects that the model neglects: adhesion, a base under the body, elastic waves, and friction heat."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from roughvisc.mechanics.sheet import Sheet, complement
 
 Array = NDArray[np.float64]
 
-#: Distance over which surfaces attract each other, that between atoms (D. Tabor, J. Colloid Interface Sci. 58 (1977)
-#: 2). The Tabor parameter is proportional to its inverse, the attraction of stiff rough surfaces to the inverse of its
-#: cube root. [m]
+#: Distance over which surfaces attract each other: the distance between atoms (D. Tabor, J. Colloid Interface Sci. 58
+#: (1977) 2). The Tabor parameter is proportional to its inverse, the attraction of stiff rough surfaces to the inverse
+#: of its cube root. [m]
 ATTRACTION_RANGE = 3e-10
 #: Maugis' parameter over Tabor's, for Lennard-Jones atoms (D. Maugis, J. Colloid Interface Sci. 150 (1992) 243).
 _MAUGIS = 1.1570
@@ -64,7 +64,7 @@ def pull_off_force(radius: float, work_of_adhesion: float, tabor: float = math.i
     work_of_adhesion : float
         ``w``. [J/m2]
     tabor : float
-        Tabor parameter; infinite: JKR, 0: DMT. [-]
+        Tabor parameter: infinite for JKR, 0 for DMT. [-]
 
     Returns
     -------
@@ -73,7 +73,7 @@ def pull_off_force(radius: float, work_of_adhesion: float, tabor: float = math.i
 
     Notes
     -----
-    Between the limits it is the fit of [3]_ to the theory of Maugis, with an error of at most 1.7 %.
+    Between the limits the function uses the fit of [3]_ to the theory of Maugis, with an error of at most 1.7 %.
 
     References
     ----------
@@ -121,7 +121,7 @@ def punch_pull_off(radius: float, contact_modulus: float, work_of_adhesion: floa
 
 
 def adhesive_load(force: float, pull_off: float) -> float:
-    r"""Return the load that gives the same contact radius of a sphere without adhesion (JKR).
+    r"""Return the load under which a sphere without adhesion has the contact radius of an adhesive sphere (JKR).
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def adhesive_load(force: float, pull_off: float) -> float:
     Returns
     -------
     float
-        :math:`F + 2 P + 2 \sqrt{P F + P^2}`: the contact radius is that of Hertz under this load. [N]
+        :math:`F + 2 P + 2 \sqrt{P F + P^2}`: Hertz's theory gives the contact radius under this load. [N]
 
     References
     ----------
@@ -161,7 +161,7 @@ def rough_attraction(
     rms_slope : float
         Root mean square slope ``h'``. [-]
     rms_laplacian : float
-        Root mean square ``h''`` of the Laplacian of the heights, twice that of the mean curvature. [1/m]
+        Root mean square ``h''`` of the Laplacian of the heights: twice the rms mean curvature. [1/m]
     contact_modulus : float
         ``E*``. [Pa]
     work_of_adhesion : float
@@ -172,19 +172,19 @@ def rough_attraction(
     Returns
     -------
     float
-        From 1 on the surfaces stick without a load. Below, they touch on :math:`1 / (1 - r)` times the area that a load
-        brings into contact without adhesion. [-]
+        Ratio ``r``. From 1 on the surfaces stick without a load. For smaller ratios a load makes :math:`1 / (1 - r)`
+        times the contact area without adhesion. [-]
 
     Notes
     -----
-    A spot of the diameter :math:`d = 4 h' / h''` is surrounded by a rim within which the gap is below ``z``, of the
-    width :math:`d\,(3 z / 4 h' d)^{2/3}`. There the attraction is ``w / z``; within the spot the mean pressure is
+    A spot of diameter :math:`d = 4 h' / h''` is surrounded by a rim of width :math:`d\,(3 z / 4 h' d)^{2/3}`, in which
+    the gap is below ``z``. The attraction in the rim is ``w / z``, and the mean pressure in the spot is
     :math:`h' E^* / 2`. The ratio of the two forces is
 
     .. math::
         r = \pi \left(\tfrac{3}{16}\right)^{2/3} \frac{2 w}{h' E^* z} \left(\frac{4 z}{h' d}\right)^{2/3} .
 
-    It applies to attraction that does not change the shape of the spots (DMT), with a Tabor parameter below one.
+    The ratio applies if the attraction does not change the shape of the spots (DMT): for Tabor parameters below one.
 
     References
     ----------
@@ -230,12 +230,12 @@ def conformal_energy(roughness: float, contact_modulus: float) -> float:
 
 
 def periodic_relief(pressure: Array, cells: tuple[float, float], sheet: Sheet) -> float:
-    r"""Return the reduction of the approach by the base of a sheet, over the contact compliance, if the load repeats.
+    r"""Return the reduction of the approach by the base of a sheet, over the contact compliance, for a periodic load.
 
     Parameters
     ----------
     pressure : ndarray, shape (nx, ny)
-        One period. [Pa]
+        Pressure in one period. [Pa]
     cells : tuple of float
         Cell sides. [m]
     sheet : Sheet
@@ -256,31 +256,32 @@ def periodic_relief(pressure: Array, cells: tuple[float, float], sheet: Sheet) -
 
 
 def half_space_excess(first: float) -> float:
-    r"""Return the excess of the approach on a half-space over that on the real sheet, over the former, at one load.
+    r"""Return the relative excess of the approach on a half-space over the approach on the real sheet, at one load.
 
     Parameters
     ----------
     first : float
         Reduction ``e`` of the approach by the base over the approach on a half-space, to first order: :math:`C F \int_0
-        ^\infty (1 - S)\,\mathrm ds / \pi h \delta` of a contact much smaller than the thickness ``h``. The integral is
-        1.7702 on a bonded sheet of Poisson's ratio a half, and 1.1676 on any slipping one. [-]
+        ^\infty (1 - S)\,\mathrm ds / \pi h \delta` for a contact much smaller than the thickness ``h``. The integral is
+        1.7702 on a bonded sheet with Poisson's ratio 1/2, and 1.1676 on a slipping sheet of any Poisson's ratio. [-]
 
     Returns
     -------
     float
-        :math:`e / (1 + e)`: equal to ``e`` to first order, and never more than one. For spheres it is within a quarter
-        of the Fredholm equation's, up to contact radii of two thicknesses. [-]
+        :math:`e / (1 + e)`, over the approach on the half-space: equal to ``e`` to first order, and never more than
+        one. For spheres it is within 25 % of the solution of the Fredholm equation, up to contact radii of two
+        thicknesses. [-]
     """
     return first / (1 + first)
 
 
 def half_space_shortfall(first: float) -> float:
-    r"""Return the relative shortfall of the force on a half-space against that on the real sheet, at one approach.
+    r"""Return the relative shortfall of the force on a half-space from the force on the real sheet, at one approach.
 
     Parameters
     ----------
     first : float
-        As for :func:`half_space_excess`, of a contact that is taken for that of a paraboloid. [-]
+        As for :func:`half_space_excess`; the contact is treated as the contact of a paraboloid. [-]
 
     Returns
     -------
@@ -290,14 +291,14 @@ def half_space_shortfall(first: float) -> float:
     Notes
     -----
     The force on the sheet is :math:`F (1 + 1.5 e + 2.27 e^2 + 3 e^3)`. The first coefficient is exact for a sphere; the
-    others are fitted to the Fredholm equation of a sphere on bonded and slipping sheets. The shortfall is within 7 % of
-    it up to an approach of :math:`h^2/R`.
+    others are fitted to the Fredholm equation of a sphere on bonded and slipping sheets. Up to an approach of
+    :math:`h^2/R` the shortfall is within 7 % of the solution of this equation.
     """
     return 1 - 1 / (1 + 1.5 * first + 2.27 * first**2 + 3 * first**3)
 
 
 def dundurs_coupling(compliances: Sequence[float], poissons: Sequence[float]) -> float:
-    r"""Return Dundurs' second constant, for the sideways displacement of an interface under pressure.
+    r"""Return Dundurs' second constant, which couples tangential displacements of an interface to the pressure.
 
     Parameters
     ----------
@@ -309,7 +310,7 @@ def dundurs_coupling(compliances: Sequence[float], poissons: Sequence[float]) ->
     Returns
     -------
     float
-        :math:`|\beta|`; :math:`(1 - 2\nu)/(2 - 2\nu)` of one body under a rigid one. [-]
+        :math:`|\beta|`; :math:`(1 - 2\nu)/(2 - 2\nu)` for one body under a rigid body. [-]
 
     References
     ----------
@@ -343,8 +344,8 @@ def radiation_lag(radius: float, shear_modulus: float, density: float) -> float:
 
     Notes
     -----
-    The spring is :math:`4 G a / (1 - \nu)` and the dashpot :math:`3.4\,a^2 \sqrt{\rho G} / (1 - \nu)` [1]_. A force
-    that changes over a time ``T`` is off its quasi-static value by about the lag over ``T``.
+    The spring is :math:`4 G a / (1 - \nu)` and the dashpot :math:`3.4\,a^2 \sqrt{\rho G} / (1 - \nu)` [1]_. If a force
+    changes over a time ``T``, its relative difference from the quasi-static force is about the lag over ``T``.
 
     References
     ----------
@@ -364,7 +365,7 @@ def moving_load_excess(speed: float, shear_modulus: float, density: float, poiss
     Parameters
     ----------
     speed : float
-        ``V`` of the load. [m/s]
+        Speed ``V`` of the load. [m/s]
     shear_modulus : float
         ``G`` of the half-space. [Pa]
     density : float
@@ -375,17 +376,16 @@ def moving_load_excess(speed: float, shear_modulus: float, density: float, poiss
     Returns
     -------
     float
-        Displacement under a moving normal line load over that of one at rest, minus one; infinite from the speed of
-        Rayleigh waves on. [-]
+        Displacement under a moving normal line load over the displacement under a static one, minus one; infinite from
+        the speed of Rayleigh waves on. [-]
 
     Notes
     -----
     With :math:`m = V / c_2`, :math:`c_2^2 = G / \rho`, :math:`\kappa^2 = (1 - 2\nu) / (2 - 2\nu)`,
     :math:`\alpha_1^2 = 1 - \kappa^2 m^2` and :math:`\alpha_2^2 = 1 - m^2` a steady pressure of any shape displaces the
     surface :math:`m^2 \alpha_1 / ((1 - \nu) R)` times as far as at rest, with Rayleigh's function
-    :math:`R = 4 \alpha_1 \alpha_2 - (1 + \alpha_2^2)^2` [1]_. The form coded has :math:`R` multiplied by its
-    conjugate, which leaves nothing to cancel at low speed. To leading order the excess is :math:`3 m^2 / 4` for
-    :math:`\nu = 1/2`.
+    :math:`R = 4 \alpha_1 \alpha_2 - (1 + \alpha_2^2)^2` [1]_. The code multiplies :math:`R` by its conjugate, which
+    avoids cancellation at low speed. To leading order the excess is :math:`3 m^2 / 4` for :math:`\nu = 1/2`.
 
     References
     ----------
@@ -408,32 +408,32 @@ def moving_load_excess(speed: float, shear_modulus: float, density: float, poiss
 def flash_temperature(
     heat_flux: float, radius: float, speed: float, heat_conductivity: float, volumetric_heat_capacity: float
 ) -> float:
-    r"""Return the mean temperature rise of a round spot that slides on a half-space and heats it evenly.
+    r"""Return the mean temperature rise of a round spot that slides on a half-space, for a uniform heat flux.
 
     Parameters
     ----------
     heat_flux : float
-        ``q``, into the half-space. [W/m2]
+        Heat flux ``q`` into the half-space. [W/m2]
     radius : float
-        ``a`` of the spot. [m]
+        Radius ``a`` of the spot. [m]
     speed : float
-        ``V`` of the spot along the half-space. [m/s]
+        Speed ``V`` of the spot along the half-space. [m/s]
     heat_conductivity : float
-        ``k`` of the half-space. [W/(m K)]
+        Heat conductivity ``k`` of the half-space. [W/(m K)]
     volumetric_heat_capacity : float
-        :math:`\rho c` of the half-space. [J/(m3 K)]
+        Heat capacity :math:`\rho c` of the half-space. [J/(m3 K)]
 
     Returns
     -------
     float
-        Mean over the spot, in the steady state, above the temperature far away. [K]
+        Mean temperature of the spot in the steady state, above the temperature far away. [K]
 
     Notes
     -----
-    A slow spot has :math:`8 q a / 3 \pi k`, and a fast one, whose heat has no time to flow sideways,
-    :math:`0.974\,(q a / k) / \sqrt P` with :math:`P = V a \rho c / k` [1]_ [2]_. The factor is that of
-    :math:`2 q \sqrt{t / \pi k \rho c}`, with the time ``t`` since the leading edge, averaged over the circle. In
-    between the inverse squares of both are added [3]_: at most 4 % below the exact value, about ``P`` = 2.
+    The rise of a slow spot is :math:`8 q a / 3 \pi k`. A fast spot, whose heat has no time to flow sideways, has
+    :math:`0.974\,(q a / k) / \sqrt P` with :math:`P = V a \rho c / k` [1]_ [2]_. The factor follows from the average of
+    :math:`2 q \sqrt{t / \pi k \rho c}` over the circle, where ``t`` is the time since the leading edge. In between the
+    inverse squares of both limits are added [3]_. The sum is at most 4 % below the exact value, near ``P`` = 2.
 
     References
     ----------

@@ -33,12 +33,12 @@ class Limit:
     source: str
 
 
-#: The limit by which a surface is judged whose generator states its shortest wavelength.
+#: Name of the resolution limit for a surface whose generator states its shortest wavelength.
 STATED = "resolution (stated)"
-#: Rounding of a number that is exactly at a limit: 8 cells per wavelength still hold.
+#: Margin for the rounding of a number exactly at a limit, so that 8 cells per wavelength are still accepted.
 _JUST = 1 + 1e-9
-#: Name -> limits, in the order of an audit. Unless a threshold has a meaning of its own, an effect of some 10 % makes
-#: an assumption doubtful, and an effect of the size of the computed quantity breaks it.
+#: Name -> limits, in the order of an audit. Unless a threshold has a physical meaning, an effect of some 10 % makes an
+#: assumption doubtful, and an effect of the size of the computed quantity breaks the assumption.
 LIMITS: dict[str, Limit] = {
     "adhesion": Limit(
         "The spots in contact do not stick.",
@@ -140,9 +140,9 @@ PROPERTIES: dict[str, tuple[str, dict[str, float]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class AuditInputs:
-    """Properties of the bodies on which no contact result depends; see :func:`roughvisc.audit`.
+    """Properties of the bodies that only an audit uses; see :func:`roughvisc.audit`.
 
-    Quantities are numbers in SI, or texts; None if they are not given.
+    Quantities are numbers in SI or text with a unit; None if they are not given.
     """
 
     work_of_adhesion: Any = None

@@ -1,4 +1,4 @@
-"""What a result records of its surface, contact and bodies."""
+"""Surface, contact and bodies of a result, as an audit needs them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 #: Relative rounding of loads, areas and wavelengths.
 _ROUNDING = 1e-9
-#: Part of the mean square slope beyond the shortest wavelength of a recipe, up to which the heights are the recipe's.
+#: Largest part of the mean square slope below the shortest wavelength of a recipe, for heights that the recipe made.
 _SHORTER = 1e-6
 
 
@@ -46,7 +46,7 @@ class Scene:
     dataset : xarray.Dataset
         Result of one case.
     case : Case or None
-        Its case, if it is that of a study.
+        Case of the result, if the result belongs to a study.
     given : AuditInputs
         Stated properties.
     """
@@ -56,7 +56,7 @@ class Scene:
     given: AuditInputs
 
     def need(self, *names: str) -> list[float]:
-        """Return stated properties. [SI]"""
+        """Return stated properties by name. [SI]"""
         if missing := [name for name in names if getattr(self.given, name) is None]:
             raise NotKnown(f"Give {' and '.join(missing)}.")
         return [getattr(self.given, name) for name in names]
@@ -77,7 +77,7 @@ class Scene:
 
     @cached_property
     def period(self) -> xr.DataArray:
-        """Heights; under a mirror boundary with the mirror images. [m]"""
+        """Heights of one period: with the mirror images under a mirror boundary. [m]"""
         return mirror(self.height) if self.boundary == "mirror" else self.height
 
     @property
@@ -87,14 +87,14 @@ class Scene:
 
     @property
     def sides(self) -> list[float]:
-        """Sides of the surface, under a mirror boundary with the mirror images. [m]"""
+        """Sides of one period: with the mirror images under a mirror boundary. [m]"""
         return [count * side for count, side in zip(self.period.shape, self.cells, strict=True)]
 
     @cached_property
     def waves(self) -> tuple[float, float, float]:
         """``sum |q| |h_q|^2`` [m], part of the rms slope from the last octave [-], and its longest wavelength [m].
 
-        In free space they are those under a cosine window. NaN if the surface is flat or points are missing.
+        In free space a cosine window is applied to the heights. NaN if the surface is flat or points are missing.
         """
         z = self.period.values - self.period.values.mean()
         if not np.ptp(z) > 0:
@@ -108,14 +108,14 @@ class Scene:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether there is form alone: a recipe's, or wavelengths above a quarter of the shorter side."""
+        """Whether the surface has no roughness: a smooth recipe, or wavelengths above a quarter of the shorter side."""
         return is_analytic(self.period) or self.waves[2] > min(self.sides) / 2
 
     @cached_property
     def stated_wave(self) -> tuple[float, float] | None:
-        """Shortest wavelength that the recipe states [m] and its cells, along the axis where it has the fewest.
+        """Shortest wavelength of the recipe [m], and cells per wavelength, along the axis with the fewest cells.
 
-        None if the recipe states none, or the heights contain shorter wavelengths and are no longer the recipe's.
+        None if the recipe states no wavelength, or conditioning has added shorter wavelengths to the heights.
         """
         try:
             recipe = json.loads(self.dataset["height"].attrs["recipe"])
@@ -139,7 +139,7 @@ class Scene:
 
     @cached_property
     def loaded_slope(self) -> float:
-        """Root mean square slope that may be loaded: in free space down to the largest approach. [-]"""
+        """Root mean square slope of the loaded surface: in free space, of the part above the largest approach. [-]"""
         depth, highest = math.inf, float(self.height.max())
         if self.boundary == "free":  # the highest point of an indenter may lie between the cells
             depth = float(self.dataset["approach"].max()) - (float(self.height.attrs.get("highest", highest)) - highest)
@@ -152,7 +152,7 @@ class Scene:
 
     @cached_property
     def fullest(self) -> xr.Dataset:
-        """Row with the largest force: of these that with the largest contact area, the last of them."""
+        """Row with the largest force; among equal forces the last row with the largest contact area."""
         force = self.dataset["force"].values
         area = np.nan_to_num(self.dataset["contact_area"].values)  # NaN: not solved
         area = np.where(force >= force.max() * (1 - _ROUNDING), area, -1.0)
@@ -163,7 +163,7 @@ class Scene:
     def force(self) -> float:
         """Largest force. [N]"""
         if not self.fullest["force"] > 0:
-            raise NotKnown("There was no load, and so no contact to judge.")
+            raise NotKnown("The result has no load, and therefore no contact.")
         return float(self.fullest["force"])
 
     def pressure_in(self, row: xr.Dataset) -> Array:
@@ -175,7 +175,7 @@ class Scene:
 
     @cached_property
     def pressure(self) -> Array:
-        """Pressure where the force is largest. [Pa]"""
+        """Pressure in the row with the largest force. [Pa]"""
         return self.pressure_in(self.fullest)
 
     @property
@@ -186,7 +186,7 @@ class Scene:
 
     @property
     def curvature(self) -> float:
-        """Mean curvature of the profile over the contact, where all neighbours are known; positive at summits. [1/m]"""
+        """Mean curvature of the profile over cells in contact with known neighbours; positive at summits. [1/m]"""
         z = self.height
         curvature = sum(
             (2 * z - z.shift({axis: 1}) - z.shift({axis: -1})) / (2 * side**2)
@@ -221,7 +221,7 @@ class Scene:
 
     @cached_property
     def facts(self) -> Mapping[str, Any]:
-        """Attributes of the result, with the facts on material and program that the case of a stored one states."""
+        """Attributes of the result; for a stored result also the facts on material and program from its case."""
         if self.case is None:
             if "time_scale" not in self.dataset.attrs:
                 raise NotKnown("The material is not stated: audit the file from run, or the Dataset from simulate.")
@@ -234,7 +234,7 @@ class Scene:
     def late(self) -> float:
         """Contact compliance at the end of the program. [1/Pa]"""
         if not self.facts["compliance_at_end"] > 0:
-            raise NotKnown("There is no creep by the end of the program.")
+            raise NotKnown("The body does not deform by the end of the program.")
         return float(self.facts["compliance_at_end"])
 
     @cached_property
