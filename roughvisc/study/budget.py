@@ -1,4 +1,4 @@
-"""``budget``: the total uncertainty of a number, by source, from a few more solves of the same case."""
+"""``budget``: the total uncertainty of a number, by source, from a few further solves of the same case."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ def budget(
         ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid or
         the conductivities.
     at : float, str, or a sequence of these, optional
-        Times or speeds. Default: all that the study keeps. [s] or [m/s]
+        Times or speeds. Default: all kept times or speeds of the study. [s] or [m/s]
     modulus_error, time_scale_error : float or str, optional
-        Relative errors of the moduli of the material and of its times at 95 %: of a measured curve, or from batch to
-        batch. Without them these sources stay open. [-]
+        Relative errors of the moduli and the times of the material at 95 %, such as the error of a measured curve or
+        the scatter between batches. Without an error its source stays open. [-]
     cutoff : float or str, optional
         Shortest wavelength of the real surface. Without it the waves that the scan does not resolve stay open. [m]
     population : {"patch", "ensemble"}, optional
-        Whether the number is of this patch, the default, or of the roughness that it is a sample of.
+        Whether the number describes this patch, the default, or the roughness from which the patch is a sample.
     out : path, optional
         Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
     client, workers
@@ -75,10 +75,10 @@ def budget(
     -------
     xarray.Dataset
         Over ``source`` and ``time`` or ``speed``: ``half_width``, of the logarithm at 95 %, missing if a source is
-        open [-]; ``direction``, 1 or -1 of an error that only raises or lowers the number. Over ``source``:
-        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, one of ``counted``, ``none`` (it does
-        not apply) and ``open`` (an input is missing). Over the times or speeds: ``value``, ``lower`` and ``upper``, in
-        the unit of the quantity, and ``case_cost`` [s]. Of several quantities, over ``quantity`` too.
+        open [-]; ``direction``, 1 or -1 for an error that only raises or lowers the number. Over ``source``:
+        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, one of ``counted``, ``none`` (the source
+        does not apply) and ``open`` (an input is missing). Over the times or speeds: ``value``, ``lower`` and
+        ``upper``, in the unit of the quantity, and ``case_cost`` [s]. For several quantities also over ``quantity``.
 
     Raises
     ------
@@ -89,9 +89,9 @@ def budget(
 
     Notes
     -----
-    Sources are taken as independent, in logarithms: :math:`Q e^{\pm U}`, :math:`U^2 = \sum U_i^2`; one with a
-    direction counts on that side only. An open source is not counted. A number that is zero, as the leak rate of a
-    closed gap, has no logarithm, and its interval is missing.
+    Sources are taken as independent, in logarithms: :math:`Q e^{\pm U}`, :math:`U^2 = \sum U_i^2`. A source with a
+    direction counts only on this side, and an open source does not count. A number that is zero, such as the leak rate
+    of a closed gap, has no logarithm, and its interval is missing.
 
     See Also
     --------
@@ -158,7 +158,7 @@ def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tup
 
 
 def _own_result(case: Case, finished: Path, base: Case, places: list[float] | None) -> xr.Dataset | None:
-    """Return the finished result of the case at some places, if it has all that is needed."""
+    """Return the finished result of the case at some times or speeds; None if it lacks a row or a field."""
     if not set(base.settings.fields) <= set(case.settings.fields) or not is_result_of(case, finished):
         return None
     whole, axis = open_result(finished), case.experiment.axis

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Case", "read_cases", "read_study", "vary"]
 
-#: Raised with each change of the numbers that an unchanged case gives.
+#: Incremented whenever the numbers of an unchanged case change.
 NUMERICS_REVISION = 37
 
 
@@ -67,7 +67,7 @@ class Case:
     varied : mapping
         Values that a sweep or :func:`vary` set: dotted key -> value in SI.
     written : mapping
-        Quantities among them as written in the study file: dotted key -> text with a unit.
+        Varied quantities as written in the study file: dotted key -> text with a unit.
     title : str
         Title of the study.
     body : Body
@@ -97,7 +97,7 @@ class Case:
     audit_inputs: Mapping[str, Any] = field(compare=False)
 
     def __repr__(self) -> str:
-        """Return title, surface, material and experiment in one line, and what a sweep has set."""
+        """Return title, surface, material, experiment and varied values in one line."""
         name = Path(self.surface["file"]).name if "file" in self.surface else self.surface["generate"]
         parts = [f"{self.title!r}, {name} on {self.tables['material']['model']}", repr(self.experiment)]
         parts += [f"{key} = {self.written.get(key, value)}" for key, value in self.varied.items()]
@@ -146,7 +146,7 @@ class Case:
 
     @property
     def surface_sha256(self) -> str:
-        """SHA-256 of the scan's file; of a generated surface: of its recipe."""
+        """SHA-256 of the scan's file, or of the recipe of a generated surface."""
         return self._checksums[0][0]
 
     @cached_property
@@ -157,8 +157,8 @@ class Case:
     def key(self) -> str:
         """Sixteen hexadecimal digits that identify everything that determines the numbers.
 
-        They are a digest of the tables in SI, of the checksums of the scans, and of :data:`NUMERICS_REVISION`. The
-        title, the paths, and the tables ``[observe]`` and ``[audit]`` do not count.
+        The key is a digest of the tables in SI, the checksums of the scans, and :data:`NUMERICS_REVISION`. The title,
+        the paths, and the tables ``[observe]`` and ``[audit]`` do not count.
         """
         settings: dict[str, Any] = {"fields": sorted(self.settings.fields)}
         for one in fields(self.settings):
@@ -204,7 +204,7 @@ class Case:
         return height
 
     def to_json(self) -> str:
-        """Return the case as JSON, from which :meth:`from_json` makes it again, with the same key."""
+        """Return the case as JSON; :meth:`from_json` makes a case with the same key from it."""
         stated = dict(self.tables)
         if self.varied:
             stated["varied"] = dict(self.varied)
@@ -216,7 +216,7 @@ class Case:
 
     @classmethod
     def of_result(cls, dataset: xr.Dataset) -> Case:
-        """Return the case of a result, as its attribute ``case`` states it."""
+        """Return the case of a result from its attribute ``case``."""
         if "case" not in dataset.attrs:
             raise InputError("the result does not record its case: expected a result of a study", key="case")
         return cls.from_json(dataset.attrs["case"])
@@ -249,8 +249,8 @@ def read_study(path: str | Path) -> Case:
     Raises
     ------
     InputError
-        If the file cannot be read, if anything in it is unknown, missing, impossible or in a wrong unit, or if it
-        contains a sweep: see :func:`read_cases`.
+        If the file cannot be read, if a key or a value is unknown, missing, impossible or in a wrong unit, or if the
+        file contains a sweep: see :func:`read_cases`.
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
@@ -329,7 +329,7 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
 def _changed(
     data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, drawn: Mapping[str, int] | None = None
 ) -> Case:
-    """Return the case of some tables with values changed, and with the number of its realisation among them."""
+    """Return the case of some tables with changed values, one of which is the number of its realisation."""
     for key, value in changes.items():
         data = place(data, key, value)
     case = _case_of(data, origin, origin.parent if origin else None)
@@ -349,7 +349,7 @@ def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) 
     except InputError as error:
         for key in (error.key, error.key.rpartition(".")[0]):
             file = value_at(data, f"{key}.file", None)
-            if file is not None and key.startswith("material"):  # its columns are in the place of its name
+            if file is not None and key.startswith("material"):  # its columns have replaced its name in the table
                 raise error.prefixed(str(file)) from error
         text = value_at(data, error.key, None)
         if text == error.found or in_si(text, error.key, data) != error.found:
@@ -363,7 +363,7 @@ def _faces(surface: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _checksums(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return the checksums of the scan or recipe of each face and of its surface card, whose origin does not count."""
+    """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
     found = []
     for face in _faces(surface):
         if "file" not in face:
@@ -383,7 +383,7 @@ def _checksums(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _digest(stated: Any) -> str:
-    """Return the SHA-256 of nested values, equal for numbers that are equal to 15 significant digits."""
+    """Return the SHA-256 of nested values, with numbers rounded to 15 significant digits."""
     text = json.dumps(_rounded(stated), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -60,7 +60,7 @@ def _toml(value: Any) -> str:
 
 
 def names_of(keys: Sequence[str]) -> dict[str, str]:
-    """Return names of dotted keys: the last word, with the rest of the key if two names would be equal.
+    """Return short names of dotted keys: the last word, with the rest of the key if two names would be equal.
 
     Examples
     --------
@@ -111,7 +111,7 @@ def case_words(case: Mapping[str, Any]) -> str:
 def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return stems of file names of cases: the varied values in portable letters, otherwise the keys.
 
-    A stem depends on its case alone; if two are equal apart from capitals, both have their keys added.
+    A stem depends only on its case. If two stems differ only in capitals, both get their keys added.
 
     Parameters
     ----------

@@ -24,10 +24,10 @@ from roughvisc.topography.conditioning import condition
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.parameters import rms_slope
 
-#: Cells of the longer side that is pressed, at most, and tolerance of the pressure.
+#: Largest number of cells along the longer side for a press, and tolerance of the pressure.
 MOST_PRESSED, _TOLERANCE = 256, 1e-2
-#: Largest number of presses, accepted relative error of the contact, and largest factor between the pressure and that
-#: of a theory: a surface with plateaus has more contact under any pressure.
+#: Largest number of presses, accepted relative error of the contact, and largest factor between the pressure and the
+#: pressure of a theory: a surface with plateaus has more contact than in theory under any pressure.
 _PRESSES, _NEAR, _FARTHEST = 12, 0.01, 100.0
 #: Pressure on a flat scan. [Pa]
 _ON_FLAT = 1e3
@@ -36,17 +36,17 @@ _ON_FLAT = 1e3
 def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTACT) -> FirstPressure:
     """Return the nominal pressure that finally brings a part of a scan into contact with the rubber of a first study.
 
-    A scan of many cells is pressed on fewer. These have a lower root mean square slope, and light contact is
-    proportional to the pressure over the slope (:func:`~roughvisc.study.first_study.pressure_for`). They are
-    pressed less, by the ratio of the slopes. On self-affine surfaces of 500 x 480 cells the contact is within 4 % of
-    that of the run.
+    A large scan is pressed on fewer cells, which have a lower root mean square slope. Light contact is proportional to
+    the pressure over the slope (:func:`~roughvisc.study.first_study.pressure_for`), so the pressure on fewer cells is
+    reduced by the ratio of the slopes. On self-affine surfaces of 500 x 480 cells the contact is within 4 % of the
+    contact in a run on all cells.
 
     Parameters
     ----------
     scan : xarray.DataArray
-        As read. [m]
+        Heights of the scan before conditioning. [m]
     found : Inspection
-        What is seen in it, and how it is going to be conditioned.
+        Inspection of the scan, with its proposed conditioning.
     contact : float
         Contact fraction to aim at, above 0 and below 1. [-]
     """

@@ -16,13 +16,13 @@ from roughvisc.topography.writers import surface_table, written_quantity
 SHEAR_MODULUS, KELVIN_MODULUS, KELVIN_VISCOSITY = 3e6, 1e6, 1e5
 #: Final contact fraction, unless another is requested.
 CONTACT = 0.05
-#: Number of points from which a coarser grid is proposed for the first run.
+#: Number of points above which the study proposes a coarser grid for the first run.
 _LARGE = 400_000
 
 
 @dataclass(frozen=True)
 class FirstPressure:
-    """Pressure of a first study, and the contact that it makes.
+    """Pressure of a first study, and the resulting contact.
 
     Attributes
     ----------
@@ -31,9 +31,9 @@ class FirstPressure:
     contact : float
         Requested final contact fraction. [-]
     late, early : float
-        Contact fractions in the end and instantaneous. [-]
+        Contact fractions at the end and immediately after loading. [-]
     shape : tuple of int
-        Numbers of cells that were pressed.
+        Numbers of cells of the pressed grid.
     """
 
     pressure: float
@@ -50,7 +50,7 @@ _REMARKS = {
     "fill": "missing points are filled in; the result keeps their mask",
     "filter": "shorter wavelengths are noise",
 }
-#: Boundary of the study, for a scan that stands for a larger, nominally flat surface.
+#: Boundary of the study, for a scan that represents a larger, nominally flat surface.
 _BOUNDARIES = {
     "periodic": 'boundary = "periodic"               # the scan stands for a larger, nominally flat surface',
     "mirror": 'boundary = "mirror"                 # opposite borders differ: the scan repeats with its mirror images',
@@ -64,7 +64,7 @@ def starter_study(
     found: Inspection,
     first: FirstPressure,
 ) -> str:
-    """Return a study of a scan pressed on a rubber, as TOML, to be run and changed.
+    """Return the TOML text of a study of a scan pressed on a rubber, for the user to run and change.
 
     Parameters
     ----------
@@ -73,7 +73,8 @@ def starter_study(
     study : path
         File of the study.
     options : mapping
-        ``format``, ``channel``, ``unit``, ``spacing`` [m] that the file needs to be opened; None for the others.
+        ``format``, ``channel``, ``unit`` and ``spacing`` [m] for opening the file; None for options that it does not
+        need.
     found : Inspection
         Inspection of the scan.
     first : FirstPressure
@@ -102,7 +103,7 @@ def starter_study(
 
 
 def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
-    r"""Return the nominal pressure that brings a small fraction of a rough surface into contact, with two digits.
+    r"""Return the nominal pressure that brings a small fraction of a rough surface into contact, to two digits.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
     Notes
     -----
     At small loads :math:`A / A_0 = \kappa p / (E^* h'_{rms})`, with :math:`\kappa = \sqrt{8 / \pi} = 1.6` in Persson's
-    theory [1]_ and :math:`\sqrt{2 \pi} = 2.5` in that of Bush, Gibson and Thomas [2]_: here 2.
+    theory [1]_ and :math:`\sqrt{2 \pi} = 2.5` in the theory of Bush, Gibson and Thomas [2]_. This function uses 2.
 
     References
     ----------

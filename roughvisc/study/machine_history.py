@@ -1,4 +1,4 @@
-"""Histories of test machines as loading programs: a zero, a factor, noise below zero, thinned rows."""
+"""Histories of test machines as loading programs: zero, scale factor, noise below zero, thinning of rows."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from roughvisc.units import is_quantity, number
 
 Array = NDArray[np.float64]
 
-#: Loads below zero count as zero down to this part of the largest load.
+#: Negative loads count as zero up to this part of the largest load.
 _NOISE = 0.01
-#: Number of segments from which a note proposes a larger `thin`, if they are more than a tenth of the rows.
+#: Number of segments above which a note proposes a larger `thin`, if they exceed a tenth of the rows.
 _MANY = 300
 
 
@@ -32,7 +32,7 @@ class History(NamedTuple):
     times, values : list of float
         Times from zero [s], and values [N, m or Pa].
     note : str
-        Numbers of rows and segments, and what became zero.
+        Numbers of rows and segments, and the noise that was set to zero.
     """
 
     control: Control
@@ -67,19 +67,19 @@ def read_program(
     factor : float
         Factor for the values after subtracting `zero`: -1 if compression is negative in the file.
     thin : float or str
-        Rows are omitted as long as all rows are within this distance of the straight lines between the kept rows; zero
-        keeps all rows. A string with ``%`` is a part of the largest value. [N, m or Pa]
+        Largest distance of an omitted row from the straight lines between the kept rows; zero keeps all rows. A string
+        with ``%`` is a part of the largest value. [N, m or Pa]
 
     Returns
     -------
     Program
-        Its ``note`` states the numbers of rows and segments, and what becomes zero.
+        Its ``note`` states the numbers of rows and segments, and the noise that is set to zero.
 
     Raises
     ------
     InputError
-        If the file or a column cannot be read, times do not increase, or loads are below zero by more than 1 % of the
-        largest load, which counts as noise; the message names the line.
+        If the file or a column cannot be read, times do not increase, or loads are below zero by more than noise (1 %
+        of the largest load); the message names the line.
 
     Notes
     -----
@@ -158,7 +158,7 @@ def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
 
 
 def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:
-    """Return a note on values below zero, which count as zero; refuse values below the noise."""
+    """Return a note on noise below zero, which counts as zero; refuse lower values."""
     unit, largest, lowest = UNITS[control], max(float(values.max()), 0.0), float(values.min())
     if lowest < -_NOISE * largest:
         at = int(np.argmin(values))
@@ -173,29 +173,29 @@ def _noise_note(path: str | Path, control: Control, times: Array, values: Array)
 
 
 def _less(values: Array, zero: float) -> Array:
-    """Return values less their zero, rounded to 12 digits, in memory of their own."""
+    """Return a copy of values minus their zero, rounded to 12 digits."""
     return np.array([float(f"{value - zero:.12g}") for value in values.tolist()]) if zero else values.copy()
 
 
 def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
-    """Return the rows to keep so that the straight lines between them pass every row within a tolerance.
+    """Return the numbers of the rows to keep, so that linear interpolation between them meets a tolerance at every row.
 
     Parameters
     ----------
     times, values : ndarray
-        Of the rows; two rows at one time are a jump, and both are kept.
+        Times and values of the rows; two rows at one time are a jump, and both are kept.
     tolerance : float
         In the unit of the values; zero keeps every row.
 
     Returns
     -------
     ndarray of int
-        Ascending, with the first and the last row.
+        In ascending order, including the first and the last row.
 
     Notes
     -----
-    From each row that is kept the line goes to the farthest row that it can reach: the slopes that pass all rows
-    between within the tolerance form a cone, which narrows row by row.
+    From each kept row a line goes to the farthest row that it can reach within the tolerance. The slopes that pass all
+    rows in between within the tolerance form a cone, which narrows from row to row.
     """
     if tolerance <= 0:
         return np.arange(len(times))

@@ -1,7 +1,7 @@
-"""Neighbours of a case: the case with one thing changed, solved by the ordinary sweep and compared with it.
+"""Neighbours of a case: copies with one change each, solved by the ordinary sweep and compared with the case.
 
-They show the sources of error of a number :math:`Q`. With other cells, fewer waves, another material or another patch
-its logarithm changes, and the error of a source is a weight times that change: :math:`\\ln Q \\pm U`.
+Each neighbour shows one source of error of a number :math:`Q`. With other cells, fewer waves, another material or
+another patch the logarithm of :math:`Q` changes, and the error is a weight times this change: :math:`\\ln Q \\pm U`.
 """
 
 from __future__ import annotations
@@ -38,21 +38,22 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 Population = Literal["patch", "ensemble"]
-#: Inputs of a budget that only the user knows.
+#: Inputs of a budget that the user has to state.
 KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
 STEPS, GRID, SAMPLE, OCTAVE = "time steps and solver", "grid", "sample", "next octave of waves"
 MODULUS, TIME_SCALE = "modulus", "time scale"
 #: Recipes that give the same surface on any grid.
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
-#: Relative change of a modulus or a time scale that shows the slope of a number.
+#: Relative change of a modulus or a time scale, for the derivative of a number.
 _CHANGE = 1.1
 #: Order with which the error of the grid vanishes, and Roache's factor of two grids at this order.
 ORDER = 1.5
 GRID_FACTOR = 3 / (2**ORDER - 1)
 #: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
-#: Student's factor is 2.57; their spectrum is the spectrum of one patch, whose longest waves scatter too.
+#: Student's factor is 2.57. The factor is larger, because all have the spectrum of one patch, whose longest waves are
+#: a sample, too.
 _PATCHES, _SAMPLE_FACTOR = 6, 3.3
-#: Factor by which the wavelength above which 99 % of the slope lie may exceed the shortest wavelength of the spectrum.
+#: Largest ratio of the wavelength above which 99 % of the slope lie to the shortest wavelength of the spectrum.
 _SAME = 1.15
 
 
@@ -61,13 +62,13 @@ _SAME = 1.15
 
 
 def is_data(case: Case) -> bool:
-    """Return whether the grid of the surface is data, so that another grid is another surface."""
+    """Return whether the surface is measured on its grid, so that another grid means another surface."""
     treated = any(case.surface.get(step, False) is not False for step in (*FACE_STEPS, "second"))
     return case.surface.get("generate") not in _ANY_GRID or treated
 
 
 def is_sample(case: Case, height: xr.DataArray) -> bool:
-    """Return whether the surface is a sample of a larger one, which has other patches and shorter waves."""
+    """Return whether the surface is a sample of a larger surface, which has other patches and shorter waves."""
     return case.settings.boundary != "free" and is_data(case) and bool(np.isfinite(height.values).all())
 
 
@@ -107,9 +108,9 @@ def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
 
 
 def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = None) -> Case:
-    """Return a case that keeps these fields, at these places of its axis if given, and no error of the grid.
+    """Return a case that keeps these fields, at the given places of its axis, without an estimate of the grid error.
 
-    They are not named among the values that vary, and so not in the title of the result.
+    The changes do not count as varied values, so the title of the result does not name them.
     """
     changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
     if places is not None and case.experiment.axis == "time":
@@ -123,7 +124,7 @@ def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = No
 
 @dataclass(frozen=True)
 class Neighbour:
-    """A case with one thing changed.
+    """A case with one change.
 
     Attributes
     ----------
@@ -131,7 +132,7 @@ class Neighbour:
     weight : float
         Half-width of the logarithm of a number at 95 %, over the change of the logarithm. [-]
     against : Case
-        Case that it is compared with.
+        Case for the comparison.
     """
 
     case: Case
@@ -146,11 +147,11 @@ class Source:
     Attributes
     ----------
     method : str
-        How its error is found; the missing input if it is open.
+        Method of the estimate, or the missing input of an open source.
     neighbours : tuple of Neighbour
-        Cases that show it.
+        Cases from which the error is estimated.
     state : {"counted", "none", "open"}
-        Whether it is part of the total error: ``none`` if it does not apply, ``open`` if an input is missing.
+        Whether the source is part of the total error: ``none`` if it does not apply, ``open`` if an input is missing.
     """
 
     method: str
@@ -172,7 +173,7 @@ def sources_of(
     known : mapping
         Inputs of :data:`KNOWN`, as in :func:`roughvisc.budget`.
     coarsening : float
-        Length of the cells over the length of the cells of the case: the sources are those on this grid.
+        Length of the cells over the length of the cells of the case, for the sources on another grid.
 
     Raises
     ------
@@ -219,7 +220,7 @@ def sources_of(
             smooth = vary(own, {"surface.shortest_wave": 2 * shortest})
             found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
 
-    # the contact of an indenter has few cells: its material is compared on its own grid
+    # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
     compared, material = coarse if sample else own, base.tables["material"]
     changes: dict[str, dict[str, Any]] = {
         MODULUS: {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)},
@@ -257,7 +258,7 @@ def solve(
     workers: int | None = 0,
     threads: int | None = None,
 ) -> dict[str, xr.Dataset]:
-    """Return the results of some cases by their keys; results that the folder contains are used again.
+    """Solve some cases and return the results by their keys; results in the folder are not computed again.
 
     Parameters
     ----------
@@ -316,7 +317,7 @@ def compared(
     coarsening: float | None = None,
     before: Mapping[str, xr.Dataset] | None = None,
 ) -> dict[str, xr.Dataset]:
-    """Solve the neighbours of a case, and return the budget of each quantity by its name.
+    """Solve the neighbours of a case and return the budget of each quantity by name.
 
     Parameters
     ----------
@@ -324,15 +325,15 @@ def compared(
         As in :func:`sources_of`.
     observed : sequence of Observable
     solved : callable
-        Returns the results of cases by their keys: :func:`solve` with its settings.
+        Solves cases and returns the results by their keys: :func:`solve` with its settings.
     own : xarray.Dataset, optional
-        Result of the case if it is known.
+        Result of the case, if it is known.
     places : sequence of float, optional
         Times [s] or speeds [m/s] of the rows. Default: all.
     coarsening : float, optional
-        Use cells that are longer by this factor, and the rows with a force.
+        Factor for the length of the cells; only rows with a force are used.
     before : mapping, optional
-        Budgets on another grid, from which the rows are taken, and the errors that no grid reduces.
+        Budgets on another grid. They provide the rows, and the errors that do not depend on the grid.
 
     Returns
     -------
@@ -412,7 +413,7 @@ def _error(
     values : mapping
         Key of each case -> values of the quantity.
     stated : ndarray
-        Error of the logarithm by steps and solver. [-]
+        Error of the logarithm of the quantity by time steps and solver. [-]
     """
     both = np.zeros(stated.shape)
     if name == STEPS:

@@ -34,9 +34,9 @@ def observe(
 ) -> list[Path]:
     """Compute the quantities in ``[observe]`` of a study from its finished results, and add them to the files.
 
-    ``roughvisc run`` does this at the end; after :func:`roughvisc.run` and :func:`roughvisc.sweep` call it with the
-    same arguments. Quantities that a file already contains, for the same values, are not computed again. Frames are
-    Dask tasks: on the default client if there is one, otherwise in threads.
+    ``roughvisc run`` calls this function at the end. After :func:`roughvisc.run` and :func:`roughvisc.sweep` call it
+    with the same arguments. Quantities that a file already contains, for equal arguments, are not computed again.
+    Frames are Dask tasks, on the default client if there is one, otherwise in threads.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def observe(
 
 
 def _add(case: Case, path: Path) -> bool:
-    """Add to one file the quantities that it lacks; return whether it lacked any."""
+    """Add missing quantities to one file; return whether any was missing."""
     with open_result(path) as result:
         if not _lacking(case, result):
             return False
@@ -96,6 +96,6 @@ def _add(case: Case, path: Path) -> bool:
 
 
 def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
-    """Return the observables that a result does not have, or has for other values."""
+    """Return the observables that a result lacks, or contains for other arguments."""
     before = json.loads(result.attrs.get(OBSERVED, "{}"))
     return {name: values for name, values in case.observed.items() if before.get(name) != values}
