@@ -1,7 +1,7 @@
 """``roughvisc plan``: steps, time, memory and disk of each case, before anything runs.
 
-One run on few cells gives the steps, the convolutions and the contact. They grow slowly with the grid. One convolution,
-timed on the real grid, gives the time. Memory and disk are counted.
+A run on few cells gives the numbers of steps and convolutions and the contact, which grow slowly with the grid. A timed
+convolution on the real grid gives the time. Memory and disk follow from the sizes of the arrays.
 """
 
 from __future__ import annotations
@@ -79,38 +79,39 @@ COLUMNS = {
 _CELLS = ("cells_x", "cells_y", "solved_cells_x", "solved_cells_y")
 #: Longest side of the grid of a coarse run, of a loading and of a friction curve. [cells]
 _COARSE, _COARSE_CURVE = 128, 48
-#: Powers of the number of cells a side with which steps and convolutions grow. Measured on 15 cases of rough surfaces,
-#: balls, slides and curves of 96 to 512 cells a side: convolutions grow with 0.25 to 0.65, under an approach with 0.9,
-#: and those of curves with 0.15.
+#: Exponents with which steps, and convolutions of loadings and of friction curves, grow with the number of cells a
+#: side. On 15 measured cases of rough surfaces, balls, slides and curves, of 96 to 512 cells a side, the exponent of
+#: convolutions is 0.25 to 0.65, under a prescribed approach 0.9, and for curves 0.15.
 _STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
-#: Largest numbers of convolutions and steps of a coarse run: a limit of time would depend on the load of the machine.
+#: Largest numbers of convolutions and steps of a coarse run. A time limit would depend on the load of the machine.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 2500, 500
-#: Speeds of a coarse friction curve: of more, evenly spread ones.
+#: Largest number of speeds of a coarse friction curve, spread evenly over the speeds of the case.
 _FEW_SPEEDS = 7
-#: Cells of a slide on the coarse grid, at most.
+#: Largest length of a slide on the coarse grid. [cells]
 _MOST_SLID = 32
-#: First step of a hold, in parts of the hold: later ones become longer in proportion.
+#: First step of a hold over the length of the hold. Later steps grow in proportion to the time.
 _FIRST_STEP = 0.005
 #: Iterations of a timed solve.
 _ITERATIONS = 3
-#: Coarse runs of a sweep go on for this time, or this part of the expected time of all cases. [s, 1]
+#: Time for the coarse runs of a sweep: this time, or this part of the expected time of all cases. [s, 1]
 _BUDGET, _SHARE = 1.2, 0.05
-#: Convolutions that take as long as the rest of a step, and further ones for each exponential. Cost of a convolution of
-#: a curve, with all that goes with it, over that of a contact problem, at 256 and 1024 squared.
+#: Time of the rest of a step, and of each exponential in a step, over the time of a convolution. Time per convolution
+#: of a friction curve over the time of a convolution of a contact problem, at 256 and 1024 cells a side.
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
-#: Work of the runs on coarser grids that estimate the grid error, over that of the run, and the time to compare a cell
-#: of a kept pressure with that of the coarser grid. [-], [s]
+#: Work of the runs on coarser grids for the grid error, over the work of the run, and time to compare a kept pressure
+#: with the coarser grid, per cell. [-], [s]
 _GRID_ERROR, _COMPARE = 0.3, 3e-7
-#: Time to write a file, and a byte of a field. [s]
+#: Time to write a file without fields, and each byte of a field. [s]
 _FILE, _WRITE = 0.05, 3e-9
-#: Surfaces of fewer cells are made twice, to time it: of more, the time does not matter beside that of the run.
+#: Surfaces of fewer cells are made a second time, because the first includes imports. For larger surfaces the time of
+#: imports is negligible. [cells]
 _QUICK = 512**2
 #: Contact fraction that counts as full contact.
 _FULL = 0.95
-#: Bytes of the variables of a result without their values, of a friction curve, a loading and one with slides.
+#: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
 _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
-#: Bytes of a row without its fields, and bits that compression leaves of a rounded pressure and of another rounded
-#: field, more than those of the precision. Measured at precisions of 1e-2 and 1e-4.
+#: Size of a row without its fields [byte], and bits per value of a compressed pressure and of another compressed field
+#: in addition to the bits of the precision. Measured at precisions of 1e-2 and 1e-4.
 _ROW, _PRESSURE_BITS, _FIELD_BITS = 300.0, 9.0, 3.0
 
 
@@ -144,10 +145,10 @@ def plan(
     Notes
     -----
     A case runs on at most 128 cells a side, with its own tolerance and kept times; a friction curve on 48, at some of
-    its speeds. Steps and convolutions are extrapolated to the real grid. The contact fraction is that of the coarse
-    run, corrected for the slopes that the coarse grid lacks by Persson's theory. The time follows from a few iterations
-    on the real grid. It is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2. In a sweep with
-    many cases some have no coarse run; their numbers are those of the most similar case.
+    its speeds. Steps and convolutions are extrapolated to the real grid. The contact fraction comes from the coarse
+    run; Persson's theory corrects it for the slopes that the coarse grid does not resolve. The time follows from a few
+    iterations on the real grid. The time is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2.
+    In a sweep with many cases some have no coarse run, and the coarse run of the most similar case is used for them.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -168,7 +169,7 @@ def plan(
         try:
             if surface not in surfaces:
                 height, ready = case.height(), time.thread_time()
-                if height.size < _QUICK:  # once more: the first time imports what it needs
+                if height.size < _QUICK:  # a second time, because the first includes imports
                     case.height()
                 surfaces[surface] = height, time.thread_time() - ready
             height, seconds = surfaces[surface]
@@ -200,14 +201,14 @@ def plan(
 
 
 class CoarseRun(NamedTuple):
-    """Costs and contact of a case by a coarse run.
+    """Costs and contact of a case, from a coarse run.
 
     Attributes
     ----------
     steps, convolutions : float
         Time steps or speeds, and convolutions, on the real grid.
     kept : float
-        Part of the steps that is kept. [-]
+        Kept part of the steps. [-]
     contact : ndarray
         Part of the cells in contact, of each kept row and each row in a slide. [-]
     fraction : float
@@ -233,12 +234,12 @@ class CoarseRun(NamedTuple):
 def coarse_run(own: Rows, case: Case) -> CoarseRun:
     """Run a case on few cells, with its own tolerance and kept times, and time a convolution on its own grid.
 
-    A long run ends early. Its steps and its contact are then carried on.
+    A long run is stopped early, and its steps and its contact are extrapolated to the end of the program.
 
     Parameters
     ----------
     own : Rows
-        Rows of the case on its own grid, of which none is computed.
+        Rows of the case on its own grid, not computed.
     case : Case
         The case.
     """
@@ -248,7 +249,7 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         program, stated = with_coarse_slides(own.scene.program, spacing(few)), own.scene.program.segments
         cells = sum(one.slide.cells(spacing(height)) for one in stated if one.slide is not None)
         settings = replace(settings, edge="accept", missing="absent")
-        if cells:  # the kept times may lie beyond the end
+        if cells:  # shorter slides end the program earlier, perhaps before kept times
             settings = replace(settings, times=settings.times and len(program.corners))
         experiment = Loading(program)
     elif isinstance(experiment, SteadySliding):
@@ -262,7 +263,7 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         rows = experiment.rows(Problem(few, case.body, settings))
         began = time.thread_time()
         for row in rows:
-            total, slides = before, False  # in the middle of a pair convolutions are counted with the end
+            total, slides = before, False  # inside a pair of steps: its convolutions are counted at its end
             if program is None:
                 total += row.values["convolutions"]
             else:
@@ -273,13 +274,13 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
             if row.values:
                 fraction = float(np.fmax(fraction, row.values["contact_fraction"]))
                 force = float(np.fmax(force, row.values["force"]))
-                if row.kept or slides:  # the corners of a slide are no sample of its kept times
+                if row.kept or slides:  # corners alone do not represent the kept times of a slide
                     contact.append(float(np.nan_to_num(row.values["contact_area_counted"])) / nominal_area(few))
             if program is not None and (total > _MOST_CONVOLUTIONS or tally[:, 0].sum() > _MOST_STEPS):
                 share = _part_done(program, row.at)
                 compliance = case.body.material.contact_compliance
                 now, end = (float(compliance(one)) for one in (row.at, program.duration))
-                if force * now > 0:  # a load that is still to come, and creep
+                if force * now > 0:  # further loading and creep after the end of the coarse run
                     fraction = scaled_contact(fraction, max(program.largest_load * end / (force * now), 1.0))
                     contact.append(fraction)
                 break
@@ -305,7 +306,7 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
 
 
 def scaled_contact(fraction: float, times: float) -> float:
-    r"""Return a contact fraction under another ratio of pressure to modulus times slope.
+    r"""Return a contact fraction after scaling the ratio of pressure to modulus times slope.
 
     Parameters
     ----------
@@ -316,8 +317,8 @@ def scaled_contact(fraction: float, times: float) -> float:
 
     Notes
     -----
-    Persson's theory has the fraction :math:`\mathrm{erf}(\sqrt 2\, p / (E^* h'))` under a nominal pressure ``p``, with
-    the root mean square slope ``h'`` [1]_.
+    In Persson's theory the fraction is :math:`\mathrm{erf}(\sqrt 2\, p / (E^* h'))` under a nominal pressure ``p``,
+    where ``h'`` is the root mean square slope [1]_.
 
     References
     ----------
@@ -327,7 +328,7 @@ def scaled_contact(fraction: float, times: float) -> float:
 
 
 def solved(rows: Rows) -> xr.DataArray:
-    """Return the heights that are solved on: of a loading in free space perhaps a part of the surface. [m]"""
+    """Return the heights on the solved grid, which in free space may be a part of the surface. [m]"""
     if not isinstance(rows, LoadingRows):
         return rows.problem.height
     along_x, along_y = rows.domain.cells
@@ -335,7 +336,7 @@ def solved(rows: Rows) -> xr.DataArray:
 
 
 def coarse_surface(rows: Rows) -> xr.DataArray:
-    """Return the heights that are solved on, on few cells along the longer side, with the waves that these hold. [m]"""
+    """Return the heights of the solved grid on few cells, with the waves that these cells resolve. [m]"""
     height = solved(rows)
     shape = height.sizes["x"], height.sizes["y"]
     factor = max(shape) / (_COARSE if isinstance(rows, LoadingRows) else _COARSE_CURVE)
@@ -352,7 +353,7 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
 
 
 def with_coarse_slides(program: Program, sides: tuple[float, float]) -> Program:
-    """Return the program with slides of at least one coarse cell, and not of many, at their speed."""
+    """Return the program with slides of one to some coarse cells at unchanged speed."""
     segments = []
     for segment in program.segments:
         if segment.slide is not None:
@@ -365,9 +366,9 @@ def with_coarse_slides(program: Program, sides: tuple[float, float]) -> Program:
 
 
 def _part_done(program: Program, now: float) -> float:
-    """Return the part of the steps that a program has taken by a time [s], slides left out. [-]
+    """Return the part of the steps before a time [s] over all steps of a program, without slides. [-]
 
-    A hold takes more steps early, and a cycle eight ramps a period.
+    The steps of a hold are shorter at its start, and a cycle has eight ramps per period.
     """
     done = total = 0.0
     for began, segment in zip(program.corners, program.segments, strict=False):
@@ -383,7 +384,7 @@ def _part_done(program: Program, now: float) -> float:
 
 
 def timed_convolution(rows: Rows, touching: float) -> float:
-    """Return the time of a convolution in a contact solve of few iterations, with its share of the solve. [s]
+    """Return the time of a contact solve of few iterations per convolution. [s]
 
     Parameters
     ----------
@@ -404,7 +405,7 @@ def timed_convolution(rows: Rows, touching: float) -> float:
     if not guess.any():
         guess = np.ones(gap.shape)
     times = []
-    for _ in range(2):  # the first one allocates
+    for _ in range(2):  # the first solve allocates memory
         began, before = time.thread_time(), grid.convolutions
         with suppress(ConvergenceError):
             few = {"tolerance": 1e-11, "max_iterations": _ITERATIONS, "present": present}
@@ -417,18 +418,18 @@ def timed_convolution(rows: Rows, touching: float) -> float:
 
 
 def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Available) -> dict[str, Any]:
-    """Return the costs of a case by a coarse run.
+    """Return the costs of a case from a coarse run.
 
     Parameters
     ----------
     case : Case
         The case.
     own : Rows
-        Its rows, of which none is computed.
+        Rows of the case, not computed.
     run : CoarseRun
-        Of this case or of a similar one.
+        Coarse run of this case or of a similar case.
     seconds : float
-        Time of what a run needs before its first step: surface, kernels, domain, material. [s]
+        Time before the first step of a run, for surface, kernels, domain and material. [s]
     there : Available
         Available memory.
     """
@@ -476,11 +477,11 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
     Parameters
     ----------
     case : Case
-        Fields and their precision.
+        Case, with its fields and their precision.
     cells : int
-        Of the surface.
+        Number of cells of the surface.
     rows, steps : float
-        Kept times, and accepted steps.
+        Numbers of kept times and of accepted steps.
     contact : float
         Mean part of the cells in contact at kept times.
     """
@@ -506,7 +507,7 @@ def _warning(own: Rows, fraction: float) -> str:
 
 
 def _work(cells: float) -> float:
-    """Return the work of a transform, in any unit."""
+    """Return the work of a transform, in an arbitrary unit."""
     return cells * math.log2(cells + 2)
 
 
@@ -514,7 +515,7 @@ def _work(cells: float) -> float:
 
 
 def _spread(count: int) -> list[int]:
-    """Return the integers below a count: first and last, then halves, quarters and so on between them."""
+    """Return the integers below a count in an order that spreads them: both ends, then halves, quarters and so on."""
     order = dict.fromkeys([0, count - 1])
     pieces = 2
     while len(order) < count:
@@ -524,12 +525,12 @@ def _spread(count: int) -> list[int]:
 
 
 def _distance(number: int, other: int, parameters: Mapping[str, Any]) -> tuple[int, int]:
-    """Return how many parameters of two cases differ, and how far they are apart in the sweep."""
+    """Return the number of different parameters of two cases, and the difference of their numbers in the sweep."""
     return sum(values[other] != values[number] for values in parameters.values()), abs(other - number)
 
 
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:
-    """Return totals, free memory and disk, and why the cases do not fit."""
+    """Return totals, free memory and disk, and the reason if the cases do not fit."""
     place = existing_part(folder.absolute())
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)

@@ -30,16 +30,17 @@ class Observable:
     Attributes
     ----------
     name : str
-        As in a result.
+        Name of the number in a result.
     derive : callable, optional
-        Gives it over the axis, from a result and the arguments of its observable. Default: the result contains it.
+        Returns the number over the axis, from a result and the arguments of its observable. Default: the result
+        contains the number.
     fields : tuple of str
-        Fields that it is derived from.
+        Fields that `derive` needs.
     octave_factor : float
-        Change by the next octave of waves, at most, over the change by the last one. The factors were chosen on 45
+        Largest change by the next octave of waves, over the change by the last octave. The factors were chosen on 45
         rough surfaces, and their coverage was measured on others (workflows/benchmarks/whole_error.py). [-]
     follows : {"pressure", "approach", "area", "gap"}
-        What its error follows.
+        Quantity whose stated error determines the error of the number.
     """
 
     name: str
@@ -49,15 +50,15 @@ class Observable:
     follows: Literal["pressure", "approach", "area", "gap"] = "pressure"
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
-        """Return its values in a result of a case, over the axis."""
+        """Return the values of the number in a result of a case, over the axis."""
         found = result[self.name] if self.derive is None else self.derive(result, case.observed)
         return np.asarray(found.values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
-        """Return the error of its logarithm by steps and solver, from the stated errors of the rows. [-]
+        """Return the error of the number's logarithm by steps and solver, from the stated errors of the rows. [-]
 
-        The mean gap of a periodic surface has the error of the approach. A leak rate changes by up to six times as
-        much as the mean gap, near the load that closes the gap. A conductance follows the contact area.
+        The mean gap of a periodic surface has the error of the approach. The relative change of a leak rate is up to
+        six times the change of the mean gap, near the load that closes the gap. A conductance follows the contact area.
         """
         relative = np.zeros_like(values)
         if self.follows == "area" and "contact_area_error" in result:
@@ -87,7 +88,7 @@ def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
 
 
 def _incremental_stiffness(result: xr.Dataset) -> xr.DataArray:
-    """Stiffness against a fast increment of load, with the instantaneous modulus."""
+    """Return the stiffness for a fast increment of load, with the instantaneous modulus."""
     body = Case.of_result(result).body
     compliance = float(body.material.contact_compliance(0.0))
     if compliance == 0:
@@ -146,7 +147,7 @@ def quantity_of(case: Case, name: str) -> Observable:
 def creep_time(experiment: Experiment, size: float) -> float:
     """Return the time during which the material under a surface creeps. [s]
 
-    It is the length of the program, or the time in which the surface slides by its `size` [m] at the lowest speed.
+    The time is the length of the program, or the time of sliding by the `size` [m] of the surface at the lowest speed.
     """
     if isinstance(experiment, Loading):
         return experiment.program.duration

@@ -33,7 +33,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     ----------
     values : xarray.DataArray
         A quantity with a dimension ``realisation``, such as ``results.contact_area`` of a sweep with ``realisations``,
-        in any unit. Realisation 0, a measured surface itself, is not counted among its surrogates.
+        in any unit. Realisation 0, the measured surface itself, does not count as one of its surrogates.
 
     Returns
     -------
@@ -42,24 +42,25 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
 
         - ``mean`` and ``standard_deviation`` (of the sample, with :math:`n - 1`);
         - ``lower`` and ``upper``, the interval of the mean;
-        - ``patch_lower`` and ``patch_upper``, the interval of one more patch, to which a single measurement belongs;
+        - ``patch_lower`` and ``patch_upper``, the interval of the value of one more patch, for a single measurement;
         - ``count``, the number of known values;
         - with realisation 0 its value ``itself``, and its ``ratio`` to the mean [-].
 
     Raises
     ------
     InputError
-        If there is no such dimension.
+        If the quantity has no dimension ``realisation``.
 
     Notes
     -----
-    Values that are not finite are missing. If all others are positive, the intervals are taken in logarithms, with the
-    mean :math:`m` and the standard deviation :math:`s` of the :math:`n` logarithms and Student's quantile :math:`t` of
-    :math:`n - 1`: that of the mean is :math:`m + s^2/2 \pm t \sqrt{s^2/n + s^4/(2(n-1))}` [1]_, which holds the mean
-    of log-normal values in 92 to 95 of 100 samples of 4 or more with :math:`s \le 1.2`; that of a patch is
-    :math:`m \pm t s \sqrt{1 + 1/n}`. With values of both signs they are those of Student. A quantity that is never
-    negative, but zero in some realisations, such as the leak rate of a closed gap, has no interval. Nor is there one of
-    fewer than two values.
+    Values that are not finite count as missing. If all other values are positive, both intervals are intervals of the
+    logarithm. Let :math:`m` and :math:`s` be the mean and the standard deviation of the :math:`n` logarithms, and
+    :math:`t` Student's quantile with :math:`n - 1` degrees of freedom. The interval of the mean is
+    :math:`m + s^2/2 \pm t \sqrt{s^2/n + s^4/(2(n-1))}` [1]_. It contains the mean of log-normal values in 92 to 95 of
+    100 samples of 4 or more values with :math:`s \le 1.2`. The interval of a patch is
+    :math:`m \pm t s \sqrt{1 + 1/n}`. For values of both signs Student's intervals of the values themselves are
+    returned. There is no interval for fewer than two values, or for a quantity that is never negative and is zero in
+    some realisations, such as the leak rate of a closed gap.
 
     References
     ----------
@@ -95,10 +96,10 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
 
 
 def statistics(values: Array) -> dict[str, Array]:
-    """Return what :func:`over_realisations` returns of values over (realisation, ...), without a surface itself."""
+    """Return the statistics of :func:`over_realisations` for values over (realisation, ...), without realisation 0."""
     values = np.where(np.isfinite(values), values, np.nan)
     count = np.isfinite(values).sum(axis=0)
-    with np.errstate(all="ignore"):  # a missing value or too few of them give NaN
+    with np.errstate(all="ignore"):  # missing values or too few values give NaN
         freedom = np.where(count > 1, count - 1, np.nan)
         student = stdtrit(freedom, 0.975)
         mean = np.nansum(values, axis=0) / count

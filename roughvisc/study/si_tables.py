@@ -34,19 +34,19 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     value : object
         A value, or a list or a table of values.
     key : str
-        Its dotted key.
+        Dotted key of the value.
     tables : mapping
         Tables of the case, for units that depend on another key.
 
     Returns
     -------
     object
-        The value with numbers for texts with a unit. Any other text is unchanged.
+        The value, in which numbers replace texts with a unit. Other texts are unchanged.
 
     Raises
     ------
     InputError
-        If an integer is larger than any number of double precision.
+        If an integer exceeds the largest number of double precision.
     """
     if isinstance(value, Mapping):
         return {name: in_si(one, f"{key}.{name}" if key else name, tables) for name, one in value.items()}
@@ -71,7 +71,7 @@ def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
     Parameters
     ----------
     key : str
-        Such as ``"program.0.load"``.
+        Dotted key, such as ``"program.0.load"``.
     case : mapping, optional
         The case as JSON, for units that depend on another key.
 
@@ -87,10 +87,10 @@ def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
 
 
 def _unit(key: str, tables: Mapping[str, Any]) -> str:
-    """Return the unit of the value at a dotted key, ``"1"`` of a pure number."""
+    """Return the unit of the value at a dotted key; ``"1"`` for a pure number."""
     table, *path = key.split(".")
     names = [part for part in path if not part.isdecimal()]
-    if not names or key == "keep.times":  # a number there is a count
+    if not names or key == "keep.times":  # a number in keep.times is a number of times
         return ""
     if table == "program" and not path[0].isdecimal():
         return ""

@@ -50,11 +50,11 @@ PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": 
 #: Table of each setting, and of the precision of the fields in a file.
 TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
 TABLE_OF |= dict.fromkeys(("fields", "times", "precision"), "keep")
-#: Fields of which an observable needs one.
+#: Observable -> fields, one of which it needs.
 _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
-#: Largest number of speeds between two ends.
+#: Largest number of speeds of ``from``, ``to`` and ``count``.
 _MOST_SPEEDS = 1000
-#: Part of its duration by which a kept time may exceed a program.
+#: Largest excess of a kept time over the end of a program, relative to the duration.
 _ROUNDING = 1e-12
 
 
@@ -64,9 +64,9 @@ class Column(NamedTuple):
     Attributes
     ----------
     heading, unit : str
-        Name in the heading, and unit in SI; without one, `unit_key` states the unit of the argument, too.
+        Name in the heading, and unit in SI. Without a unit, `unit_key` states the unit of the argument, too.
     unit_key : str
-        Key of the unit of the column, if the heading does not state it.
+        Key that states the unit of the column, if the heading does not.
     """
 
     heading: str
@@ -74,7 +74,7 @@ class Column(NamedTuple):
     unit_key: str
 
 
-#: Columns of each model that a CSV file may state.
+#: Columns of the CSV file of each model.
 COLUMNS: dict[str, dict[str, Column]] = {
     "creep_table": {
         "times": Column("time", "s", "time_unit"),
@@ -152,7 +152,7 @@ def _in_file(key: str, file: Any) -> Iterator[None]:
         yield
     except InputError as error:
         problem = str(error) if str(file) in str(error) else f"{file}: {error}"
-        if error.key.isidentifier():  # of an argument
+        if error.key.isidentifier():  # the name of an argument
             raise located(error, key) from error
         raise located(InputError(problem, found=file, expected=error.expected), key) from error
 
@@ -285,7 +285,7 @@ def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
 
 
 def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
-    """Return the factor of all times of a material at its temperature; one if none is stated."""
+    """Return the factor of all times of a material at its temperature; 1 without a temperature."""
     stated = split(table, *TEMPERATURE)[0]
     if not stated:
         return 1.0

@@ -1,4 +1,4 @@
-"""Sweeps: the changes that make each case of a study, and the realisations of its surface."""
+"""Sweeps: changes of a study for each of its cases, and the realisations of its surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roughvisc.arguments import a_table, dotted
 from roughvisc.errors import InputError, short_repr
 from roughvisc.topography.scans import is_card, read_toml
 
-#: Key of a sweep, and the key of the number of a realisation in a case.
+#: Keys of the number of realisations in a sweep, and of the number of a realisation in a case.
 REALISATIONS, REALISATION = "realisations", "realisation"
 #: Number of the measured surface, which comes before its surrogates.
 ITSELF = 0
@@ -25,7 +25,7 @@ MOST, MOST_CASES = 10_000, 100_000
 
 
 def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], dict[str, int]]]:
-    """Return the changes of a study that make each of its cases.
+    """Return the changes of a study for each of its cases.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
     Returns
     -------
     list of (dict, dict)
-        Dotted key -> value, and the number of the realisation of a case that is one.
+        Dotted key -> value; and the number of the realisation, if the case is a realisation.
 
     Raises
     ------
     InputError
-        If the tables are not lists of values, a pattern matches no file, there are too many cases, a key changes no
-        result, or the surface has no realisations.
+        If the tables are not lists of values, a pattern matches no file, there are too many cases, a key does not
+        influence results, or the surface has no realisations.
     """
     found: list[tuple[dict[str, Any], dict[str, int]]] = []
     named = [_with_files(one, folder) for one in sweep] if isinstance(sweep, list) else _with_files(sweep, folder)
@@ -112,7 +112,7 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
 def _with_files(table: Any, folder: Path) -> Any:
     """Return a table of a sweep with the names of files, sorted, for each pattern such as ``"scans/*.sur"``.
 
-    The name of an existing file is not taken for a pattern.
+    The name of an existing file is not a pattern.
     """
     if not isinstance(table, Mapping):
         return table
@@ -137,10 +137,10 @@ def _with_files(table: Any, folder: Path) -> Any:
 def _realisations(
     change: Mapping[str, Any], count: Any, data: Mapping[str, Any], folder: Path
 ) -> list[tuple[dict[str, Any], dict[str, int]]]:
-    """Return the changes that make each realisation of a case, and its number.
+    """Return the changes of a case for each of its realisations, and the number of each.
 
-    Realisation 0 of a scan is the scan itself, the others are its surrogates. Generated faces are made with
-    consecutive seeds, beginning with the stated ones.
+    Realisation 0 of a scan is the scan itself; the others are its surrogates. Generated faces have consecutive seeds,
+    beginning with the stated seeds.
     """
     where = f"sweep.{REALISATIONS}"
     if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
@@ -171,7 +171,7 @@ def _realisations(
     if not seeds:
         made = f"generate = {surface.get('generate')!r}"
         raise InputError(key=where, found=made, expected="a scan, or generate = 'self_affine'")
-    if 0 < max(seeds.values()) - min(seeds.values()) < count:  # one face would come again as the other one
+    if 0 < max(seeds.values()) - min(seeds.values()) < count:  # both faces would have some seeds in common
         expected = f"seeds of the two faces that are equal, or at least {count} apart"
         raise InputError(key=where, found=list(seeds.values()), expected=expected)
     return [

@@ -1,7 +1,7 @@
 """``choose``: the grid and the tolerance for a wanted error of a number.
 
-Grids are solved from coarse to fine until the errors of the grid, of the steps and of the other sources together are
-as small as wanted. The other sources, which no grid reduces, are estimated once, on the coarsest grid that resolves
+The case is solved on finer and finer grids until the total error of grid, steps and other sources is as small as
+wanted. The other sources do not depend on the grid. Their errors are estimated once, on the coarsest grid that resolves
 the waves of the surface.
 """
 
@@ -55,15 +55,15 @@ if TYPE_CHECKING:
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
-#: The tolerance over the target, at first and at least; the largest and the smallest that are chosen.
+#: First and smallest tolerance over the target; largest and smallest tolerance of all.
 _PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
 #: Level of the finest grid, whose cells are ``2**-2`` times as long as the study's; fewest cells a side of any grid.
 _FINEST, _FEWEST = -2, 12
-#: An error that exceeds the target by less is accepted, since both are rounded in print.
+#: Accepted ratio of an error to the target, since messages round both.
 _ROUNDING = 1.005
 #: Length of cells by level, in words.
 _LENGTHS = {1: "twice as long as", 0: "as long as", -1: "half as long as", -2: "a quarter as long as"}
-#: What reduces the error of a source.
+#: Remedy for the error of each source.
 _REMEDIES = {
     STEPS: "a smaller tolerance",
     GRID: "finer cells",
@@ -131,7 +131,7 @@ def run(
     progress: bool = True,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Return the result of the case that is chosen for wanted errors; see :func:`roughvisc.run`."""
+    """Choose grid and tolerance for wanted errors and return the result; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
     watch = partial(Display, progress, summary=False)
     chosen, reasons, budgets = choose(
@@ -160,17 +160,17 @@ def choose(
     case : Case
         Case whose grid and tolerance are changed.
     want : mapping
-        Number -> wanted relative error at 95 % [-]; also the errors that are known, as :func:`roughvisc.budget` takes
-        them.
+        Number -> wanted relative error at 95 % [-]; also known errors, under the names of the arguments of
+        :func:`roughvisc.budget`.
     folder : Path
-        Folder of the results. The solves go to its folder ``budget``, and are used again.
+        Folder of the results. The solves are stored in its folder ``budget``, and are not computed again.
     watch : callable
         Makes the display of a sweep.
     tell : callable
         Called with the error on each grid, as a sentence.
     client, workers, threads
-        As in :func:`roughvisc.sweep`, but without a client in this process by default: most solves wait for a coarser
-        one.
+        As in :func:`roughvisc.sweep`. Default without a client: this process, because most solves depend on a coarser
+        solve.
 
     Returns
     -------
@@ -184,8 +184,8 @@ def choose(
     Raises
     ------
     InputError
-        If a target is invalid or cannot be met: the message names the smallest error, its sources, and what would
-        reduce the largest of them.
+        If a target is invalid or cannot be met: the message names the smallest error, its sources, and a remedy for the
+        largest source.
     """
     targets = targets_of(want)
     observed = [quantity_of(case, name) for name in targets]
@@ -194,7 +194,7 @@ def choose(
     height, smallest = case.height(), min(targets.values())
     base = with_rows(case, [*case.settings.fields, *(field for one in observed for field in one.fields)])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
-    if case.settings.tolerance < Settings.tolerance:  # sharper than usual, on purpose
+    if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
         tolerance = min(tolerance, case.settings.tolerance)
     times, places = case.settings.times, None
     if case.experiment.axis == "time":
@@ -220,7 +220,7 @@ def choose(
         steps = max(error_of(one, [STEPS]) / math.log1p(targets[name]) for name, one in found.items())
         if before is None and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
-            continue  # steps and solver would take half of the target
+            continue  # steps and solver would use more than half of the target
         _refuse_missed(case, targets, found, "whatever the grid", _FLOOR)
         if all(error_of(one) <= _ROUNDING * math.log1p(targets[name]) for name, one in found.items()):
             break
@@ -247,7 +247,7 @@ def choose(
 def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
     """Return the largest error of the logarithm of a number by some sources of its budget, all by default. [-]
 
-    It is infinite without a row, or if a value has no logarithm.
+    The error is infinite without rows, or if a value has no logarithm.
     """
     part = budget if sources is None else budget.sel(source=list(sources))
     both = np.array([together(part, side) for side in (-1, 1)])
@@ -264,8 +264,8 @@ def _refuse_missed(
 ) -> None:
     """Refuse targets that cannot be met; the message names the sources, and a remedy for the largest.
 
-    With the budgets on the grid `before`, a target is missed if it is so even without a change on the next grid, whose
-    error is a part of the last change at least.
+    The error of the next grid is at least a part of the last change. With the budgets on the coarser grid, `before`, a
+    target is missed if even this smallest error exceeds it.
     """
     lines, first = [], ""
     for name, budget in budgets.items():

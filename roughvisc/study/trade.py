@@ -59,14 +59,14 @@ VARIABLES = {
 }
 #: Folder of the solves and of the table, in the folder of the results.
 FOLDER = "trade"
-#: Quantities that are compared without being requested, the most important first.
+#: Quantities that are compared by default, the most important first.
 _USUAL = ("friction_coefficient", "contact_area", "pressure", "approach", "mean_gap")
-#: Tolerances on the grid of the study; ``(coarsening, tolerance)`` of further settings.
+#: Default tolerances on the grid of the study; default ``(coarsening, tolerance)`` on coarser and finer grids.
 _TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
 _COARSER, _FINER = ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)), ((0.5, 1e-3), (0.25, 1e-3))
 #: Fewest cells a side of a coarser grid, and most of a finer one.
 _FEWEST, _MOST = 12, 1024
-#: The sharpest tolerance over the tolerance of the reference.
+#: Smallest tolerance of the settings over the tolerance of the reference.
 _SHARPER = 5.0
 #: Number of kept times if the study keeps all accepted steps, which differ between settings.
 _FEW = 9
@@ -94,13 +94,15 @@ def trade(
         Tolerances to measure, each with the length of the cells over the length in the study. Default: tolerances
         from 1e-1 to 1e-3, and coarser grids; also finer grids if the surface is a recipe without conditioning. [-]
     quantity : str or sequence of str
-        Numbers whose errors come first, or are compared on request: ``force``, ``leak_rate``, ``thermal_conductance``
-        or ``incremental_stiffness``. The table ``observe`` of the study states the fluid, or what is conducted.
+        Numbers whose errors are listed first. ``force``, ``leak_rate``, ``thermal_conductance`` and
+        ``incremental_stiffness`` are compared only if named here. The table ``observe`` of the study states the fluid
+        or the conductivities.
     budget : float or str
-        Total wall time of all solves. A setting that would exceed it is not measured, which the result states. [s]
+        Total wall time of all solves. A setting that would exceed the budget is not measured, and the result states
+        this. [s]
     out : path, optional
-        Folder of the solves, which are kept and used again, with their times. Default: ``trade`` in the folder of the
-        results.
+        Folder of the solves. They are kept with their times and not computed again. Default: ``trade`` in the folder of
+        the results.
     progress : bool
         Show a progress bar.
 
@@ -119,12 +121,13 @@ def trade(
 
     Notes
     -----
-    Settings are solved in this process one after the other, from the cheapest to the dearest. The reference is the
-    finest run: it has the finest grid of the settings that the time allows, and a fifth of their smallest tolerance, or
-    the smallest that the time allows. Its own uncertainty follows from the run with the next larger tolerance, and from
-    grids two and four times coarser, by Richardson extrapolation with Roache's safety factors. Pressures of two grids
-    are compared as means over the coarser cells. In a slide the profile moves by whole cells. Kept times within it are
-    those at which it has moved by whole cells of every grid, at least the beginning and the end.
+    Settings are solved in this process one after the other, from the cheapest to the most expensive. The reference is
+    the finest run. Its grid is the finest grid of the settings that the time allows. Its tolerance is a fifth of their
+    smallest tolerance, or the smallest that the time allows. The uncertainty of the reference follows from the run with
+    the next larger tolerance, and from grids two and four times coarser, by Richardson extrapolation with Roache's
+    safety factors. Pressures on two grids are compared as means over the coarser cells. In a slide the profile moves by
+    whole cells. Times in a slide are kept if the profile has moved by whole cells of every grid, which includes the
+    beginning and the end.
     """
     if not isinstance(case, Case):
         case = read_study(case)
@@ -152,7 +155,7 @@ def trade(
     base = _with_common_rows(case, height, fields, {grid for _, grid in wanted})
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
 
-    # relative work: the number of steps follows the root of the tolerance, iterations hardly change
+    # relative work: the number of steps grows with the inverse root of the tolerance, iterations hardly change
     axis = base.experiment.axis
     power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
     work = {(tolerance, grid): tolerance**-power / grid**2 for tolerance, grid in wanted}
@@ -176,7 +179,7 @@ def trade(
         spent, rate = spent + seconds, seconds / work[setting]
         derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
         results[setting] = result.assign(derived)
-    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # without the time for them, the sharpest run
+    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # otherwise the run with the smallest tolerance
     reference = next((one for one in (*candidates, *sorted(results)) if one in results and one[1] in finest), None)
     if reference is None:
         where = f"{case.origin}: " if case.origin else ""
@@ -185,7 +188,7 @@ def trade(
 
 
 def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
-    """Return the settings that are measured by default."""
+    """Return the default settings, as tolerance and coarsening."""
     rungs = [(tolerance, 1.0) for tolerance in _TOLERANCES]
     rungs += [(tolerance, grid) for grid, tolerance in _COARSER if min(shape) / grid >= _FEWEST]
     return rungs if data else rungs + [(one, grid) for grid, one in _FINER if max(shape) / grid <= _MOST]
@@ -241,7 +244,7 @@ def _compared(
     columns = {name: (VARIABLES[name].dims, [row[name] for row in rows]) for name in rows[0]}
     table = xr.Dataset(columns, {"quantity": list(names)})
     table = table.set_coords(["tolerance", "coarsening", "cells_x", "cells_y"])
-    # the error follows the tolerance, unevenly: hence the larger safety factor
+    # the error decreases unevenly with the tolerance, which requires the larger safety factor
     looser = min((one for one in results if one[0] > sharp and one[1] == finest), default=(math.inf, finest))
     by_steps = TWO_GRIDS * apart(looser) / (looser[0] / sharp - 1)
     second, third = (sharp, 2 * finest), (sharp, 4 * finest)
@@ -269,10 +272,11 @@ def _compared(
 
 
 def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return the differences of some quantities: the worst of the rows, over the largest value of the second result.
+    """Return the largest difference of each quantity over all rows, over the largest value of the second result.
 
-    For the pressure it is the absolute difference summed (L1) over the largest force. It is missing if the rows are at
-    other times. A quantity that is missing in both results, such as the friction before the load, is equal there.
+    The difference of pressures is the integral of the absolute difference (L1), over the largest force. Differences are
+    missing if the rows are at other times. A quantity that is missing in both results, such as the friction before
+    loading, counts as equal.
     """
     rows, errors = axis_of(wanted.variables), []
     if found[rows].shape != wanted[rows].shape or not np.allclose(found[rows], wanted[rows], rtol=1e-9, atol=0):
@@ -289,7 +293,7 @@ def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) ->
 
 
 def format_tolerance(value: float) -> str:
-    """Return a tolerance as a study file states it.
+    """Return a tolerance in the notation of study files.
 
     Examples
     --------
@@ -310,14 +314,14 @@ def _label(tolerance: float, coarsening: float, shape: tuple[int, int]) -> str:
 
 
 def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
-    """Return the Pareto front: settings that no other one beats in wall time without being beaten in accuracy.
+    """Return the mask of Pareto-optimal settings: every faster setting is less accurate.
 
     Errors count to two digits.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`trade`.
+        Result of :func:`trade`.
     quantity : str
         Quantity whose error counts.
     """
@@ -333,7 +337,7 @@ def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
 
 
 def uncertainty(dataset: xr.Dataset, quantity: str) -> float:
-    """Return the possible error of the reference; for a scan, on the grid of the scan. [-]"""
+    """Return the uncertainty of the reference; for a scan without the uncertainty of the grid. [-]"""
     parts = ("time",) if dataset.attrs.get("grid_is_data") else ("time", "grid")
     return float(sum(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity) for part in parts))
 
@@ -341,9 +345,9 @@ def uncertainty(dataset: xr.Dataset, quantity: str) -> float:
 def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     """Return the index of the fastest setting whose error is at most ``target``; None if there is none.
 
-    The error of a setting is the largest error at this and all sharper tolerances on the same grid, so that a chance
-    agreement does not count, plus the uncertainty of the reference. Another grid than the scan's is another surface,
-    and not chosen. Among settings of nearly equal times, the first is chosen.
+    The error of a setting is its largest error at this and all smaller tolerances on its grid, so that a chance
+    agreement does not count, plus the uncertainty of the reference. For a scan only settings on its own grid are
+    chosen, because another grid means another surface. Among settings of nearly equal times the first is chosen.
     """
     error, spent = dataset["error"].sel(quantity=quantity).values, dataset["run_time"].values
     tolerance, coarsening = dataset["tolerance"].values, dataset["coarsening"].values
@@ -368,7 +372,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the file is absent or is something else.
+        If the file is absent or was not written by ``roughvisc trade``.
     """
     if not is_trade(path):
         raise InputError(key=str(path), found="no trade", expected="a file that roughvisc trade wrote (.nc)")
@@ -377,7 +381,7 @@ def open_trade(path: str | Path) -> xr.Dataset:
 
 
 def is_trade(path: str | Path) -> bool:
-    """Return whether a file is one that ``roughvisc trade`` wrote."""
+    """Return whether a file was written by ``roughvisc trade``."""
     try:
         with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
             return "run_time" in file and "quantity" in file.dims
