@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import xarray as xr
 
@@ -82,7 +82,7 @@ def simulate(
         ``grid_error_area`` and others at the output times. ``auto``: from 256 x 256 to 512 x 512
         cells, if the pressure is kept; the run takes at most a third of the time there.
     numerics : Numerics
-        Settings that are rarely changed: length of the time steps.
+        Settings that are rarely changed: length of the time steps, device.
     threads : int, optional
         Number of threads for a large grid; the result does not depend on it. Default: the value of
         ``scipy.fft.set_workers``, or else all cores that the process may use, but one thread if other threads run or in
@@ -118,10 +118,8 @@ def simulate(
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """
-    if not isinstance(numerics, Numerics):
-        raise InputError(f"numerics is {numerics!r}: expected rv.Numerics(...)")
     settings = Settings(
-        **vars(numerics),
+        **_stated(numerics),
         boundary=boundary,
         tolerance=tolerance,
         times=times,
@@ -147,6 +145,7 @@ def friction(
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] = (),
     grid_error: bool | Literal["auto"] = Settings.grid_error,
+    numerics: Numerics = Numerics(),
     threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
@@ -177,6 +176,8 @@ def friction(
         Whether to estimate the grid errors ``grid_error_friction`` and ``grid_error_area`` from the same curve on cells
         twice and four times as long. It takes about a third more time. ``auto``: from
         256 x 256 to 512 x 512 cells.
+    numerics : Numerics
+        Settings that are rarely changed; here the device.
     threads : int, optional
         As in :func:`roughvisc.simulate`.
     progress : bool or callable
@@ -218,10 +219,19 @@ def friction(
     1
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
-    settings = Settings(boundary=boundary, tolerance=tolerance, fields=fields, grid_error=grid_error)
+    settings = Settings(
+        **_stated(numerics), boundary=boundary, tolerance=tolerance, fields=fields, grid_error=grid_error
+    )
     problem = Problem(height, body_of(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
     return _warned(found.assign_attrs(title="Steady sliding"), 4)
+
+
+def _stated(numerics: Numerics) -> dict[str, Any]:
+    """Return the settings of a ``Numerics``; anything else is refused."""
+    if not isinstance(numerics, Numerics):
+        raise InputError(f"numerics is {numerics!r}: expected rv.Numerics(...)")
+    return vars(numerics)
 
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:

@@ -21,6 +21,7 @@ from roughvisc.variables import FIELDS
 Boundary = Literal["auto", "free", "periodic", "mirror"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
+Device = Literal["cpu", "gpu"]
 
 #: Settings whose values are words.
 WORDS: dict[str, tuple[str, ...]] = {
@@ -48,6 +49,8 @@ class Numerics:
     ----------
     time_step : "auto" or float or str
         Steps chosen by the tolerance, or a fixed step length. [s]
+    device : {"cpu", "gpu"}
+        Where fields are computed. A GPU needs CuPy; results agree with those of a CPU within the tolerance.
 
     Raises
     ------
@@ -61,8 +64,11 @@ class Numerics:
     """
 
     time_step: float | str = "auto"
+    device: Device = "cpu"
 
     def __post_init__(self) -> None:
+        if self.device not in get_args(Device):
+            raise InputError(key="device", found=self.device, expected="'cpu' or 'gpu'")
         if self.time_step != "auto":
             try:
                 step = number(self.time_step, "s", "time_step", above=0)
@@ -80,7 +86,7 @@ class Settings(Numerics):
     ----------
     boundary, tolerance, times, fields, edge, missing, grid_error
         As in :func:`roughvisc.simulate`; any sequence of times or fields becomes a tuple.
-    time_step
+    time_step, device
         As in :class:`Numerics`.
 
     Raises

@@ -111,6 +111,12 @@ fft = SimpleNamespace(
 )
 
 
+#: One device with 8 GiB, all of it free.
+cuda = SimpleNamespace(
+    runtime=SimpleNamespace(getDeviceCount=lambda: 1, memGetInfo=lambda: (8 << 30, 8 << 30)),
+)
+
+
 def asarray(values):
     """Return an array on the device."""
     return values if isinstance(values, DeviceArray) else DeviceArray(np.array(values))

@@ -22,6 +22,7 @@ USUAL = {
     "boundary": "auto",
     "tolerance": 1e-3,
     "time_step": "auto",
+    "device": "cpu",
     "times": None,
     "fields": ("pressure", "gap"),
     "missing": "refuse",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,11 +75,20 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.option("--no-plots", is_flag=True, help="Draw no figures.")
 @click.option("--workers", type=click.IntRange(0), help="Parallel processes; 0: this one only. [default: one per core]")
 @click.option("--threads", type=click.IntRange(1), help="Threads per case on a large grid. [default: all cores]")
+@click.option("--device", type=click.Choice(["cpu", "gpu"]), help="Where fields are computed. [default: as stated]")
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
 @click.option("--scheduler-file", type=PATH, help="Scheduler file written by a Dask scheduler.")
 @click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
 @QUIET
-def run(study: Path, out: Path | None, targets: tuple[str, ...], no_plots: bool, quiet: bool, **settings: Any) -> None:
+def run(
+    study: Path,
+    out: Path | None,
+    targets: tuple[str, ...],
+    no_plots: bool,
+    quiet: bool,
+    device: str | None,
+    **settings: Any,
+) -> None:
     """Compute all cases of a study file.
 
     Writes one NetCDF file per case, named by the key of the case. A single case also gets two figures. The cases of a
@@ -100,6 +110,8 @@ def run(study: Path, out: Path | None, targets: tuple[str, ...], no_plots: bool,
     from roughvisc.study.execution.run import result_folder
 
     cases = rv.read_cases(study)
+    if device is not None:
+        cases = [replace(rv.vary(case, {"solve.device": device}), varied=case.varied) for case in cases]
     if targets and len(cases) > 1:
         raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
     folder, console = result_folder(cases[0], out, to_write=False), screen(quiet)

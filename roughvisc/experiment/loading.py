@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -28,7 +28,7 @@ from roughvisc.experiment.warnings import loading_warnings
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.neighbours import contact_area
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.layer_memory import check_convergence
 from roughvisc.mechanics.memory import History
@@ -139,6 +139,7 @@ class LoadingRows(Rows):
         self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
     ) -> None:
         height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
+        xp = arrays_of(settings.device)
         require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory=in_memory)
         profile = Profile(height, settings.missing, body.kernel)
         program = program.on_area(profile.area)
@@ -149,24 +150,27 @@ class LoadingRows(Rows):
         self.area, self._profile, self.domain = profile.area, surface.profile, surface.domain
         self.reaches_border = surface.reaches_border
         self.problem = replace(problem, height=surface.profile.height)
-        self._start = state or LoadingState(enlarged=surface.enlarged)
+        self._start = on_device(state, xp) if state else LoadingState(enlarged=surface.enlarged)
         self._border = self._start.border
 
         profile, cells = surface.profile, surface.domain.cells
-        gap = np.ascontiguousarray(profile.gap[cells])
-        grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel)
+        gap, present = np.ascontiguousarray(profile.gap[cells]), None
+        if not profile.all_present:
+            present = profile.present[cells]
+        self._gap, self._present, shape = gap, present, (gap.shape[0], gap.shape[1])
+        grid = Grid(shape, profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
         options = memory_options(program, settings)
         self.choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
         log.info("memory: %s", self.choice.note)
         self.scene = Scene(
             grid=grid,
-            gap=gap,
+            gap=xp.asarray(gap),
             memory=self.choice.memory,
             program=program,
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
             time_step=None if settings.time_step == "auto" else settings.time_step,
-            present=None if profile.all_present else profile.present[cells],
+            present=None if present is None else xp.asarray(present),
         )
         if isinstance(body, LayeredBody):
             check_convergence(body, self.scene)
@@ -235,16 +239,16 @@ class LoadingRows(Rows):
             Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
         """
         scene, profile, domain, point = self.scene, self._profile, self.domain, step.point
-        contact, grid, is_whole = point.pressure > 0, scene.grid, domain.is_whole
-        present = scene.memory.displacement(point.history)
-        displacement, effective = present[0], present[-1]
-        gap = np.maximum(scene.gap + displacement - point.approach, 0.0)
+        grid, is_whole, displaced = scene.grid, domain.is_whole, scene.memory.displacement(point.history)
+        pressure, on_host = to_host(point.pressure), to_host(displaced)
+        contact, displacement, effective = pressure > 0, on_host[0], on_host[-1]
+        gap = np.maximum(self._gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0
 
         # Counting cells overestimates the area by a part of the strip along the perimeter, where contact ends within
         # the material. If the material itself ends, at an absent cell or at the border of a scan in free space, the
         # edge of the contact is known and the count is exact. A mirror plane is not an edge: cells adjoin their images.
-        free, goes_on = ~contact if scene.present is None else scene.present & ~contact, not is_whole
+        free, goes_on = ~contact if self._present is None else self._present & ~contact, not is_whole
         counted, area = contact_area(contact, free, grid.cell_area, grid.boundary == "periodic", goes_on, goes_on)
 
         is_full = is_whole and np.count_nonzero(contact) == np.count_nonzero(profile.present)
@@ -267,19 +271,20 @@ class LoadingRows(Rows):
         }
         if scene.motions:
             slide = scene.motions[step.segment]
-            friction = tangential_force(grid, point.pressure, displacement, slide)
+            friction = tangential_force(grid, point.pressure, displaced[0], slide)
             row |= {
                 "sliding_distance": step.state.distance,
                 "friction_force": friction,
                 "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
-                "friction_force_across": tangential_force(grid, point.pressure, displacement, slide, across=True),
+                "friction_force_across": tangential_force(grid, point.pressure, displaced[0], slide, across=True),
                 "friction_force_error": step.difference.friction,
             }
         if not kept:
             return row, {}
-        row |= stated | {"contact_area_error": area_error(step, scene, gap, counted, area)}
+        area_off = area_error(step, scene, pressure, gap, self._present, counted, area)
+        row |= stated | {"contact_area_error": area_off}
 
-        names, fields, pressure = self.problem.settings.fields, {}, point.pressure
+        names, kept_fields = self.problem.settings.fields, {}
         if is_whole:
             gap = np.where(profile.present, gap, np.nan)
         else:
@@ -291,8 +296,8 @@ class LoadingRows(Rows):
                 opening[domain.cells] = gap
                 displacement, gap = whole, opening
         for name in names:
-            fields[name] = {"pressure": pressure, "displacement": displacement, "gap": gap}[name]
-        return row, fields
+            kept_fields[name] = {"pressure": pressure, "displacement": displacement, "gap": gap}[name]
+        return row, kept_fields
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result with the cost of each row, the nominal pressure and the attributes.
@@ -317,6 +322,17 @@ class LoadingRows(Rows):
         if text := warnings_text(warnings):
             attributes["warnings"] = text
         return dataset.assign_attrs(attributes)
+
+
+def on_device(value: Any, xp: Any) -> Any:
+    """Return a state of a march with its arrays in a namespace, NumPy or CuPy; a checkpoint has those of NumPy."""
+    if isinstance(value, np.ndarray):
+        return xp.asarray(value)
+    if isinstance(value, tuple):
+        return tuple(on_device(part, xp) for part in value)
+    if isinstance(value, STATES):
+        return replace(value, **{part.name: on_device(getattr(value, part.name), xp) for part in fields(value)})
+    return value
 
 
 def check_program(profile: Profile, body: Body, program: Program, settings: Settings) -> None:

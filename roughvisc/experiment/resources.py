@@ -17,6 +17,7 @@ from scipy import fft
 from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.rows import memory_options
 from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.grid import arrays_of
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.memory_choice import choose_memory
@@ -55,8 +56,11 @@ class Available:
         return needed <= PART * self.size
 
 
-def memory_available() -> Available:
-    """Return the memory available to this process, and the origin of the limit."""
+def memory_available(device: str = "cpu") -> Available:
+    """Return the memory of a device that is available to this process, and the origin of the limit."""
+    if device == "gpu":
+        free, _ = arrays_of(device).cuda.runtime.memGetInfo()
+        return Available(float(free), "free on the GPU")
     import psutil
     from distributed import get_worker  # slow to import
     from distributed.system import MEMORY_LIMIT
@@ -207,7 +211,9 @@ def require_loading(
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     in_file = partial(march_bytes, settings, memory, rows=rows, part=part)
-    require_memory(shape, partial(in_file, in_memory=in_memory), in_file)
+    if settings.device == "gpu":  # kept fields are on the host
+        in_memory = False
+    require_memory(shape, partial(in_file, in_memory=in_memory), in_file, settings.device)
 
 
 def require_surface(shape: Any) -> None:
@@ -216,16 +222,19 @@ def require_surface(shape: Any) -> None:
 
 
 def require_memory(
-    shape: tuple[int, int], needed: Callable[[float], float], in_file: Callable[[float], float] | None = None
+    shape: tuple[int, int],
+    needed: Callable[[float], float],
+    in_file: Callable[[float], float] | None = None,
+    device: str = "cpu",
 ) -> None:
-    """Check that a case fits in the available memory; see :func:`too_large` for the parameters.
+    """Check that a case fits in the available memory of a device; see :func:`too_large` for the parameters.
 
     Raises
     ------
     TooLargeError
         If it does not. The message gives the needed and the available memory, and cases that fit.
     """
-    if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(), in_file)):
+    if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(device), in_file)):
         raise TooLargeError(why)
 
 

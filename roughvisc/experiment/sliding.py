@@ -32,7 +32,7 @@ from roughvisc.experiment.warnings import (
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import contact_area, faces_between
-from roughvisc.mechanics.grid import Boundary
+from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
@@ -215,7 +215,8 @@ class SlidingRows(Rows):
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
         self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
         profile = Profile(problem.height, "refuse")
-        require_memory((profile.gap.shape[0], profile.gap.shape[1]), partial(curve_bytes, problem.settings))
+        shape, settings = (profile.gap.shape[0], profile.gap.shape[1]), problem.settings
+        require_memory(shape, partial(curve_bytes, settings), device=settings.device)
         if not profile.all_present:  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
         self.problem, self.end, self._profile = replace(problem, height=profile.height), len(curve.speeds), profile
@@ -232,17 +233,21 @@ class SlidingRows(Rows):
 
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
-        grid, tolerance = self._grids[0], self._settings.tolerance
+        grid, tolerance, xp = self._grids[0], self._settings.tolerance, arrays_of(self._settings.device)
         for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
             speed = self._curve.speeds[number]
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
             slides, states = [], []
             for cells in self._grids:
-                slides.append(Sliding(law, cells.gap.shape, cells.spacing, speed))
-                states.append(steady_state(slides[-1], cells.gap, self._force, tolerance=tolerance))
-            found, creep = states[0], 0.0
+                slides.append(Sliding(law, cells.gap.shape, cells.spacing, speed, xp))
+                states.append(steady_state(slides[-1], xp.asarray(cells.gap), self._force, tolerance=tolerance))
+            across, creep = slides[0].force(states[0].pressure, axis=1), 0.0
+            states = [
+                replace(one, pressure=to_host(one.pressure), displacement=to_host(one.displacement)) for one in states
+            ]
+            found = states[0]
             row, fields = self._row(found)
-            row["friction_force_across"] = slides[0].force(found.pressure, axis=1)
+            row["friction_force_across"] = across
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, states)
             if not found.converged:

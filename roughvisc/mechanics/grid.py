@@ -54,6 +54,40 @@ def namespace(array: Array) -> Any:
     return cupy
 
 
+def arrays_of(device: str) -> Any:
+    """Return the module whose arrays a device computes with: NumPy, or CuPy for a GPU.
+
+    Parameters
+    ----------
+    device : {"cpu", "gpu"}
+        Where fields are computed.
+
+    Raises
+    ------
+    InputError
+        If CuPy is not installed or finds no GPU.
+    """
+    if device == "cpu":
+        return np
+    expected = "'cpu'"
+    try:
+        import cupy
+
+        if cupy.cuda.runtime.getDeviceCount() > 0:
+            return cupy
+        reason = "CuPy finds none on this machine"
+    except ImportError:
+        reason, expected = "CuPy is not installed", "'cpu', or CuPy: pip install 'roughvisc[gpu]'"
+    except RuntimeError as error:  # of the CUDA driver
+        reason = f"CuPy finds none on this machine ({error})"
+    raise InputError(f"device is 'gpu', and {reason}: expected {expected}", key="device", found="gpu")
+
+
+def to_host(array: Array) -> np.ndarray:
+    """Return an array of NumPy: the array itself, or a copy of an array on a device."""
+    return array if isinstance(array, np.ndarray) else array.get()
+
+
 class Grid:
     """Rectangular cells of a body's surface. Two threads may not use one grid at the same time.
 

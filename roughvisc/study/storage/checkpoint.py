@@ -25,6 +25,7 @@ from xarray.backends import BackendArray
 from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
 
 from roughvisc.experiment.loading import STATES
+from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.case import NUMERICS_REVISION
 from roughvisc.study.storage.folder import atomic_write
@@ -231,17 +232,17 @@ def _read(path: Path) -> tuple[Any, dict[str, Array]]:
 
 def _flatten(value: Any, arrays: dict[str, Array], seen: dict[int, str]) -> Any:
     """Return a value as JSON knows it; its arrays are put into ``arrays`` under names, the same array once."""
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.generic):
+        return value.item()
+    if hasattr(value, "dtype"):  # an array of NumPy or CuPy
         name = seen.setdefault(id(value), f"array{len(arrays)}")
-        arrays[name] = value
+        arrays[name] = to_host(value)
         return {"array": name}
     if is_dataclass(value):
         parts = {field.name: _flatten(getattr(value, field.name), arrays, seen) for field in fields(value)}
         return {"type": type(value).__name__, "parts": parts}
     if isinstance(value, tuple):
         return {"tuple": [_flatten(part, arrays, seen) for part in value]}
-    if isinstance(value, np.generic):
-        return value.item()
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")

@@ -1,0 +1,144 @@
+"""``device = "gpu"``: a stand-in for CuPy gives the results of NumPy to rounding; without a GPU a run is refused."""
+
+import sys
+from types import SimpleNamespace
+
+import device
+import numpy as np
+import pytest
+from support import refused
+
+import roughvisc as rv
+from roughvisc.cli import main
+from roughvisc.experiment.base import Problem
+from roughvisc.experiment.loading import Loading
+from roughvisc.mechanics.body import body_of
+from roughvisc.settings import Settings
+from roughvisc.solve import solve
+from roughvisc.study.storage.checkpoint import CheckpointWriter
+
+ZENER = rv.zener(1e6, 1e6, 1e5)
+ROUGH = rv.self_affine((1e-3, 0.8e-3), (22, 17), hurst=0.8, rms_slope=0.05, shortcut=1.5e-4, seed=4)
+PRESS = rv.Program().pressure(2e4, over=0).hold(0.3).pressure(5e3, over=0.1)
+GPU = rv.Numerics(device="gpu")
+
+
+@pytest.fixture
+def gpu(monkeypatch):
+    """The stand-in in CuPy's place, which must be used; SciPy transforms on both."""
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
+    asarray, shapes = device.asarray, []
+    monkeypatch.setattr(
+        device, "asarray", lambda values: (shapes.append(getattr(values, "shape", ())), asarray(values))[1]
+    )
+    yield device.install(monkeypatch)
+    assert shapes
+
+
+def holed():
+    values = ROUGH.values.copy()
+    values[3:6, :4] = np.nan
+    return ROUGH.copy(data=values)
+
+
+SCENES = {
+    "part of a ball": (rv.sphere(1e-3, 1e-3, 71), ZENER, rv.Program().load(1e-4, over=0.1).hold(0.2), {}),
+    "periodic": (ROUGH, ZENER, PRESS, {"boundary": "periodic"}),
+    "mirror, absent cells": (holed(), ZENER, PRESS, {"boundary": "mirror", "missing": "absent"}),
+    "slide": (ROUGH, ZENER, rv.Program().pressure(2e4, over=0.1).slide(2e-4, speed=1e-3), {"boundary": "periodic"}),
+    "sheet": (ROUGH, rv.sheet(ZENER, 2e-4), PRESS, {"boundary": "mirror"}),
+    "layer": (ROUGH, rv.layer(ZENER, 1e-4, on=rv.elastic(5e6)), PRESS, {"boundary": "periodic"}),
+    "soft": (ROUGH, rv.kelvin_voigt(1e6, 1e5), rv.Program().pressure(2e4, over=0.1), {"boundary": "periodic"}),
+    "grid error": (ROUGH, ZENER, PRESS, {"boundary": "periodic", "grid_error": True}),
+}
+FIELDS = ("pressure", "gap", "displacement")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_simulate__on_a_device_gives_what_a_cpu_gives(gpu, name):
+    height, body, program, settings = SCENES[name]
+    settings = {"times": 4, "fields": FIELDS, "progress": False, **settings}
+    found, expected = (rv.simulate(height, body, program, numerics=one, **settings) for one in (GPU, rv.Numerics()))
+    for variable in expected.data_vars:
+        if variable != "wall_time":
+            scale = float(abs(expected[variable]).max()) or 1.0
+            np.testing.assert_allclose(
+                found[variable], expected[variable], rtol=0, atol=1e-8 * scale, err_msg=str(variable)
+            )
+    assert found.attrs["memory"] == expected.attrs["memory"]
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "mirror"])
+def test_friction__on_a_device_is_that_of_a_cpu(gpu, boundary):
+    settings = {"pressure": 2e4, "speeds": [1e-3, 1e-2], "boundary": boundary, "fields": ("pressure", "gap")}
+    found, expected = (
+        rv.friction(ROUGH, ZENER, numerics=one, progress=False, **settings) for one in (GPU, rv.Numerics())
+    )
+    for variable in ("friction_force", "friction_force_across", "approach", "contact_area", "pressure", "gap"):
+        scale = float(abs(expected[variable]).max())
+        np.testing.assert_allclose(found[variable], expected[variable], rtol=0, atol=1e-7 * scale, err_msg=variable)
+
+
+@pytest.mark.parametrize("name", ["part of a ball", "slide", "layer", "soft"])
+def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name, tmp_path):
+    height, body, program, settings = SCENES[name]
+    settings = Settings(times=6, **({"boundary": "free"} | settings), device="gpu")
+    problem = Problem(height, body_of(body), settings)
+    whole = solve(problem, Loading(program))
+    count = iter(range(1000))
+    stopped = CheckpointWriter(tmp_path / "run", "key", steps=1, stop=lambda: next(count) == 4)
+    with pytest.raises(KeyboardInterrupt):
+        solve(problem, Loading(program), stopped)
+    stopped.close()
+    resumed = CheckpointWriter(tmp_path / "run", "key")
+    resumed.resume()
+    assert 0 < resumed.latest.done < program.duration
+    found = solve(problem, Loading(program), resumed).load()
+    resumed.close()
+    for variable in ("pressure", "force", "approach", "stated_error"):
+        np.testing.assert_array_equal(found[variable], whole[variable], err_msg=variable)
+
+
+def test_surface__that_exceeds_the_memory_of_the_device_is_refused(monkeypatch):
+    gpu = device.install(monkeypatch)
+    monkeypatch.setattr(gpu.cuda.runtime, "memGetInfo", lambda: (10 << 20, 8 << 30))
+    large = rv.from_array(np.random.default_rng(1).random((512, 512)), spacing=1.0)
+    with pytest.raises(rv.TooLargeError, match="free on the GPU"):
+        rv.simulate(large, ZENER, PRESS, boundary="periodic", numerics=GPU, progress=False)
+
+
+NO_DEVICE = SimpleNamespace(cuda=SimpleNamespace(runtime=SimpleNamespace(getDeviceCount=lambda: 0)))
+
+
+@pytest.mark.parametrize(("cupy", "expected"), [(None, "roughvisc[gpu]"), (NO_DEVICE, "finds none on this machine")])
+def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeypatch, tmp_path, capsys, cupy, expected):
+    monkeypatch.setitem(sys.modules, "cupy", cupy)
+    study = tmp_path / "study.toml"
+    study.write_text(
+        """[surface]
+generate = "sphere"
+radius = "1 mm"
+size = "0.2 mm"
+shape = 15
+[material]
+model = "zener"
+shear_modulus = "1 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+load = "0.1 mN"
+over = "0.1 s"
+"""
+    )
+    with pytest.raises(SystemExit) as ended:
+        main(["run", str(study), "--device", "gpu"])
+    assert ended.value.code == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "device" in said
+    assert expected in said
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_device__of_an_unknown_name_is_refused():
+    with refused("device", "tpu"):
+        rv.Numerics(device="tpu")

@@ -1,0 +1,100 @@
+"""Check and time a GPU: python workflows/benchmarks/gpu.py [--sizes 512 1024 2048 4096 8192] [--seconds 240]
+
+Each scene runs on the GPU, and up to 1,024 squared also on one core of the CPU: the pressures of both are compared (L1
+norm, over the tolerance; expected: below a hundredth). ``pairs`` is the time of all convolutions over the time of as
+many bare pairs of transforms. Sizes are left out when the time is used up. Needs CuPy (``roughvisc[gpu]``).
+"""
+
+import argparse
+import time
+from functools import partial
+
+import numpy as np
+from scipy import fft
+
+import roughvisc as rv
+from roughvisc.mechanics.grid import arrays_of, transforms
+
+TOLERANCE = 1e-3
+RUBBER = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
+#: Cells a side up to which a scene also runs on the CPU.
+COMPARED = 1024
+
+
+def rough(cells):
+    """A periodic rough surface whose shortest waves have eight cells."""
+    shortest = 8e-3 / cells
+    return rv.self_affine(1e-3, cells, hurst=0.8, rms_slope=0.1, rolloff=2.5e-4, shortcut=shortest, seed=1)
+
+
+def creep(height, numerics):
+    program = rv.Program().pressure("20 kPa", over="10 ms").hold("500 ms")
+    settings = {"boundary": "periodic", "times": 20, "fields": ("pressure",), "tolerance": TOLERANCE}
+    return rv.simulate(height, RUBBER, program, numerics=numerics, grid_error=False, progress=False, **settings)
+
+
+def elastic(height, numerics):
+    program = rv.Program().pressure("20 kPa", over=0)
+    settings = {"boundary": "periodic", "fields": ("pressure",), "tolerance": TOLERANCE, "grid_error": False}
+    return rv.simulate(height, rv.elastic(3e6), program, numerics=numerics, progress=False, **settings)
+
+
+def friction(height, numerics):
+    settings = {"pressure": "20 kPa", "speeds": ["10 mm/s"], "fields": ("pressure",), "tolerance": TOLERANCE}
+    return rv.friction(height, RUBBER, numerics=numerics, grid_error=False, progress=False, **settings)
+
+
+SCENES = {"creep": creep, "elastic": elastic, "friction": friction}
+
+
+def seconds(run):
+    """Return the wall time of a call and its result."""
+    began = time.perf_counter()
+    found = run()
+    return time.perf_counter() - began, found
+
+
+def bare_pair(cells, xp):
+    """Return the wall time of a pair of bare transforms in double precision. [s]"""
+    both, field = transforms(1, xp), xp.asarray(np.random.default_rng(1).random((cells, cells)))
+
+    def pairs(count):
+        for _ in range(count):
+            found = both.waves_back(both.waves(field), field.shape)
+        float(found.sum())  # waits for the device
+
+    pairs(2)
+    return seconds(lambda: pairs(10))[0] / 10
+
+
+def measure(sizes=(512, 1024, 2048, 4096, 8192), limit=240.0, scenes=tuple(SCENES)):
+    """Yield a record for each scene and size, as long as the time lasts. [s]"""
+    began, gpu = time.perf_counter(), rv.Numerics(device="gpu")
+    xp = arrays_of("gpu")
+    for scene in scenes:
+        SCENES[scene](rough(64), gpu)  # compiles the kernels
+    for cells in sizes:
+        height, pair = rough(cells), bare_pair(cells, xp)
+        for scene in scenes:
+            if time.perf_counter() - began > limit:
+                return
+            took, found = seconds(partial(SCENES[scene], height, gpu))
+            record = {"scene": scene, "cells": cells, "gpu_s": took}
+            record["pairs"] = took / (float(found.convolutions.sum()) * pair)
+            if cells <= COMPARED:
+                with fft.set_workers(1):
+                    record["cpu_s"], expected = seconds(partial(SCENES[scene], height, rv.Numerics()))
+                record["ratio"] = record["cpu_s"] / took
+                apart = np.abs(found.pressure.values - expected.pressure.values).sum((1, 2))
+                largest = float(expected.pressure.values.sum((1, 2)).max())
+                record["apart"] = float(apart.max()) / largest / TOLERANCE
+            yield record
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[512, 1024, 2048, 4096, 8192])
+    parser.add_argument("--seconds", type=float, default=240.0)
+    given = parser.parse_args()
+    for row in measure(given.sizes, given.seconds):
+        print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)
