@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 class Kernel(Protocol):
     """Displacement of a surface under pressure, at unit contact compliance.
 
-    The surface is the same everywhere, and its own mirror image in x and y. A class needs two methods:
+    The body is homogeneous along its surface, and symmetric in x and y. A class needs two methods:
     :meth:`influence` for free space, :meth:`transfer` for periodic boundaries and the preconditioner. Both describe one
     linear, symmetric and positive operator. The other methods are inherited. A kernel is a value: frozen, and equal to
     another one with the same parameters.
@@ -39,8 +39,8 @@ class Kernel(Protocol):
     Attributes
     ----------
     raises_surface : bool
-        Whether pressure may raise the surface anywhere. Default: it may. Otherwise no point deeper than the approach
-        touches, and a window follows the contact in free space.
+        Whether pressure may raise the surface anywhere. Default: True. If False, no point deeper than the approach
+        touches, and in free space the contact is solved on a part of the surface.
     """
 
     raises_surface: bool = True
@@ -54,7 +54,7 @@ class Kernel(Protocol):
         shape : tuple of int
             Number of cells ``(nx, ny)``, counted from the one at the origin.
         spacing : tuple of float
-            Cell sides ``(dx, dy)``. Any are possible: coarser cells are requested too. [m]
+            Cell sides ``(dx, dy)``. They may be longer than on the grid of the surface. [m]
 
         Returns
         -------
@@ -79,7 +79,7 @@ class Kernel(Protocol):
         """
 
     def check_cells(self, spacing: tuple[float, float]) -> None:
-        """Refuse cells on which :meth:`influence` is not accurate; default: none. Called for the grid of a surface.
+        """Refuse cells on which :meth:`influence` is inaccurate. Default: accept all cells.
 
         Parameters
         ----------
@@ -151,9 +151,9 @@ def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[fl
 
     Notes
     -----
-    Every offset of the padded grid is filled with the kernel, also the one at half its length that no pair of
-    cells has: with a zero there the symbol turns negative for slender cells (aspect 16: -1.5) and its inverse
-    is no preconditioner.
+    The kernel fills every offset of the padded grid, even the offset at half its length, at which no pair of cells
+    lies. With a zero there the symbol becomes negative for slender cells (aspect 16: -1.5), and its inverse is useless
+    as a preconditioner.
     """
     offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
     if padded[0] % 2 or padded[1] % 2:
@@ -214,14 +214,14 @@ def wave_limits(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[f
 
 @dataclass(frozen=True)
 class Body:
-    """Viscoelastic body whose surface is the same everywhere.
+    """Viscoelastic body that is homogeneous along its surface.
 
     Parameters
     ----------
     material : Prony or Creep
         A material.
     kernel : Kernel
-        Displacement of the surface under pressure at unit contact compliance. Default: that of a half-space.
+        Displacement of the surface under pressure at unit contact compliance. Default: the kernel of a half-space.
 
     Raises
     ------
@@ -254,7 +254,7 @@ class Body:
 
     @property
     def can_crop(self) -> bool:
-        """Whether a part of a surface may be solved on in free space: no cell deeper than the approach touches."""
+        """Whether a part of a surface suffices in free space: no cell deeper than the approach touches."""
         return self.separates and not self.kernel.raises_surface
 
     @property
@@ -263,7 +263,7 @@ class Body:
         return (self.material,)
 
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> Self:
-        """Return the body with materials that represent its own at some frequencies, see :func:`over_frequencies`.
+        """Return the body with materials fitted to its own at some frequencies, see :func:`over_frequencies`.
 
         Parameters
         ----------
@@ -293,7 +293,7 @@ class Body:
         return self.kernel.transfer(qx, qy), complex_compliance(self.material, frequency)
 
     def facts(self, end: float) -> dict[str, Any]:
-        """Return what an audit needs to know of the body: attributes of a result, unless its case states them.
+        """Return the attributes of a result that describe the body for an audit, unless the case states them.
 
         Parameters
         ----------

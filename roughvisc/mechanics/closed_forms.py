@@ -94,7 +94,7 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     .. math:: a^3 = \frac{3 W R}{4 E^*}, \quad \delta = \frac{a^2}{R}, \quad
               p = \frac{2 E^*}{\pi R} \sqrt{a^2 - r^2}
 
-    The displacement outside loses about ``(r/a)^2`` roundings far from the contact.
+    Far from the contact the relative rounding error of the displacement grows as ``(r/a)^2``.
 
     References
     ----------

@@ -34,10 +34,10 @@ Array = Any  # an array of NumPy or CuPy
 Boundary = Literal["free", "periodic", "mirror"]
 BOUNDARIES: tuple[Boundary, ...] = ("free", "periodic", "mirror")
 
-#: Rows that are transformed together, bytes of such columns and the fewest columns, which stay in the cache. Measured
-#: from 64 to 1,024 cells a side: whole fields take up to 1.5 times as long.
+#: Number of rows that are transformed together; bytes of the columns that are, and their least number. The blocks fit
+#: in the cache. Whole fields take up to 1.5 times as long (measured from 64 to 1,024 cells a side).
 ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
-#: Cells from which periodic convolutions are done by blocks of columns too; below, whole fields are faster.
+#: Number of cells from which periodic convolutions use blocks of columns too; below, whole fields are faster.
 BLOCKS_FROM = 1024**2
 #: Cells of a field from which several threads are faster than one (measured: slower at 512 squared, faster at 1024).
 THREADED_FROM = 1024**2
@@ -98,7 +98,7 @@ class Grid:
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic", "mirror"}
-        What lies outside the grid.
+        Surface outside the grid.
     workers : int, optional
         Threads of the transforms from a million cells on. Default: as set by ``scipy.fft.set_workers``, or one.
     kernel : Kernel
@@ -225,8 +225,8 @@ class Grid:
     def inverse(self, displacement: Array) -> Array:
         """Return approximately the pressure that causes a displacement, in single precision.
 
-        This is the inverse of the periodic kernel on the cells, or of the mirror kernel. In free space it is wrong only
-        by what wraps around; it is symmetric and positive definite, at a fifth of the cost of a convolution.
+        This is the inverse of the periodic kernel on the cells, or of the mirror kernel. In free space its only
+        error is the wrap-around. It is symmetric and positive definite, at a fifth of the cost of a convolution.
 
         Parameters
         ----------
@@ -243,13 +243,13 @@ class Grid:
 
     @cached_property
     def self_influence(self) -> float:
-        """Displacement of a cell under unit pressure on it alone: the mean eigenvalue. [m]
+        """Displacement of a cell under unit pressure on that cell alone: the mean eigenvalue. [m]
 
-        With mirror images, the mean over all cells.
+        On a mirrored surface, the mean over all cells.
         """
         if self.boundary == "mirror":
             return float(self.symbol.mean())
-        parts = []  # of the waves that each non-negative wave number stands for
+        parts = []  # number of waves of each non-negative wave number, over the number of points
         for points in self.points:
             number = np.arange(points // 2 + 1)
             parts.append(self.xp.asarray(np.where((number == 0) | (2 * number == points), 1.0, 2.0)) / points)
@@ -302,7 +302,7 @@ class Grid:
         return found
 
     def _memory(self, shape: tuple[int, int], number: Any) -> Array:
-        """Return a complex array to work in, the same in each convolution: new memory takes up to a third more time."""
+        """Return a complex work array, reused by each convolution: new memory takes up to a third more time."""
         key = shape, threading.get_ident()
         if key not in self._memories:
             self._memories[key] = self.xp.empty(shape, np.complex128)
@@ -338,7 +338,7 @@ class Grid:
             spectrum[..., first:, :] *= symbol[count - first : 0 : -1]
 
     def turn(self, cells: int, axis: int) -> Array:
-        """Return the factors by which the transform of a periodic field changes if the field moves back by `cells`."""
+        """Return the factors of the transform of a periodic field for a shift of the field back by `cells`."""
         if self.boundary != "periodic":
             raise ValueError("only periodic fields turn")
         count = self.shape[axis]
@@ -358,7 +358,7 @@ def threads_of(size: int, workers: int | None = None) -> int:
     size : int
         Cells.
     workers : int, optional
-        Threads for a large field. Default: those of ``scipy.fft.set_workers``.
+        Threads for a large field. Default: the value of ``scipy.fft.set_workers``.
     """
     if size < THREADED_FROM:
         return 1
@@ -366,13 +366,13 @@ def threads_of(size: int, workers: int | None = None) -> int:
 
 
 def on_threads(work: Callable[[slice], Any], count: int, length: int, threads: int) -> None:
-    """Call a function for each part, of some length, of so many rows or columns, on a number of threads."""
+    """Split `count` rows or columns into parts of a length, and call a function for each part on several threads."""
     parts = [slice(first, min(first + length, count)) for first in range(0, count, length)]
     if threads == 1:
         for part in parts:
             work(part)
     else:
-        for _ in _pool(threads).map(work, parts):  # raises what a part has raised
+        for _ in _pool(threads).map(work, parts):  # reraises an error of a part
             pass
 
 
@@ -395,7 +395,10 @@ class Transforms:
         self.fft, self.settings = fft, settings
 
     def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
-        """Return the Fourier transform, half of it along y, of a field; along y alone also of the field and zeros."""
+        """Return the Fourier transform of a field at non-negative wave numbers along y.
+
+        With ``points`` and ``axes=(1,)`` the field is padded with zeros along y.
+        """
         return self.fft.rfftn(field, s=None if points is None else (points,), axes=axes, **self.settings)
 
     def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
@@ -417,7 +420,7 @@ class Transforms:
 
 
 class DuccTransforms(Transforms):
-    """The same by ducc0, which is faster."""
+    """Transforms by ducc0, which are faster."""
 
     def __init__(self, threads: int) -> None:
         super().__init__(ducc0.fft, nthreads=threads)
@@ -446,7 +449,7 @@ class DuccTransforms(Transforms):
 
 
 def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
-    """Return an array whose rows are not a power of two apart: transforms of those take up to three times as long."""
+    """Return an array with padded rows: rows a power of two apart make transforms up to three times slower."""
     return np.empty((shape[0], shape[1] + 16), number)[:, : shape[1]]
 
 

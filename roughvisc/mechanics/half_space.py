@@ -16,8 +16,9 @@ from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Rings of distances in units of the longer cell side, and the Gauss points per side that give 1e-15 in them. The closed
-# form cancels as eps (r / side)^2 (7e-8 at 16384 cells) and is used inside the first ring only.
+# Rings of distances in longer cell sides, and number of Gauss points per side for an error of 1e-15 in each ring. The
+# rounding error of the closed form grows as eps (r / side)^2 (7e-8 at 16384 cells). It is used inside the first ring
+# only.
 _GAUSS = ((4.0, 16.0, 8), (16.0, 40.0, 5), (40.0, 200.0, 4), (200.0, math.inf, 3))
 
 
@@ -45,8 +46,8 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     Notes
     -----
     Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
-    alternating signs, loses digits far from the cell, where the corner terms cancel; Gauss quadrature of
-    ``1 / (pi r)`` over the cell takes over there.
+    alternating signs, loses digits far from the cell, because the corner terms cancel. There Gauss quadrature of
+    ``1 / (pi r)`` over the cell replaces it.
 
     References
     ----------
@@ -82,12 +83,12 @@ def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> 
     dx, dy : float
         Cell sides. [m]
     depth : float
-        [m]
+        Depth below the loaded plane. [m]
 
     Returns
     -------
     ndarray
-        [m]
+        Integral. [m]
     """
     total = np.zeros_like(x)
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
@@ -138,7 +139,7 @@ def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
 
 
 def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-    """Refuse an impossible grid."""
+    """Check the number of cells and the cell sides of a grid."""
     (nx, ny), (dx, dy) = shape, spacing
     if int(nx) != nx or int(ny) != ny or min(nx, ny) < 1:
         raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")

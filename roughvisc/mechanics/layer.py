@@ -1,7 +1,7 @@
 r"""Layers on a half-space: a coating, a rubber on a polymer, skin on tissue.
 
 Each wave of pressure is a problem of plane strain. It is displaced by :math:`2 C(q) / |q|` times the pressure, with an
-effective contact compliance ``C(q)``. If the materials creep, each wave has a creep compliance of its own, a positive
+effective contact compliance ``C(q)``. If the materials creep, each wave has its own creep compliance, a positive
 sum of exponentials. All waves share the times, so that each exponential is one kernel:
 
 .. math:: C(q, t) = C_0(q) + \varphi(q) t + \sum_m C_m(q) (1 - e^{-t/\tau_m}).
@@ -35,11 +35,12 @@ Array = NDArray[np.float64]
 
 # Matrices of more waves than this are computed in parts: they take many times the memory of the waves.
 _WAVES_TOGETHER = 1 << 16
-# Wave number times the thinnest layer's thickness from which on a wave feels the top layer alone, to 1e-11. And the
-# decades of the wave number times the whole thickness below which a wave feels the half-space alone.
+# Wave number times the thickness of the thinnest layer from which on a wave depends on the top layer alone, to 1e-11.
+# Number of decades of the wave number times the whole thickness, below one, searched for waves that depend on the
+# half-space alone.
 _SHORT, _DECADES = 15.0, 9
-# Waves per decade at which a series is known: the first number whose interpolant is accurate enough; and what the
-# interpolant may differ by, as a part of the tolerance.
+# Numbers of waves per decade at which a series is computed: the first whose interpolant is accurate enough is used. And
+# error of the interpolant, as a part of the tolerance.
 _WAVES_PER_DECADE, _INTERPOLATED = (10, 14, 20, 30, 45), 0.2
 # Relative error of the interpolant of elastic layers.
 _ELASTIC = 1e-6
@@ -47,18 +48,19 @@ _ELASTIC = 1e-6
 _NODES = 12
 # Ages per decade at which the compliance is fitted.
 _AGES_PER_DECADE = 8
-# Times per decade offered to a fit if waves may have them, and how far they reach beyond the ages.
+# Retardation times per decade to try in a fit, and factor by which their range exceeds the range of ages.
 _OFFERED, _BEYOND = (0, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20, 24, 28, 34, 40, 48, 57, 68), 10.0
 # Times per decade at which the signs of moduli are compared.
 _SIGNS = 100
-# A term that nowhere makes up more of the compliance than this is left out.
+# Terms whose part of the compliance is below this at all ages are left out.
 _UNSEEN = 1e-9
 # Depths of images per decade, from this part of the thinnest layer's thickness on. The response of elastic layers is
 # right to 1e-5 for moduli up to 1,000 apart and to 1e-4 for moduli up to 100,000 apart (measured).
 _IMAGES_PER_DECADE, _SHALLOWEST = 14, 0.8
 # Instantaneous compliances below this part of the final one need not be relatively accurate.
 _LEAST = 1e-6
-# Up to so many cell sides from the load its displacement is computed in closed form, beyond by Gauss points a side.
+# Distance from the loaded cell, in cell sides, up to which its displacement is computed in closed form. Number of
+# Gauss points a side used beyond this distance.
 _NEAR_CELLS, _GAUSS_POINTS = 12.0, 4
 # Distances per decade at which images are added up.
 _DISTANCES = 400
@@ -205,10 +207,10 @@ class Layers:
         return np.asarray((found @ weights).imag)
 
     def times(self, shortest: float, longest: float, per_decade: float) -> Array:
-        """Return retardation times that waves may have: those of the materials, and a number per decade between.
+        """Return possible retardation times of waves: the times of the materials, and a number per decade between.
 
-        If the moduli of all materials have one sign at the complex frequency ``-1/tau``, no wave has the time ``tau``.
-        The limits represent all times beyond them.
+        If the moduli of all materials have the same sign at the complex frequency ``-1/tau``, no wave has the time
+        ``tau``. The limits represent all times beyond them.
         """
         place = lattice(shortest, longest, _SIGNS)
         signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
@@ -226,7 +228,7 @@ def laplace_compliance(material: Prony, s: NDArray[Any]) -> NDArray[Any]:
     """Return the shear compliance of a series under a pressure that grows as ``exp(s t)``. [1/Pa], [1/s]"""
     found = material.glassy + material.fluidity / s
     for compliance, time in zip(material.compliances, material.times, strict=True):
-        with np.errstate(divide="ignore"):  # at a time of its own
+        with np.errstate(divide="ignore"):  # at a retardation time of the material
             found = found + compliance / (1 + s * time)
     return np.asarray(found)
 
@@ -250,8 +252,9 @@ class LayerKernel(Kernel):
     Notes
     -----
     In free space the kernel is Love's with the compliance of short waves, and a sum of images :math:`w_j / (\pi
-    \sqrt{r^2 + b_j^2})` averaged over the loaded cell. A wave meets them as :math:`w_j e^{-q b_j}`. The weights are
-    linear in the compliance and add up to that of long waves, so that the far field is the half-space's.
+    \sqrt{r^2 + b_j^2})` averaged over the loaded cell. An image contributes :math:`w_j e^{-q b_j}` to the
+    compliance of a wave. The weights are linear in the compliance. Their sum gives the compliance of long waves, so
+    that the far field is the field of the half-space.
     """
 
     q: tuple[float, ...]
@@ -278,9 +281,10 @@ class LayerKernel(Kernel):
         return short * love_kernel(shape, spacing) + image_influence(shape, spacing, depths, weights)
 
     def contrast(self, longest: float, shortest: float) -> float:
-        """Return the effective compliance of the longest wave over that of the shortest, given by wave numbers. [1/m]
+        """Return the ratio of the effective compliances of the longest and the shortest wave.
 
-        It is large for a stiff layer on a soft base, and zero if nothing is displaced.
+        Waves are given by their wave numbers [1/m]. The ratio is large for a stiff layer on a soft base, and zero if
+        short waves displace nothing.
         """
         long, short = self._along(np.log(np.clip([longest, shortest], self.q[0], self.q[-1])))
         return float(long / short) if short > 0 else 0.0
@@ -293,7 +297,7 @@ class LayerKernel(Kernel):
 
 
 def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths: Array, weights: Array) -> Array:
-    r"""Return the displacement of cells by images of a cell under unit pressure.
+    r"""Return the displacement of cells due to the images of a cell under unit pressure.
 
     Parameters
     ----------
@@ -451,7 +455,7 @@ def layer_series(layers: Layers, shortest: float, duration: float, tolerance: fl
 
 
 def _known_waves(layers: Layers, t: Array, tolerance: float) -> tuple[Array, Array, float]:
-    """Return wave numbers whose compliances determine those of all waves, others between them, and the error. [1/m]"""
+    """Return wave numbers to interpolate between, others between them [1/m], and the error of the interpolant."""
     from scipy.interpolate import CubicSpline  # slow to import
 
     whole, thinnest = sum(layers.thicknesses), min(layers.thicknesses)
@@ -484,7 +488,7 @@ def _known_waves(layers: Layers, t: Array, tolerance: float) -> tuple[Array, Arr
 
 @dataclass(frozen=True, repr=False)
 class LayeredBody(Body):
-    """Layers on a half-space, see :func:`layer`. Its `material` is that of the top layer.
+    """Layers on a half-space, see :func:`layer`; `material` is the material of the top layer.
 
     Parameters
     ----------
@@ -565,9 +569,9 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
 
     Notes
     -----
-    Each wave of pressure has a response of its own, see
-    :func:`~roughvisc.mechanics.layer.effective_compliance`: short waves feel the layer alone, waves much longer than
-    its thickness the material below.
+    The response depends on the wavelength of the pressure, see
+    :func:`~roughvisc.mechanics.layer.effective_compliance`: short waves depend on the layer alone, waves much
+    longer than its thickness on the material below.
 
     Examples
     --------
@@ -596,7 +600,7 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
 
 
 def _check(name: str, material: Any) -> None:
-    """Refuse what is not a material of one body with a constant Poisson's ratio of 0 to 1/2."""
+    """Check that an argument is a material of one body with a constant Poisson's ratio of 0 to 1/2."""
     if isinstance(material, Body):
         raise InputError(key=name, found=material, expected="a material" + " or a layer" * (name == "on"))
     amiss = check_material(material).stands_for
@@ -608,7 +612,7 @@ def _check(name: str, material: Any) -> None:
 
 
 def _final_kernel(materials: tuple[Material, ...], thicknesses: tuple[float, ...]) -> LayerKernel:
-    """Return the kernel of the final state, or of the instantaneous one if a material flows; per unit of the top."""
+    """Return the kernel of the final state, or of an earlier one if it is unknown or infinite, per unit of the top."""
     for age in _AGES:
         with suppress(InputError):  # a table ends earlier
             shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]

@@ -5,8 +5,8 @@ Each wave creeps in its own way, and all waves share the times of the exponentia
     C(q, t) = C_0(q) + fluidity(q) t + sum_m C_m(q) (1 - exp(-t/tau_m)).
 
 The memory is the recursion of :class:`~roughvisc.mechanics.memory.Memory` for the transform of the pressure. Symbols
-take the place of compliances: ``C_0`` and each ``C_m`` are kernels of their own. The number ``alpha`` that reduces a
-step to an elastic problem becomes a symbol too, so that each length of step has a kernel of its own:
+replace the compliances: ``C_0`` and each ``C_m`` are separate kernels. The compliance ``alpha`` of the elastic problem
+of a step becomes a symbol too, so that the kernel of a step depends on its length:
 
     displacement_q = alpha_q p_q + history_q.
 """
@@ -26,7 +26,8 @@ from roughvisc.mechanics.memory import History, Memory, Prediction
 from roughvisc.mechanics.stepping import Scene
 
 Array = Any  # an array of NumPy or CuPy
-#: Compliance of the longest wave of a grid over that of the shortest, from which the contact may not converge.
+#: Compliance of the longest wave of a grid over the compliance of the shortest wave, from which the contact may not
+#: converge.
 _STIFF_LAYERS = 100.0
 #: Parts of the largest load and approach at which the contact is tried.
 _TRIED = (1.0, 0.1, 0.01)
@@ -35,7 +36,7 @@ _TRIED = (1.0, 0.1, 0.01)
 class LayerMemory(Memory):
     """Exponential series of the waves of a layered body. Fields and modes of a history are transforms of pressures.
 
-    The wave of the grid that creeps most stands for the body if a step is judged: how stiff it is, and how errors fade.
+    The wave of the grid that creeps most represents the body in the choice of rules and lengths of steps.
 
     Parameters
     ----------
@@ -91,23 +92,23 @@ class LayerMemory(Memory):
         return
 
     def roll(self, history: History, cells: int, axis: int) -> History:
-        """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
+        """Return the memory of a periodic body in the frame of a profile that has moved along an axis."""
         turn = self.grid.turn(cells, axis)
         earlier = None if history.earlier is None else history.earlier * turn
         return History(history.fields * turn, history.modes * turn, earlier, history.step)
 
 
 def check_convergence(body: LayeredBody, scene: Scene) -> None:
-    """Refuse stiff layers on a soft base whose contact does not converge, before anything is computed.
+    """Check, before a run, that the contact of stiff layers on a soft base converges.
 
-    Their elastic contact is tried at the largest load or approach, with the first and with the last compliance.
+    The elastic contact is tried at the largest load and approach, with the first and with the last compliance.
 
     Parameters
     ----------
     body : LayeredBody
         The body.
     scene : Scene
-        Cells, memory of the body and program, with loads in place of nominal pressures.
+        Cells, memory of the body, and program; its nominal pressures are converted to loads.
 
     Raises
     ------

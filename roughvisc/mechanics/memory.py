@@ -4,17 +4,17 @@ The contact compliance is an exponential series,
 
     C(t) = glassy + fluidity t + sum_i c_i (1 - exp(-t/tau_i)).
 
-``v = K p`` is the displacement per unit compliance under the present pressure. Each exponential keeps one field ``m_i``
-with ``dm_i/dt = (v - m_i)/tau_i``; the fluidity keeps ``dm/dt = v``. The displacement is ``glassy v + sum_i c_i m_i``.
-A step of length ``h`` is an elastic problem with the compliance ``alpha``,
+``v = K p`` is the displacement per unit compliance under the present pressure. Each exponential has one field ``m_i``
+with ``dm_i/dt = (v - m_i)/tau_i``; the fluidity has one with ``dm/dt = v``. The displacement is
+``glassy v + sum_i c_i m_i``. A step of length ``h`` is an elastic problem with the compliance ``alpha``,
 
     displacement = alpha v_new + history,
 
-so that the history costs no convolution. ``v`` runs linearly within a step: second order, and exact for such ``v``.
-If the body creeps far within a step this rule rings. BDF2 then takes its place, after a first step with constant ``v``.
+so that the history costs no convolution. ``v`` is taken as linear within a step; this rule is of second order. It rings
+if the body creeps far within a step. BDF2 then replaces it, after a first step with constant ``v``.
 
-The same recursion holds for the pressure. A memory may keep both fields, ``(v, p)``, so that the pressure that causes
-the present displacement is known.
+The same recursion applies to the pressure. A memory may keep both fields, ``(v, p)``. It then gives the pressure that
+causes the present displacement.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ORDERS = np.arange(2.0, 16)
 _COEFFICIENTS = (-1) ** _ORDERS * (_ORDERS - 1) / np.cumprod(_ORDERS)
 #: BDF2 is used if the compliance grows by more than this factor within a step.
 STIFF = 3.0
-#: BDF2 is stable while steps grow by no more than 1 + sqrt(2) [1]_; after a longer growth it starts anew.
+#: BDF2 is stable while steps grow by no more than 1 + sqrt(2) [1]_; after a faster growth it restarts.
 #:
 #: .. [1] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, section III.5.
 LARGEST_GROWTH = 2.4
@@ -81,7 +81,7 @@ class Prediction:
     step : float
         Length of the step. [s]
     grid : Grid or None
-        Cells with the kernel of the step, if that is not the same in all steps; `compliance` is one then.
+        Cells with the kernel of the step, if the kernel depends on the step; `compliance` is then one.
     """
 
     compliance: float
@@ -108,7 +108,7 @@ class Memory:
     def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
         factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
         self.series = series
-        #: Contact compliance after a time [s], of which few are asked for again and again. [1/Pa]
+        #: Contact compliance after a time [s], cached because few times recur often. [1/Pa]
         self.compliance = lru_cache(maxsize=64)(lambda time: float(series.contact_compliance(time)))
         self.glassy = factor * series.glassy
         flow = [series.fluidity] if series.fluidity else []
@@ -119,20 +119,20 @@ class Memory:
 
     @cached_property
     def weights(self) -> Any:
-        """Contact compliance of each exponential [1/Pa], of the fluidity [1/(Pa s)], and at once. [1/Pa]"""
+        """Contact compliance: of each exponential [1/Pa], of the fluidity [1/(Pa s)], instantaneous [1/Pa]."""
         return np.append(self.compliances, self.glassy)
 
     @property
     def is_elastic(self) -> bool:
-        """Whether the history does not matter."""
+        """Whether the response is independent of the history."""
         return not self.compliances.any()
 
     def is_stiff(self, step: float) -> bool:
-        """Return whether the body creeps so far within a step that ``v`` cannot be linear in it."""
+        """Return whether the body creeps too far within a step for a linear ``v``."""
         return step > 0 and self.compliance(step) > STIFF * self.glassy
 
     def start(self, nothing: Array) -> History:
-        """Return the memory of an undisturbed body, under a pressure of zeros, shape (nx, ny)."""
+        """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
         fields = self.kept(nothing, nothing)
         return History(fields, namespace(fields).zeros((self.times.size, *fields.shape), fields.dtype))
 
@@ -156,7 +156,7 @@ class Memory:
         Parameters
         ----------
         history, prediction : History, Prediction
-            Memory before the step, and its problem. The modes of the prediction are used up.
+            Memory before the step, and elastic problem of the step. The modes of the prediction are overwritten.
         unit : array, shape (nx, ny)
             Displacement per unit compliance at the end. [m Pa]
         pressure : array, shape (nx, ny)
@@ -183,21 +183,21 @@ class Memory:
         return self.on_cells(self.response(history.fields[:1], -1))[0]
 
     def after_rest(self, history: History, time: float) -> Array:
-        """Return the displacement after a time without pressure, of a body that carries none now. [m]"""
+        """Return the displacement after a time without pressure; the present pressure must be zero. [m]"""
         own = self.recursion(time, 0.0, "linear")[0]
         total = namespace(history.fields).zeros_like(history.fields[:1])
         for i, mode in enumerate(history.modes):
             total += self.response(mode[:1], i, own[i])
         return self.on_cells(total)[0]
 
-    # The methods below depend on the fields that are kept: transforms if the waves of a body creep differently.
+    # The methods below depend on the kept fields, which are transforms if the waves of a body creep differently.
 
     def kept(self, unit: Array, pressure: Array) -> Array:
         """Return the fields of a history. [m Pa], [Pa]"""
         return unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
 
     def response(self, field: Array, number: int, part: float = 1.0) -> Array:
-        """Return what a field of an exponential contributes to the displacement, times a part; -1: what is instant."""
+        """Return a part of the displacement due to a field of exponential `number`; -1: instantaneous part."""
         return (self.weights[number] * part) * field
 
     def on_cells(self, total: Array) -> Array:
@@ -205,7 +205,7 @@ class Memory:
         return total
 
     def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
-        """Return the elastic problem of a step from what its history carries, see :class:`Prediction`."""
+        """Return the elastic problem of a step from the displacement due to its history, see :class:`Prediction`."""
         alpha = self.glassy + float((self.compliances * new).sum())
         return Prediction(alpha, carried, modes, new, step)
 
@@ -214,7 +214,7 @@ class Memory:
         return history.fields[0]
 
     def roll(self, history: History, cells: int, axis: int) -> History:
-        """Return the memory of a periodic body, seen from a profile that has moved along an axis."""
+        """Return the memory of a periodic body, in the frame of a profile that has moved along an axis."""
 
         def rolled(fields: Array) -> Array:
             return namespace(fields).roll(fields, -cells, axis - 2)

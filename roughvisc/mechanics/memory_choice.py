@@ -1,4 +1,4 @@
-"""Memory of a body for a program: the exponential series of its material, and how far that is from the material."""
+"""Memory of a body for a program: the exponential series of its material, and the error of the series."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from roughvisc.mechanics.memory import Memory
 
 #: Largest error of a series that replaces a material, as a part of the tolerance.
 SERIES_SHARE = 0.1
-#: Part of it for the series of the materials of a layered body; the rest is for the series of its waves.
+#: Part of this error for the series of the materials of a layered body; the rest is for the series of its waves.
 MATERIALS_SHARE = 0.3
 #: Default shortest time of a series, as a part of the length of the program.
 SHORTEST_AGE = 1e-6
@@ -22,7 +22,7 @@ SHORTEST_AGE = 1e-6
 
 @dataclass(frozen=True)
 class Choice:
-    """A memory, and its distance from the material.
+    """A memory, and its deviation from the material.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ def choose_memory(
     Parameters
     ----------
     body : Body or Material
-        A body, or a material, which stands for a half-space of it.
+        A body, or the material of a half-space.
     duration : float
         Length of the program. [s]
     tolerance : float
@@ -71,7 +71,7 @@ def choose_memory(
     grid : Grid, optional
         Cells; needed for a layered body only.
     keeps_pressure : bool
-        Whether the pressure that causes the displacement is kept too.
+        Whether the memory also keeps the pressure that causes the displacement.
 
     Returns
     -------

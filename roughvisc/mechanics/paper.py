@@ -1,8 +1,8 @@
-"""The algorithm of the paper, with its errors corrected: what this package is compared with, and no part of a solve.
+"""The algorithm of the paper, with its errors corrected. Tests compare this package with it; no solve uses it.
 
 "A robust algorithm for the contact of viscoelastic materials" presses a profile in equal steps of time: rectangle rule,
 one convolution for each past increment of pressure, plain conjugate gradients from uniform pressure, stopped when the
-pressure stagnates. Numbers in brackets are those of the paper's equations; "printed" marks what is corrected
+pressure stagnates. Numbers in brackets are the equations of the paper; "printed" marks a corrected statement
 (docs/theory.md, "Errors in the paper").
 """
 
@@ -57,15 +57,15 @@ def press(
     Parameters
     ----------
     operator : Convolution
-        Of the half-space, on the grid of the gap.
+        Convolution of the half-space, on the grid of the gap.
     gap : ndarray, shape (nx, ny)
         Undeformed gap. [m]
     compliance : callable
-        Contact compliance, [1/Pa], by the age, [s]; half of the paper's.
+        Contact compliance [1/Pa] by the age [s]; half of the compliance in the paper.
     load : callable
-        Normal force, [N], by the time, [s].
+        Normal force [N] by the time [s].
     times : sequence of float
-        In equal steps from zero, at which the load may jump. [s]
+        Times in equal steps from zero, at which the load may jump. [s]
     epsilon : float
         A contact is solved once an iteration changes the pressure by less than this part of the load.
 
@@ -86,10 +86,10 @@ def press(
     # (17) Printed: C at the first lag. The present increment has lag 0, and the load may jump.
     at_once = compliance(0.0)
     pressure = np.zeros_like(gap)
-    increments: list[Array] = []  # (5) Printed: from n = 2. The first increment is that at the first time.
+    increments: list[Array] = []  # (5) Printed: from n = 2. The first increment is applied at the first time.
     for time in times:
-        # (5) Printed: up to the last step, with a kernel of unit force. An increment was applied and is kept. Of the
-        # present one, all that is known yet is the part that takes the last pressure away.
+        # (5) Printed: up to the last step, with a kernel of unit force. An increment acts from its step on. The present
+        # increment is new pressure minus last pressure, and only the second part is known yet.
         past = -at_once * operator.displacement(pressure)
         for began, increment in zip(times, increments, strict=False):
             past += operator.displacement(compliance(time - began) * increment)
@@ -116,8 +116,8 @@ def conjugate_gradients(
 ) -> Contact:
     """Elastic contact under a load, (1) to (4), by the iteration (6) to (16).
 
-    ``gap`` is that without the present pressure [m], ``compliance`` that of the present increment [1/Pa]. ``sign`` is
-    that of (9); with the printed one, -1, the iteration stalls. It ends after ``most`` iterations.
+    ``gap`` excludes the displacement by the present pressure [m]; ``compliance`` is for the present increment [1/Pa].
+    ``sign`` is the sign in (9); with the printed sign, -1, the iteration stalls. It ends after ``most`` iterations.
     """
     if load == 0:
         return Contact(np.zeros_like(gap), float(np.min(gap)), 0, True)

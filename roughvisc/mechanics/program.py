@@ -20,7 +20,7 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.units import Quantity, format_quantity, number
 
-#: In which the profile moves.
+#: Direction of motion of the profile.
 Direction = Literal["x", "-x", "y", "-y"]
 
 
@@ -33,7 +33,7 @@ class Slide:
     distance : float
         Requested distance; the profile slides by the nearest whole number of cells. [m]
     direction : {"x", "-x", "y", "-y"}
-        In which the profile moves.
+        Direction of motion of the profile.
     """
 
     distance: float
@@ -46,16 +46,16 @@ class Slide:
 
     @property
     def axis(self) -> int:
-        """Of the grid."""
+        """Axis of the grid along the motion."""
         return 0 if self.direction.endswith("x") else 1
 
     @property
     def sense(self) -> int:
-        """1 where the profile moves towards larger coordinates, else -1."""
+        """1 if the profile moves towards larger coordinates, else -1."""
         return -1 if self.direction.startswith("-") else 1
 
     def cells(self, spacing: tuple[float, float]) -> int:
-        """Whole number of cells that is slid, one a step.
+        """Return the number of cells that the profile slides, one per step.
 
         Parameters
         ----------
@@ -81,17 +81,17 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
     Parameters
     ----------
     began, end : float
-        Of the slide. [s]
+        Start and end of the slide. [s]
     taken, cells : int
-        Cells taken, and cells of the whole slide.
+        Number of cells taken, and of the whole slide.
     """
     return end if taken >= cells else began + (end - began) * (taken / cells)
 
 
 Control = Literal["load", "approach", "pressure"]
-#: what may be prescribed -> its unit
+#: Controlled quantity -> its unit.
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
-#: what contact without adhesion cannot carry below zero
+#: Quantities that contact without adhesion cannot carry below zero.
 PUSHING = ("load", "pressure")
 
 
@@ -108,7 +108,7 @@ class Segment:
     end : float or None
         Value at the end, reached linearly; None keeps the value found at the start. [N, m or Pa]
     amplitude, period : float
-        A sine wave about the value ``end``, which must also be the value at the start. [N, m or Pa], [s]
+        Amplitude and period of a sine wave about ``end``, which must also be the value at the start. [N, m or Pa], [s]
     slide : Slide or None
         Motion of the profile along the surface, during which the controlled quantity keeps its value.
     """
@@ -134,10 +134,10 @@ class Segment:
         if self.amplitude and not (self.period > 0 and math.isfinite(self.period)):
             raise InputError(f"period of a cycle is {self.period!r}: expected a positive number [s]")
         if self.slide is not None and (self.end is not None or self.amplitude or self.duration == 0):
-            raise InputError("a slide takes time and keeps what is controlled: expected no end, no wave, duration > 0")
+            raise InputError("a slide keeps the controlled quantity: expected duration > 0, no end, no wave")
 
     def __str__(self) -> str:
-        """In words, such as ``load to 2 N over 50 ms``."""
+        """Return the segment in words, such as ``load to 2 N over 50 ms``."""
         lasting, unit = format_quantity(self.duration, "s"), UNITS[self.control]
         named = "nominal pressure" if self.control == "pressure" else self.control
         if self.amplitude:
@@ -157,7 +157,7 @@ class Segment:
         return self.end is None and not self.amplitude and self.slide is None
 
     def value(self, elapsed: float, start: float) -> float:
-        """Prescribed value [N or m] a time [s] after the start of the segment, which began at ``start``."""
+        """Return the prescribed value at a time after the start [s]; ``start`` is the value at the start. [N or m]"""
         if self.amplitude:
             mean = start if self.end is None else self.end
             return mean + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
@@ -168,7 +168,7 @@ class Segment:
         return start + (self.end - start) * (elapsed / self.duration)
 
     def turns(self, after: float, before: float) -> list[float]:
-        """Return the instants strictly between two others at which a cycle turns back, from its start. [s]"""
+        """Return the turning points of a cycle strictly between two times since its start. [s]"""
         if not self.amplitude:
             return []
         quarter = self.period / 4
@@ -176,13 +176,13 @@ class Segment:
         return [n * quarter for n in range(first, last + 1) if n % 2 and after < n * quarter < before]
 
     def highest(self, start: float) -> float:
-        """The largest value prescribed anywhere in the segment, which began at ``start``. [N or m]"""
+        """Return the largest prescribed value of the segment; ``start`` is the value at the start. [N or m]"""
         if self.amplitude:
             return (start if self.end is None else self.end) + abs(self.amplitude)
         return max(start, start if self.end is None else self.end)
 
     def is_nothing(self, start: float) -> bool:
-        """Whether zero is prescribed throughout."""
+        """Return whether the prescribed value is zero throughout; ``start`` is the value at the start."""
         return not self.amplitude and start == 0 and not self.end
 
     def on_area(self, area: float) -> Segment:
@@ -193,7 +193,7 @@ class Segment:
         return replace(self, control="load", end=end, amplitude=float(f"{self.amplitude * area:.15g}"))
 
 
-#: what may be prescribed -> what may be meant where the unit is of another kind: keys and their units
+#: Controlled quantity -> the other quantities, to suggest if the unit is of another kind: names and units.
 INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
 #: Largest number of cycles.
 MOST_CYCLES = 1e6
@@ -250,7 +250,7 @@ class Program:
         return self._then(Segment(control, number(over, "s", "over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
-        """This program followed by another one."""
+        """Return this program followed by another one."""
         return Program(self.segments + other.segments, " ".join(filter(None, (self.note, other.note))))
 
     def load(self, value: float | str, *, over: float | str) -> Program:
@@ -337,9 +337,9 @@ class Program:
         duration : float or str
             How long. [s]
         control : {"load", "approach", "pressure"}, optional
-            The quantity to hold; default: that of the previous segment. The other one follows from the contact: a load,
-            then ``hold(..., control="approach")``, is stress relaxation. Holding the nominal pressure is the same as
-            holding the load.
+            Quantity to hold. Default: the quantity of the previous segment. The other quantity follows from the
+            contact: a load, then ``hold(..., control="approach")``, is stress relaxation. Holding the nominal pressure
+            is the same as holding the load.
 
         Returns
         -------
@@ -370,9 +370,9 @@ class Program:
         distance : float or str
             Sliding distance, rounded to whole cells; the profile moves by one cell per time step. [m]
         speed, over : float or str
-            Speed [m/s] or duration [s]; give one of them.
+            Speed [m/s] or duration [s]; give exactly one.
         direction : {"x", "-x", "y", "-y"}
-            In which the profile moves.
+            Direction of motion of the profile.
 
         Returns
         -------
@@ -400,7 +400,7 @@ class Program:
     def table(
         cls, times: Sequence[float | str], values: Sequence[float | str], control: Control = "load", note: str = ""
     ) -> Program:
-        """Linear interpolation between the rows of a table; two rows at the same time are a jump.
+        """Interpolate linearly between the rows of a table; two rows at the same time are a jump.
 
         Parameters
         ----------
@@ -409,9 +409,9 @@ class Program:
         values : sequence of float or str
             Load [N], approach [m] or nominal pressure [Pa] at these times.
         control : {"load", "approach", "pressure"}
-            Which of them.
+            Quantity of the values.
         note : str
-            Of the program.
+            Note of the program.
 
         Raises
         ------
@@ -442,7 +442,7 @@ class Program:
         cycles: float,
         control: Control = "load",
     ) -> Program:
-        """Sine wave about a mean, after a jump to this mean.
+        """Apply a sine wave about a mean, after a jump to the mean.
 
         To ramp to the mean instead, add programs: ``Program().load(1.0, over=0.1) + Program.cycle(1.0, 0.5, 2.0, 5)``.
 
@@ -453,7 +453,7 @@ class Program:
         period : float or str
             Length of a cycle. [s]
         cycles : float
-            How many.
+            Number of cycles.
         control : {"load", "approach", "pressure"}
             The oscillating quantity.
 
@@ -498,7 +498,7 @@ class Program:
         return any(segment.control == "pressure" for segment in self.segments)
 
     def gives(self, number: int) -> bool:
-        """Whether the program states what a segment prescribes; a hold may keep what was found.
+        """Return whether the program states the value of a segment; a hold may keep a computed value instead.
 
         Parameters
         ----------
@@ -528,7 +528,7 @@ class Program:
         Raises
         ------
         InputError
-            If a nominal pressure is prescribed, whose load no one knows without an area.
+            If a nominal pressure is prescribed: its load is unknown without an area.
         """
         if self.prescribes_pressure:
             raise InputError(
@@ -539,10 +539,10 @@ class Program:
 
     @property
     def time_scale(self) -> float:
-        """Shortest time in which what is prescribed changes by its largest value; infinite if nothing does. [s]
+        """Shortest time in which a controlled quantity changes by its largest value; infinite without a change. [s]
 
-        A jump counts as long as what follows it: it stands for a change that is fast for the material, and slow for
-        waves. Where a ramp starts from a value that is found, it counts from zero.
+        A jump counts as long as the segment after it: it represents a change that is fast for the material, but slow
+        for elastic waves. A ramp from a computed value counts from zero.
         """
         sizes: dict[str, float] = {}
         for one in self.segments:

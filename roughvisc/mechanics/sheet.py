@@ -1,6 +1,6 @@
-"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``. Short waves respond as on a half-space: ``S = 1``.
+"""A sheet on a rigid base: ``K_q = (2 / |q|) S(|q| h)``. For short waves ``S = 1``, as on a half-space.
 
-With a constant Poisson's ratio space and time separate as for a half-space: ``u = C(t) K * p``.
+With a constant Poisson's ratio space and time separate, as in a half-space: ``u = C(t) K * p``.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ Array = NDArray[np.float64]
 Base = Literal["bonded", "slipping"]
 #: Default base of a sheet.
 BASE: Base = "bonded"
-# In thicknesses: beyond this distance the kernel is below 1e-17 of its size at one thickness, and taken for zero.
+# Distance in thicknesses beyond which the kernel is set to zero: it is below 1e-17 of its value at one thickness.
 _REACH = 46.0
-# 1 - S(x) decreases as x^2 exp(-2 x): below rounding from here.
+# Argument x from which 1 - S(x), which decreases as x^2 exp(-2 x), is below rounding.
 SHORTEST_WAVE = 24.0
-# The correction over the distance: pieces of so many thicknesses, Chebyshev nodes in each. Error below 1e-15.
+# Length of the pieces of the correction in thicknesses, and number of Chebyshev nodes in each: error below 1e-15.
 _PIECE, _NODES = 0.15, 10
-# Gauss points per side of a cell of so many thicknesses that give the mean of the correction to 1e-13.
+# Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cells of more thicknesses than the first are long; beyond the second: refused.
+# Cell sides in thicknesses above which cells are long, and above which they are refused.
 _LONG, _LONGEST = 0.5, 50.0
 # Below this, sinh(2 x) - 2 x is computed from its series.
 _SERIES_BELOW = 0.5
@@ -98,7 +98,7 @@ class Sheet(Kernel):
     Raises
     ------
     InputError
-        If an argument is none of these.
+        If an argument is invalid.
 
     Notes
     -----
@@ -108,7 +108,7 @@ class Sheet(Kernel):
         S = \frac{k \sinh 2x - 2x}{k \cosh 2x + 2x^2 + 5 - 12 \nu + 8 \nu^2},
         \qquad S = \frac{\cosh 2x - 1}{\sinh 2x + 2x}.
 
-    In free space the kernel is that of the half-space less a smooth correction,
+    In free space the kernel is the kernel of the half-space less a smooth correction,
     ``c(r) = 1/(pi h) int_0^inf (1 - S(s)) J0(s r/h) ds``, averaged over the loaded cell. On cells longer than half of
     the thickness its transform is :meth:`transfer` of difference quotients.
 
@@ -137,9 +137,9 @@ class Sheet(Kernel):
 
     @property
     def relief(self) -> float:
-        """What the base takes off the displacement far inside the thickness, over load and compliance. [1/m]
+        """Reduction of the approach of a small contact by the base, over load and compliance. [1/m]
 
-        A contact much smaller than the thickness has that much less approach than on a half-space, to first order.
+        It compares the sheet with a half-space, to first order in the contact radius over the thickness.
         """
         s, weights = panels(96, SHORTEST_WAVE, 16)
         return float(weights @ complement(s, self.poisson, self.base)) / (math.pi * self.thickness)
@@ -175,9 +175,9 @@ class Sheet(Kernel):
     def _influence_of_long_cells(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return the kernel whose transform is the transfer function of fourth-order difference quotients. [m]
 
-        They replace ``qx^2`` by ``4 (s + s^2 / 3) / dx^2`` with ``s = sin^2(qx dx / 2)``. The transform is then smooth
-        at the shortest wave, so that the kernel decays exponentially. Its relative error of long waves is below
-        ``(q dx)^4 / 90``.
+        The difference quotients replace ``qx^2`` by ``4 (s + s^2 / 3) / dx^2`` with ``s = sin^2(qx dx / 2)``. The
+        transform is then smooth at the shortest wave, so that the kernel decays exponentially. Its relative error of
+        long waves is below ``(q dx)^4 / 90``.
         """
         counts = [
             max(n, math.ceil(_REACH * self.thickness / side) + 16) for n, side in zip(shape, spacing, strict=True)
@@ -199,7 +199,7 @@ class Sheet(Kernel):
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """Return the factor ``S`` of a wave: its displacement over that of a half-space.
+    """Return the factor ``S`` of a wave: its displacement over the displacement of a half-space.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=8)
 def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
-    """Return the kernel of the half-space less that of a sheet, at a distance in thicknesses. [1/thickness]"""
+    """Return the kernel of a half-space less the kernel of a sheet, by distance in thicknesses. [1/thickness]"""
     from scipy.interpolate import PPoly  # slow to import
     from scipy.special import j0
 

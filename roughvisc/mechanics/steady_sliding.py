@@ -5,9 +5,9 @@ the body with the frequency ``-q_x V``: ``u_q = K_q C*(-q_x V) p_q``. The real p
 symmetric, positive operator, the imaginary part a skew-symmetric one; ``K`` is their sum.
 
 Pressure ``p`` and separation ``w = g + K p - approach`` satisfy ``p >= 0``, ``w >= 0``, ``p w = 0`` in each cell under
-a given load. This monotone complementarity problem is not the minimum of an energy, so conjugate gradients do not
-apply, and active sets need not settle if the skew part is large. The interior-point method of Mehrotra [1]_ needs
-neither: ``p`` and ``w`` stay positive in all cells, and Newton's method drives their product to zero. It takes five to
+a given load. This monotone complementarity problem is not the minimum of an energy. Conjugate gradients do not apply,
+and active-set methods may cycle if the skew part is large. The interior-point method of Mehrotra [1]_ avoids both
+problems: ``p`` and ``w`` stay positive in all cells, and Newton's method drives their product to zero. It takes five to
 thirty iterations, from materials without loss to loss tangents of a thousand.
 
 1. Each iteration solves two linear systems ``(K + D) dp - d_approach = r``, ``sum dp = 0`` with ``D = w / p``, which is
@@ -48,9 +48,9 @@ _CAUTION = 2.25
 # Largest residual of GMRES over the residuals of note 2. Measured on line contacts with loss tangents up to
 # 27: 0.1 and 0.3 cost the same, 1 does not always converge.
 _FORCING = 0.3
-# Largest residual of GMRES over the right-hand side: in any step, and in the step whose error is stated.
+# Largest residual of GMRES over the right-hand side: in any step, and in the step that gives the stated error.
 _LOOSEST, _STATED = 0.5, 0.05
-# Fraction of the way to the border of the feasible set.
+# Part of the distance to the border of the feasible set that a step takes.
 _INSIDE = 0.995
 # Least separation at the start, over the range of the gap.
 _START = 0.3
@@ -62,16 +62,16 @@ _REPEATED = 0.1
 
 @dataclass(frozen=True)
 class SteadyState:
-    """A steady state of sliding, in the frame of the profile.
+    """Steady state of sliding, in the frame of the profile.
 
     Attributes
     ----------
     pressure : array, shape (nx, ny)
-        Not negative, and exactly zero out of contact. It carries the load. [Pa]
+        Pressure, exactly zero out of contact, whose integral is the load. [Pa]
     displacement : array, shape (nx, ny)
-        On a half-space with zero mean. [m]
+        Displacement; its mean is zero on a half-space. [m]
     approach : float
-        [m]
+        Approach. [m]
     power_force : float
         Friction force: dissipated power over the speed. [N]
     residual : float
@@ -79,11 +79,11 @@ class SteadyState:
     friction_residual : float
         Estimated relative error of the power force. [-]
     converged : bool
-        Whether both are within the tolerance.
+        Whether both residuals are within the tolerance.
     iterations : int
         Interior-point iterations.
     vectors : int
-        Vectors of GMRES in all; each costs two convolutions.
+        Total number of GMRES vectors; each costs two convolutions.
     """
 
     pressure: Array
@@ -115,7 +115,7 @@ class Sliding:
     ------
     InputError
         If the speed is not positive, or if the material creeps without end and the grid has waves across the motion.
-        These waves stand still in the body, so there is no steady state.
+        These waves do not move in the body, so that a steady state does not exist.
     """
 
     def __init__(
@@ -131,7 +131,7 @@ class Sliding:
         (nx, ny), (dx, dy) = shape, spacing
         #: Wave numbers along x and along y, of a real transform. [1/m]
         self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
-        odd, odd_across = self.qx.copy(), self.qy.copy()  # the shortest wave of an even number of cells has no slope
+        odd, odd_across = self.qx.copy(), self.qy.copy()  # the shortest wave of an even number of cells has zero slope
         if nx % 2 == 0:
             odd[nx // 2] = 0
         if ny % 2 == 0:
@@ -142,13 +142,13 @@ class Sliding:
         endless = acting & ~np.isfinite(complex_compliance)
         if endless.any():
             raise InputError(
-                "the material creeps without end, and the surface has waves across the motion, which stand still in "
-                "it: there is no steady state; expected a solid, or a profile that does not change across the motion",
+                "the material creeps without end under waves across the motion, which do not move in it, and a steady "
+                "state does not exist: expected a solid, or a profile that does not change across the motion",
                 key="material",
                 found=body.materials,
                 expected="a solid, or a profile that does not change across the motion",
             )
-        # The sine of the shortest wave of an even grid vanishes at the cell centres.
+        # On an even grid the sine of the shortest wave vanishes at the cell centres.
         skew = 1j * (np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response)
         displaced = np.where(acting, complex_compliance.real, 0.0) * response + skew
         softest, acts = np.abs(displaced).max(), displaced != 0
@@ -162,7 +162,7 @@ class Sliding:
         #: Cells of one period.
         self.shape = shape
         self._transforms = transforms(threads_of(nx * ny), xp)
-        #: Number of convolutions so far, with the preconditioner's.
+        #: Number of convolutions so far, including the preconditioner.
         self.convolutions = 0
         self.cell_area = dx * dy
         one = xp.zeros(shape)
@@ -175,7 +175,7 @@ class Sliding:
         return self._convolved(pressure, self.response)
 
     def full_contact(self, displacement: Array) -> Array:
-        """Return the pressure of a displacement in full contact, in single precision for a preconditioner. [Pa]"""
+        """Return the pressure for a displacement in full contact, in single precision for a preconditioner. [Pa]"""
         symbol, unit = self._stiffness
         most = float(abs(displacement).max()) or 1.0  # single precision underflows
         found = self._convolved((displacement / most).astype(np.float32), symbol)
@@ -198,9 +198,9 @@ class Sliding:
     def slope(self, pressure: Array, axis: int = 0) -> Array:
         """Return the slope of the displacement out of phase with the pressure.
 
-        In contact the body has the slope of the profile. The displacement in phase contributes nothing to a force: its
-        kernel is even, so the sum of the pressure over its slope is zero. The rest does not depend on how steeply the
-        pressure ends at the edges of contact. It is a symmetric operator.
+        In contact the surface of the body has the slope of the profile. The displacement in phase does not contribute
+        to a force: its kernel is even, so that the sum of the pressure times its slope is zero. The other part is a
+        symmetric operator, and insensitive to the steepness of the pressure at the edges of contact.
         """
         return self._convolved(pressure, self._skew * self._derivatives[axis])
 
@@ -215,7 +215,7 @@ class Sliding:
 def steady_state(
     sliding: Sliding, gap: Array, load: float, *, tolerance: float = 1e-3, max_iterations: int = 100
 ) -> SteadyState:
-    """Return the steady state under a load.
+    """Return the steady state of sliding under a load.
 
     Parameters
     ----------
@@ -226,9 +226,9 @@ def steady_state(
     load : float
         Positive. [N]
     tolerance : float
-        Of the residuals of pressure and friction. [-]
+        Largest residual of pressure and friction. [-]
     max_iterations : int
-        The state of the last of these iterations is returned as not converged.
+        Largest number of iterations; then the state is returned as not converged.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def steady_state(
         diagonal = separation / pressure
         system = _NewtonSystem(sliding, diagonal)
 
-        # Predictor: Newton's step to the solution. It states the error of the pressure that is cut to the contact.
+        # Predictor: Newton's step to the solution. It gives the error of the pressure restricted to the contact.
         right = approach - opening
         step, approach_step, count = system.solve(right, enough)
         vectors += count
@@ -296,7 +296,7 @@ def steady_state(
 
 
 class _NewtonSystem:
-    """The linear system of an iteration (notes 1 and 2).
+    """Linear system of an iteration (notes 1 and 2).
 
     Parameters
     ----------
@@ -313,23 +313,23 @@ class _NewtonSystem:
         self._scale = 1 / xp.sqrt(both)
         self._inside = sliding.self_influence / both
         self._outside = (1 - self._inside**2) / both
-        #: Pressure that the preconditioner gives for a uniform displacement, scaled to a sum of 1.
+        #: Pressure that the preconditioner assigns to a uniform displacement, scaled to a sum of 1.
         self._punch = self._inverse(xp.ones_like(both))
         self._punch /= float(self._punch.sum())
 
     def solve(
         self, right: Array, enough: float, relative: float = _LOOSEST, start: Array | None = None
     ) -> tuple[Array, float, int]:
-        """Return the steps of pressure and approach for a right-hand side, and the number of vectors.
+        """Return the changes of pressure and approach for a right-hand side, and the number of GMRES vectors.
 
         Parameters
         ----------
         right : array, shape (nx, ny)
-            [m]
+            Right-hand side ``r``. [m]
         enough, relative : float
-            Residual at which GMRES stops: scaled, and relative to the right-hand side.
+            Residuals, at the smaller of which GMRES stops: scaled, and relative to the right-hand side.
         start : array, shape (nx, ny), optional
-            First guess of the step of the pressure. [Pa]
+            First guess of the change of the pressure. [Pa]
         """
         scaled = self._scaled(right)
         enough = min(enough, relative * math.sqrt(float((scaled**2).sum())))
@@ -347,29 +347,29 @@ class _NewtonSystem:
         return step if start is None else start + step, approach_step, count
 
     def _product(self, step: Array) -> Array:
-        """``(K + D) dp``. [m]"""
+        """Return ``(K + D) dp``. [m]"""
         product = self._sliding.displacement(step)
         product += self._diagonal * step
         return product
 
     def _scaled(self, field: Array) -> Array:
-        """Displacement without its rigid part, scaled."""
+        """Return a displacement without its rigid part, scaled."""
         scaled = field - self._rigid_part(field)
         scaled *= self._scale
         return scaled
 
     def _rigid_part(self, field: Array) -> float:
-        """Rigid part of a displacement. [m]"""
+        """Return the rigid part of a displacement. [m]"""
         return float((field * self._punch).sum())
 
     def _precondition(self, scaled: Array) -> Array:
-        """Step of the pressure without a change of the load. [Pa]"""
+        """Return a change of the pressure at constant load. [Pa]"""
         step = self._inverse(scaled / self._scale)
         step -= float(step.sum()) * self._punch
         return step
 
     def _inverse(self, field: Array) -> Array:
-        """Approximate ``(K + D)^-1`` of a displacement. [Pa]"""
+        """Return approximately ``(K + D)^-1`` times a displacement. [Pa]"""
         pressure = self._sliding.full_contact(self._inside * field)
         pressure *= self._inside
         pressure += self._outside * field
@@ -382,7 +382,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
     Parameters
     ----------
     operator : callable
-        Takes and returns an array of the shape of the right-hand side.
+        Takes and returns arrays of the shape of the right-hand side.
     right : array
         Right-hand side.
     enough : float
@@ -397,14 +397,15 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
 
     Notes
     -----
-    SciPy's GMRES takes its inner products from BLAS, so that its bits depend on the number of threads, which differs
-    between this process and the workers of Dask. CuPy's never stops before a restart. ``einsum`` calls no BLAS here.
+    SciPy's GMRES uses BLAS for inner products. Its last bits then depend on the number of threads, which differs
+    between this process and the workers of Dask. CuPy's GMRES stops only at a restart. ``einsum`` does not call BLAS
+    here.
     """
     xp, shape = namespace(right), right.shape
     residual, solution, count = right.reshape(-1), xp.zeros(right.size), 0
     norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
     while norm > enough and count < _MOST_VECTORS:
-        # The first direction is the residual; each further one is the image of the direction before it, orthonormal.
+        # The first direction is the residual; each further direction is the image of the last one, orthonormalised.
         directions = xp.empty((_RESTART + 1, right.size))
         directions[0] = residual / norm
         triangle, along_residual = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART)
@@ -413,7 +414,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
             for _ in range(2):  # Gram-Schmidt, a second time if little is left
                 along = xp.einsum("ki,i->k", directions[1 : k + 1], image)
                 image -= xp.einsum("ki,k->i", directions[1 : k + 1], along)
-                triangle[:k, k] += along.tolist()  # on the host, like all of the small system
+                triangle[:k, k] += along.tolist()  # on the host, like the rest of the small system
                 length = math.sqrt(float(xp.einsum("i,i->", image, image)))
                 if length > _REPEATED * math.sqrt(float((along**2).sum())):
                     break

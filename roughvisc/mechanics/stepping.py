@@ -1,15 +1,15 @@
 """Time stepping: contact under a program of load or approach, on a viscoelastic body, with a stated error.
 
-The atom is a pair of steps. A coarse solution takes the pair as one step. The difference between both solutions is the
-stated error at the end of the pair, and the change of this difference over the pair controls the length of the next
-one. No other estimate is needed.
+The solution proceeds by pairs of steps. A coarse solution takes each pair as one step. The difference between both
+solutions is the stated error at the end of the pair, and the change of this difference over the pair controls the
+length of the next pair. No other estimate is needed.
 
-An error is weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`). A kept time
-ends a pair or lies in its middle.
+Errors are weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`). A kept time
+is the end or the middle of a pair.
 
-If little of the compliance of a pair is instantaneous, the pair is *soft*: the pressure jumps in each cell that enters
-the contact, and the pressure of an implicit step belongs to the step and not to its end. The displaced surface then
-controls the length, and a short additional step gives the pressure of a kept row.
+If little of the compliance of a pair is instantaneous, the pair is *soft*. The pressure then jumps in each cell that
+enters the contact, and the pressure of an implicit step belongs to the step and not to its end. The displaced surface
+controls the length of the pair, and a short additional step gives the pressure of a kept row.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ Array = Any  # an array of NumPy or CuPy
 #: Pressure [Pa], and its displacement per unit compliance if known [m Pa].
 Guess = tuple[Array, Array | None]
 
-#: First pair after an event, in parts of the segment: contact changes fast after a corner.
+#: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
 FIRST_PAIR = 0.005
 #: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
 #: on workflows/benchmarks/accuracy.py.
 STATED, STATED_APPROACH = 0.6, 0.6
-#: The same for bodies that have hardly any instantaneous compliance, whose steps begin at first order.
+#: The same for bodies with hardly any instantaneous compliance, whose first steps are of first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
-#: Part of the tolerance that a pair may add, and the least part that it may always add.
+#: Part of the tolerance that a pair may add to the error, and the part that it may add in any case.
 SHARE, LEAST_SHARE = 0.4, 0.2
-#: Part of the error so far that a pair may always add: of a slide, whose error depends on the cells, it may be large.
+#: Part of the error so far that a pair may add in any case. The error of a slide depends on the cells and may be large.
 LEAST_CHANGE = 0.1
-#: Part of the tolerance that the error so far and that of a pair may use up, and safety of the length of the next pair.
+#: Part of the tolerance for the error so far and the error of a pair; safety factor of the length of the next pair.
 BUDGET, PLANNED = 0.7, 0.9
-#: Part of the tolerance that the contact solver may leave.
+#: Tolerance of the contact solver, as a part of the tolerance.
 SOLVER_SHARE = 0.2
-#: What relaxation leaves of an error counts at least this part: other errors do not fade.
+#: Least part of an error that counts as remaining after relaxation: other errors do not fade.
 LEAST_REMAINING = 0.02
-#: The same where cells leave the contact.
+#: The same if cells leave the contact.
 RECEDING = 0.5
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
 ORDER = 1.5
-#: A pair is rejected if it adds this many times what it may.
+#: A pair is rejected if the error that it adds exceeds the allowed error by this factor.
 REJECTED = 2.0
 #: A rejected pair is tried again in shorter steps. If that leaves more than this part of its error, the shorter pair is
 #: accepted: a cell that enters the contact makes the pressure jump, however short the pair is.
@@ -62,45 +62,48 @@ REDUCED = 0.93
 #: Shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
 #: the segment began.
 LANDING_PAIR = 0.01
-#: Shortest pair, in parts of the segment, or of its time to the first kept one.
+#: Shortest pair, as a part of the segment, or of the time from its start to its first kept time.
 SHORTEST_PAIR = 1e-6
-#: Change of the length from one pair to the next: smallest, largest, and largest if it adds next to nothing.
+#: Ratio of the lengths of successive pairs: smallest, largest, and largest if the added error is negligible.
 SHRINK, GROW, GROW_FAST = 0.3, 2.3, 5.0
-#: Next to nothing, in parts of what it may add.
+#: Negligible added error, as a part of the allowed error.
 NEARLY_NOTHING = 0.02
-#: Steps of a pair with an event between them: the first in parts of the length asked for, and the ratio of both.
+#: Pair with an event between its steps: limits of the first step, as a part of the requested length of the pair, and
+#: largest ratio of the steps.
 SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
-#: Pairs of a period of a cycle.
+#: Least number of pairs in a period of a cycle.
 PAIRS_OF_A_CYCLE = 8
 #: A pair of steps is soft if less than this part of its compliance is instantaneous.
 SOFT = 0.1
-#: Length of the step that gives the pressure at the end of a soft step, in steps.
+#: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step.
 END_STEP = 1e-3
-#: Part of the solver's tolerance in a soft step whose end is shown, since that step magnifies the residual.
+#: Part of the usual tolerance of the contact solver in a soft step that ends at a kept time: the additional step
+#: magnifies the residual.
 MAGNIFIED = 3e-3
-#: Part of the usual tolerance of the contact solver in a slide: a slow slide changes the pressure little in a step, and
-#: its friction is a small part of it.
+#: Part of the usual tolerance of the contact solver in a slide: a step of a slow slide changes the pressure little, and
+#: the friction force is a small part of the load.
 SLIDING_SHARE = 0.3
-#: Part of the pressure of a cell that has just entered the contact that is uncertain, if it is due to creep.
+#: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
 ENTERED = 0.3
-#: Part of that pressure that both solutions of a pair may miss, times the square of the creep in the pair over the
-#: instantaneous compliance. Measured on random contacts of 2 x 40 cells with eight per cent instantaneous compliance.
+#: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
+#: creep in the pair over the instantaneous compliance. Measured on random contacts of 2 x 40 cells with eight per cent
+#: instantaneous compliance.
 SHARED = 0.1
-#: Part of the tolerance that cells that have just entered may leave uncertain at a kept time in the middle of a pair.
+#: Largest error due to cells that have just entered, at a kept time inside a pair, as a part of the tolerance.
 UNCERTAIN = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
-#: Rounding of displacements, relative to what the mean pressure could cause.
+#: Rounding of displacements, relative to the largest displacement that the mean pressure could cause.
 ROUNDING = 1e-11
-#: Times at which an open contact closes are found to this part of the way to the next event.
+#: Error of the time at which an open contact closes, as a part of the time to the next event.
 CLOSING = 1e-9
-#: Surfaces that are apart for less than this part of the way touch at once.
+#: Surfaces that are apart for less than this part of the time to the next event touch immediately.
 AT_ONCE = 1e-6
 
 
 @dataclass
 class Scene:
-    """What is prescribed.
+    """Input of the time stepping: surface, body, program and accuracy.
 
     Attributes
     ----------
@@ -113,9 +116,9 @@ class Scene:
     program : Program
         Load or approach against time, and slides.
     kept : tuple of float or None
-        Times of the kept rows, ascending; None: of every step. [s]
+        Times of the kept rows, ascending; None: times of all steps. [s]
     tolerance : float
-        Of the pressure at kept times, relative, L1 norm, and of approach and force.
+        Relative error of pressure (L1 norm), approach and force at kept times.
     time_step : float or None
         Fixed step; None: the tolerance controls the steps. [s]
     present : array of bool or None
@@ -123,7 +126,7 @@ class Scene:
     can_jump : bool
         Whether the body has an instantaneous compliance.
     stated : tuple of float
-        Part of the difference between both solutions that is stated, of pressure and force, and of the approach.
+        Stated error over the difference between both solutions: of pressure and force, and of the approach.
     """
 
     grid: Grid
@@ -147,12 +150,12 @@ class Scene:
         return float(values.min() if self.present is None else values[self.present].min())
 
     def prescribed(self, number: int, time: float, point: Point) -> float:
-        """Return what a segment prescribes at a time [s], of a solution that has a point in it. [N or m]"""
+        """Return the prescribed value of a segment at a time [s], for the solution of a point in it. [N or m]"""
         return self.program.segments[number].value(time - self.program.corners[number], point.start)
 
     @cached_property
     def motions(self) -> tuple[Slide, ...]:
-        """Slide of each segment that friction refers to: its own, the last one, or the first; empty if none slides."""
+        """Slide of each segment for the friction: its own, the last one, or the first; empty without slides."""
         slides: list[Slide | None] = []
         for segment in self.program.segments:
             slides.append(segment.slide or (slides[-1] if slides else None))
@@ -180,26 +183,26 @@ class Scene:
 
 @dataclass(frozen=True)
 class Point:
-    """A solution at an instant.
+    """Solution at an instant.
 
     Attributes
     ----------
     time : float
-        [s]
+        Time. [s]
     pressure : array, shape (nx, ny)
-        [Pa]
+        Pressure. [Pa]
     force, approach : float
-        [N, m]
+        Normal force and approach. [N, m]
     history : History
         Memory of the body.
     before : tuple or None
         Time, pressure and displacement per unit compliance of the last point, from which the next step extrapolates.
     start : float
-        Force [N] or approach [m] at the start of the segment, of which the program does not state the value.
+        Force [N] or approach [m] at the start of the segment, if the program does not state it.
     is_late : bool
-        Whether what was prescribed has jumped and the body cannot follow at once.
+        Whether the prescribed value has jumped and the body has no instantaneous compliance.
     solver_error, solver_error_approach : float
-        Errors of the contact solver: of the pressure, relative, L1 norm, and of the approach. [-, m]
+        Errors of the contact solver: relative error of the pressure (L1 norm), and error of the approach. [-, m]
     """
 
     time: float
@@ -221,18 +224,18 @@ class Point:
 
 @dataclass(frozen=True)
 class Difference:
-    """Stated error of the time steps, by the difference between the fine and the coarse solution.
+    """Stated error of the time steps, from the difference between the fine and the coarse solution.
 
     Attributes
     ----------
     pressure : float
-        Of the pressure, its absolute values summed. [N]
+        Error of the pressure: integral of its absolute value. [N]
     force, approach : float
-        [N, m]
+        Errors of force and approach. [N, m]
     inside, outside : float
-        Area in contact that may be none, and area out of contact that may be in it. [m2]
+        Uncertain area in contact, and uncertain area out of contact. [m2]
     friction : float
-        Of the friction force of a slide. [N]
+        Error of the friction force of a slide. [N]
     """
 
     pressure: float = 0.0
@@ -243,7 +246,7 @@ class Difference:
     friction: float = 0.0
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
-        """Return the larger error of each kind: of this one, or a part of the other."""
+        """Return the larger error of each kind, of this difference and a part of the other."""
         return Difference(
             max(self.pressure, part * other.pressure),
             max(self.force, part * other.force),
@@ -256,28 +259,28 @@ class Difference:
 
 @dataclass(frozen=True)
 class State:
-    """All that a march needs to continue.
+    """State from which the time stepping can continue.
 
     Attributes
     ----------
     fine : Point
-        Solution by the shorter steps.
+        Solution with the shorter steps.
     twice : Point or None
-        Solution by steps twice as long, at the same instant; None as long as both are the same.
+        Solution with steps twice as long, at the same instant; None while both solutions are equal.
     segment : int
         Index of the segment of the program.
     length : float
         Length of the next pair; zero after an event. [s]
     difference : Difference
-        Between both solutions.
+        Difference between both solutions.
     largest_force, largest_approach : float
-        So far. [N, m]
+        Largest values so far. [N, m]
     work : float
         Work of the normal force since the start. [J]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
-        Spent so far, rejected pairs included.
+        Number of convolutions so far, rejected pairs included.
     """
 
     fine: Point
@@ -293,26 +296,26 @@ class State:
 
     @property
     def coarse(self) -> Point:
-        """Solution by the longer steps."""
+        """Solution with the longer steps."""
         return self.twice or self.fine
 
 
 class Step(NamedTuple):
-    """An accepted step.
+    """Accepted step.
 
     Attributes
     ----------
     point : Point
-        The fine solution, its pressure that of the end of the step.
+        Fine solution, with the pressure at the end of the step.
     difference : Difference
         Error of the time steps.
     segment : int
         Index of the segment that the step belongs to.
     state : State
-        State after the step, from which a march continues; in the middle of a pair the one before the pair, with the
-        work and the path of the step.
+        State after the step, from which a march continues. In the middle of a pair it is the state before the pair,
+        with the work and the path of the step.
     is_end : bool
-        Whether a march may continue from the state: in the middle of a pair it may not.
+        Whether a march may continue from the state; False in the middle of a pair.
     """
 
     point: Point
@@ -328,22 +331,22 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     Parameters
     ----------
     scene : Scene
-        What is prescribed.
+        Input.
     state : State, optional
-        Where to continue, of an earlier step of the same scene. Default: at rest.
+        State of an earlier step of the same scene, from which to continue. Default: rest.
 
     Yields
     ------
     Step
-        Each accepted step, in order. Of a jump only the state after it, unless the body cannot follow at once: then
-        only the state before it.
+        Each accepted step, in order. A jump yields only the state after it. If the body has no instantaneous
+        compliance, it yields only the state before it.
 
     Raises
     ------
     InputError
         If an approach jumps and the body has no instantaneous compliance.
     ConvergenceError
-        If a contact is not solved.
+        If the contact solver does not converge.
     """
     segments = scene.program.segments
     if state is None:
@@ -367,7 +370,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
             steps = steps[:-1]
         yield from steps
-        steps = []  # their memory is free while the next ones are computed
+        steps = []  # frees their memory while the next steps are computed
 
 
 def jumps_next(scene: Scene, state: State) -> bool:
@@ -380,7 +383,7 @@ def jumps_next(scene: Scene, state: State) -> bool:
 
 
 def jump(scene: Scene, state: State, segment: Segment) -> State:
-    """Return the state after a jump; the next step takes it if there is no instantaneous compliance."""
+    """Return the state after a jump; without instantaneous compliance the next step takes the jump."""
     fine = state.fine
     if scene.can_jump:
         return single_step(scene, state, fine.time).state
@@ -405,14 +408,14 @@ def entered(scene: Scene, state: State) -> State:
     segments, index = scene.program.segments, state.segment + 1
     last, following = segments[index - 1], segments[index] if index < len(segments) else None
     changes = following is not None and following.control != last.control
-    # a corner of the approach is a jump of the load if the body cannot follow at once
+    # without instantaneous compliance a corner of the approach is a jump of the load
     jumps = not scene.can_jump and (changes or last.control == "approach")
     by_approach = following is not None and following.control == "approach"
     points = []
     for point in (state.fine, state.coarse):
         start, is_late = point.approach if by_approach else point.force, jumps and point.force > 0
         points.append(replace(without_past(point), start=start, is_late=is_late))
-    # a corner bends the histories and does not break them: the pairs may stay as long
+    # a corner of the histories without a jump: the pairs may keep their length
     smooth = not changes and last.duration > 0 and last.slide is None and state.fine.force > 0 and not jumps
     smooth = smooth and (following is None or (following.duration > 0 and following.slide is None))
     twice = points[1] if state.twice else None
@@ -420,7 +423,7 @@ def entered(scene: Scene, state: State) -> State:
 
 
 def without_past(point: Point) -> Point:
-    """Return a point from which nothing is extrapolated, and whose next step does not use the last one."""
+    """Return a point without its past: the next step neither extrapolates nor uses the step before."""
     return replace(point, before=None, history=replace(point.history, earlier=None, step=0.0))
 
 
@@ -428,13 +431,13 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine, coarse, grid, number = state.fine, state.coarse, scene.grid, state.segment
     memory, spent = scene.memory, grid.convolutions
-    rule: Rule | None = "linear" if fine.is_open else None  # exact as long as the surfaces stay apart
+    rule: Rule | None = "linear" if fine.is_open else None  # exact while the surfaces are apart
     new = other = take_step(scene, fine, time, number, rule=rule)
     if coarse is not fine:
         rule = "linear" if coarse.is_open else None
         other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
     work = trapezoid(scene, fine, new)
-    if memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all of it
+    if memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all work
         before = float((fine.pressure * memory.at_once(fine.history)).sum())
         after = float((new.pressure * memory.at_once(new.history)).sum())
         work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
@@ -446,7 +449,7 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
-    """Return the next accepted steps of a segment: a pair, or one step; the last one has the state after them."""
+    """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
     fine, coarse, number = state.fine, state.coarse, state.segment
     began, end = scene.program.corners[number : number + 2]
     event = min(scene.next_kept(fine.time), end)
@@ -468,7 +471,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     shortest = SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
     refused = refused_end = math.inf
     while True:
-        # The pair, the same in one step, and the pressures of these instants.
+        # The pair, the same in one step, and the pressures at these instants.
         middle, last = pair_ends(fine.time, length, event, next_event)
         taken = last - fine.time
         is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
@@ -481,7 +484,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             half, whole = end_value(scene, fine, first, number), end_value(scene, first, second, number)
             other = end_value(scene, coarse, once, number)
 
-        # The error at the end, and of cells that have just entered, in the middle and in both solutions.
+        # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
         apart = error_at(scene, fine, second, once, whole, other)
         left = 1.0 if is_soft else memory.remaining(middle - fine.time)
         unsure, shared = entering(scene, fine, half), 0.0
@@ -490,8 +493,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if lands and not is_soft:
             creep = memory.compliance(taken) / memory.compliance(0.0) - 1
             shared = SHARED * creep**2 * entered_force(scene, fine, second)
-        # Errors are relative to the largest values. Rounding cannot tell a smaller approach from none: all that a flat
-        # surface has under periodic boundaries.
+        # Errors are relative to the largest values, but an approach counts as at least its rounding error: a flat
+        # surface with periodic boundaries has no larger approach.
         force = max(state.largest_force, first.force, second.force, 1e-300)
         rounding = ROUNDING * memory.compliance(last) * scene.grid.stiffest * force / scene.gap.size
         approach = max(state.largest_approach, abs(first.approach), abs(second.approach), 1e-300)
@@ -502,10 +505,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         of_approach = apart.approach / approach / scene.stated[1]
         at_end = max(of_pressure, of_approach) if lands and taken > LANDING_PAIR * (last - began) else 0.0
 
-        # Whether it is accepted, and the length to try otherwise.
+        # Accept the pair, or choose the length to try next.
         in_middle, allowed = middle == event and scene.keeps(event), scene.tolerance * force
         doubtful = unsure > UNCERTAIN * allowed or unsure + left * state.difference.pressure > 0.8 * allowed
-        # a step that is too long may undershoot, so that contact under a held or growing approach seems to end
+        # too long a step may undershoot, so that contact seems to end under a held or growing approach
         opens = control == "approach" and fine.force > 0 and min(first.force, second.force) == 0
         too_long = ratio > REJECTED and ratio < REDUCED * refused
         misses = not too_long and ratio > NEARLY_NOTHING and scene.tolerance < at_end < 0.9 * refused_end
@@ -524,7 +527,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             if was_cut and factor >= 1 and not memory.is_stiff(asked):  # an event has cut the pair
                 length = max(length, min(asked, factor * taken))
             break
-        del first, second, once, half, whole, other  # their memory is free while the pair is tried again
+        del first, second, once, half, whole, other  # frees their memory while the pair is repeated
 
     works = work_of_pair(scene, fine, first, second)
     if scene.motions and scene.keeps(last):
@@ -540,10 +543,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
 
 def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
-    """Return the next steps of a slide, over one cell each, in the frame of the profile.
+    """Return the next steps of a slide by one cell each, in the frame of the profile.
 
-    The body moves backwards under the profile, by whole cells and without interpolation; then the step is an elastic
-    contact problem. The coarse solution moves by two cells at once. The error falls with the cells alone.
+    The body moves backwards under the profile by whole cells, without interpolation. The step is then an elastic
+    contact problem. The coarse solution moves by two cells per step. Only smaller cells reduce the error.
     """
     slide, grid, memory, fine, coarse = segment.slide, scene.grid, scene.memory, state.fine, state.coarse
     assert slide is not None
@@ -572,7 +575,7 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
     apart = replace(apart, friction=abs(force - friction(scene, once, slide)))
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
-    if cells == 1 and not memory.is_elastic:  # no solution with longer steps is known
+    if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
         apart = replace(apart, friction=abs(force))
     after = after_steps(scene, state, points[1:], once, apart, works[-1], spent, distance=count * side)
     inside = replace(state, work=state.work + works[1], distance=state.distance + side)
@@ -586,14 +589,14 @@ def friction(scene: Scene, point: Point, slide: Slide) -> float:
 
 
 def added(scene: Scene, state: State, second: Point, once: Point, force: float, approach: float) -> float:
-    """Return what a pair adds to the error at the next kept time, over what it may add.
+    """Return the error that a pair adds at the next kept time, over the allowed error.
 
     Errors are relative to the largest force [N] and approach [m].
     """
     fine, coarse, memory, taken = state.fine, state.coarse, scene.memory, second.time - state.fine.time
     control = scene.program.segments[state.segment].control
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
-    # errors are relative to the largest values, those of the next kept time included
+    # errors are relative to the largest values, including the next kept time
     end = scene.program.corners[state.segment + 1]
     now = scene.prescribed(state.segment, second.time, second)
     then = scene.prescribed(state.segment, min(following, end), second)
@@ -602,7 +605,8 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
     soft = scene.is_soft(taken)
     receding = bool(((fine.pressure > 0) & (second.pressure == 0)).any())
 
-    # What the difference between both solutions changes by, as the pair would leave it or as relaxation does.
+    # Change of the difference between both solutions over the pair, from its full value before the pair or from the
+    # part that relaxation leaves of this value.
     after, before = second.pressure - once.pressure, fine.pressure - coarse.pressure
     change = float(abs(after - before).sum())
     if soft:
@@ -612,7 +616,7 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
         change = min(change, float(abs(after - memory.remaining(taken) * before).sum()))
         remains = max(memory.remaining(following - second.time), RECEDING if receding else LEAST_REMAINING)
     change *= scene.grid.cell_area / force
-    # the pressure of a soft body depends on how contact changes now, and hardly on its errors before
+    # the pressure of a soft body depends on the present change of contact, and hardly on earlier errors
     of_pressure, of_approach = scene.stated
     carried = 0.0 if soft else state.difference.pressure / of_pressure / force * memory.remaining(following - fine.time)
     changes = [(change * remains, carried)]
@@ -632,9 +636,9 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
 
 
 def end_value(scene: Scene, here: Point, point: Point, number: int) -> Point:
-    """Return the end of a step of a soft pair with the pressure of its instant, if that is kept.
+    """Return the end of a step of a soft pair; at a kept time with the pressure at that time.
 
-    A short step, in which the load stays or the approach changes as before, gives this pressure.
+    A short additional step gives this pressure. The load is constant in it, or the approach changes as before.
     """
     if not (scene.keeps(point.time) and point.force > 0):
         return point
@@ -651,13 +655,13 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Poi
     Parameters
     ----------
     scene : Scene
-        What is prescribed.
+        Input of the time stepping.
     before : Point
         Start of the pair.
     fine, coarse : Point
-        Both solutions.
+        Both solutions at the end of the pair.
     shown, other : Point
-        The same with the pressures of that instant.
+        The same solutions with the pressures at that time.
     """
     apart = difference(scene, shown, other)
     if not scene.keeps(fine.time) or fine is coarse:
@@ -679,7 +683,7 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Poi
 
 
 def entering(scene: Scene, before: Point, after: Point) -> float:
-    """Return the force that a step leaves uncertain in the middle of a pair, in cells that have entered. [N]"""
+    """Return the uncertain force of cells that have entered during the first step of a pair. [N]"""
     compliance = scene.memory.compliance(after.time - before.time)
     creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
     return ENTERED * creeping * entered_force(scene, before, after)
@@ -701,33 +705,33 @@ def after_steps(
     length: float = 0.0,
     distance: float = 0.0,
 ) -> State:
-    """Return the state after accepted steps, of the next segment if they end theirs.
+    """Return the state after accepted steps; at the end of a segment, the state at the start of the next one.
 
     Parameters
     ----------
     scene, state : Scene, State
-        What is prescribed, and where the steps began.
+        Input, and state before the steps.
     points : list of Point
         Fine solution at the end of each step.
     coarse : Point
-        Coarse solution at the end of the last one.
+        Coarse solution at the end of the last step.
     apart : Difference
-        Between both there.
+        Difference between both solutions there.
     work : float
-        Of the steps. [J]
+        Work of the steps. [J]
     spent : int
-        Convolutions of the grid before the steps.
+        Number of convolutions of the grid before the steps.
     length : float
-        Of the next pair. [s]
+        Length of the next pair. [s]
     distance : float
-        Of a slide. [m]
+        Distance of a slide. [m]
     """
     fine, force, approach = points[-1], state.largest_force, state.largest_approach
     for point in points:
         force, approach = max(force, point.force), max(approach, abs(point.approach))
     reached = State(
         fine,
-        None if coarse is fine else replace(coarse, before=None),  # its first guess needs none
+        None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
         state.segment,
         length,
         apart,
@@ -741,7 +745,7 @@ def after_steps(
 
 
 def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
-    """Return the stated errors of a fine solution, from its difference to the coarse one."""
+    """Return the stated errors of a fine solution, from its difference to the coarse solution."""
     if fine is coarse:
         return Difference()
     stated, of_approach = scene.stated
@@ -753,12 +757,12 @@ def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
 def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
     """Return the work of the normal force in the first step of a pair, and in both. [J]
 
-    Force and approach run along parabolas through the three points. A load that has jumped is held from then on.
+    Force and approach are parabolas through the three points. After a jump the load is constant.
     """
     forces = middle.force if start.is_late else start.force, middle.force, end.force
     approaches = start.approach, middle.approach, end.approach
     first, last = middle.time - start.time, end.time - start.time
-    if not 0 < first < last or min(middle.force, end.force) == 0:  # as close as rounding, or contact is lost
+    if not 0 < first < last or min(middle.force, end.force) == 0:  # equal times up to rounding, or contact is lost
         early = trapezoid(scene, start, middle)
         return early, early + trapezoid(scene, middle, end)
 
@@ -783,7 +787,7 @@ def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple
 def trapezoid(scene: Scene, before: Point, after: Point) -> float:
     """Return the work of the normal force between two points. [J]
 
-    If contact is lost between them, the force ends where the surfaces still touch.
+    If contact is lost between the points, the force vanishes at the approach of last contact.
     """
     if before.force == 0 == after.force:
         return 0.0
@@ -796,13 +800,14 @@ def trapezoid(scene: Scene, before: Point, after: Point) -> float:
 
 
 def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
-    """Return the middle and the end of the next pair, of about a length; an event is its end or its middle. [s]
+    """Return the middle and the end of the next pair of about a given length. [s]
 
-    The steps of a pair have similar lengths: the coarse solution would take almost the same step as a much longer one.
+    A near event becomes the end or the middle of the pair. The steps have similar lengths, because the coarse solution
+    differs little from the fine one if one of two steps is much longer.
     """
     first, second = event - now, next_event - event
     if SHORTEST_HALF * length <= first <= LONGEST_HALF * length and second >= first / MOST_UNEQUAL:
-        is_near = second <= (MOST_UNEQUAL + SHORTEST_HALF) * first  # leave no splinter of a step
+        is_near = second <= (MOST_UNEQUAL + SHORTEST_HALF) * first  # leave no very short step
         return event, next_event if is_near else event + MOST_UNEQUAL * first
     pairs = max(math.ceil((event - now) / length - 0.2), 1)
     return now + (event - now) / (2 * pairs), event if pairs == 1 else now + (event - now) / pairs
@@ -826,17 +831,17 @@ def take_step(
     Parameters
     ----------
     scene : Scene
-        What is prescribed.
+        Input of the time stepping.
     here : Point
-        Where the step begins.
+        Start of the step.
     time : float
         End of the step. [s]
     number : int
         Index of the segment.
     value : float, optional
-        Load or approach at the end. Default: what the segment prescribes. [N or m]
+        Load or approach at the end. Default: the prescribed value of the segment. [N or m]
     guess : tuple, optional
-        First guess of the pressure and its displacement per unit compliance. Default: extrapolated.
+        First guess of the pressure and of its displacement per unit compliance. Default: extrapolation.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
     share : float
@@ -845,7 +850,7 @@ def take_step(
     Raises
     ------
     ConvergenceError
-        If the contact is not solved.
+        If the contact solver does not converge.
     """
     memory, step, area, segment = scene.memory, time - here.time, scene.grid.cell_area, scene.program.segments[number]
     by_load = segment.control == "load"
@@ -860,7 +865,7 @@ def take_step(
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
     pressure, unit = guess or extrapolated(scene, here, step)
-    guess = None  # not needed while the contact is solved
+    guess = None  # frees its memory while the contact is solved
     pressure, unit = alpha * pressure, None if unit is None else alpha * unit
     try:
         found = solve_contact(
@@ -898,7 +903,7 @@ def take_step(
 
 
 def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
-    """Return the pressure that the last two points extrapolate to, and its unit displacement if known."""
+    """Return the pressure extrapolated from the last two points, and its displacement per unit compliance if known."""
     now, unit = here.pressure, scene.memory.unit(here.history)
     if here.before is None or step == 0:
         return now, unit
@@ -909,7 +914,7 @@ def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
 
 
 def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
-    """Return a first guess of the coarse solution: the fine one, apart by as much as before the pair."""
+    """Return a first guess of the coarse solution: the fine solution, with the difference before the pair."""
     memory = scene.memory
     unit, of_coarse, of_fine = memory.unit(second.history), memory.unit(coarse.history), memory.unit(fine.history)
     if coarse is fine or unit is None or of_coarse is None:
@@ -918,11 +923,11 @@ def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
 
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:
-    """Return the time up to which the surfaces, apart now, stay apart; the present time if they touch at once. [s]"""
+    """Return the time until which open surfaces stay apart; the present time if they touch immediately. [s]"""
     here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.is_nothing(here.start) else now
-    if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to the undeformed one
+    if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to its undeformed shape
         return event
 
     def touching(time: float) -> float:
@@ -930,7 +935,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
 
     turns = [began + time for time in segment.turns(now - began, event - began)]
     first = now
-    for last in (*turns, event):  # the approach is monotone between, and the surface only rises
+    for last in (*turns, event):  # in between the approach is monotone, and the surface only rises
         pending = [(first, last)]
         while pending:
             left, right = pending.pop()

@@ -1,10 +1,10 @@
 r"""Tangential force of a contact without shear: the force of the pressure on the inclined surface.
 
-A profile that moves along +x is driven by ``-int p du/dx dA``, and kept on its path by ``-int p du/dy dA`` towards +y,
-with the displacement ``u`` of the body, which in contact has the slope of the profile. The part ``K p`` of ``u`` adds
-nothing, since ``K`` is even: on the grid its sum is zero to rounding, if the slope is that of the Fourier series. So
-the force does not depend on how steeply the pressure ends at the edges of contact, as the sum of pressure times slope
-of the profile does.
+The force ``-int p du/dx dA`` drives a profile that moves along +x, and ``-int p du/dy dA`` towards +y keeps it on its
+path. The displacement ``u`` of the body has the slope of the profile in contact. The part ``K p`` of ``u`` does not
+contribute, since ``K`` is even: on the grid its sum is zero to rounding, if the slope is computed from the Fourier
+series. The force is therefore insensitive to the steepness of the pressure at the edges of contact. The sum of pressure
+times slope of the profile is sensitive to it.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ def slope(field: Array, side: float, axis: int) -> Array:
     Parameters
     ----------
     field : array, shape (nx, ny)
-        Of any unit.
+        Field of any unit.
     side : float
-        Of a cell along the axis. [m]
+        Cell side along the axis. [m]
     axis : int
         0 for x, 1 for y.
 
     Returns
     -------
     array, shape (nx, ny)
-        The shortest wave of an even number of cells has none. [unit of the field / m]
+        Slope; zero for the shortest wave of an even number of cells. [unit of the field / m]
     """
     xp, count = namespace(field), field.shape[axis]
     fft, waves = fft_of(xp), 2 * math.pi * scipy.fft.rfftfreq(count, side)
@@ -47,14 +47,14 @@ def slope(field: Array, side: float, axis: int) -> Array:
 
 
 def tangential_force(grid: Grid, pressure: Array, displacement: Array, slide: Slide, across: bool = False) -> float:
-    """Return the friction force, against the motion of a profile, by the slope of the body under it. [N]
+    """Return the friction force against the motion of a profile, from the slope of the body. [N]
 
     Parameters
     ----------
     grid : Grid
-        The body, periodic.
+        Cells of the body, periodic.
     pressure, displacement : array, shape (nx, ny)
-        [Pa], [m]
+        Pressure [Pa], and displacement of the body [m].
     slide : Slide
         The motion.
     across : bool

@@ -113,7 +113,7 @@ def test_the_series__is_within_the_tolerance_between_its_samples(curve, shortest
 
 
 def test_a_creep_function__is_not_extrapolated():
-    with pytest.raises(InputError, match=r"asked for at 2 s, and the table ends at 1 s"):
+    with pytest.raises(InputError, match=r"requested at 2 s, and the table ends at 1 s"):
         pressed(rv.creep(lambda t: 1e-7 * (1 + t), longest=1.0))
 
 

@@ -58,7 +58,7 @@ def test_cycle__is_a_sine_about_its_mean():
         (lambda: Segment("load", 1, math.nan), r"load is nan: expected a finite number \[N\]"),
         (lambda: rv.Program().pressure("1 kPa", over=0).largest_load, "nominal pressure: expected loads"),
         (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), r"load reaches -1\.0 N"),
-        (lambda: Segment("load", 1.0, 2.0, slide=Slide(1e-3)), "a slide takes time and keeps what is controlled"),
+        (lambda: Segment("load", 1.0, 2.0, slide=Slide(1e-3)), "a slide keeps the controlled quantity"),
         (lambda: Slide(-1e-3), "distance: found -0.001"),
         (lambda: Slide(1e-3, "z"), "direction: found 'z'"),
     ],

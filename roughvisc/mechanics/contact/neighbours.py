@@ -1,4 +1,4 @@
-"""Faces between cells in contact and cells out of contact, and what counting cells makes of a contact area."""
+"""Faces between contact cells and free cells, and the correction of a counted contact area."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ PERIMETER_CORRECTION = 0.088
 
 
 def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: bool = False) -> Iterator[Mask]:
-    """The mask as seen from each cell across its lower and upper face along x, then along y.
+    """Yield the mask of the neighbour across the lower and the upper face of each cell, along x, then along y.
 
     Parameters
     ----------
     mask : ndarray of bool, shape (nx, ny)
-        Of the cells.
+        Mask of the cells.
     boundary : {"free", "periodic", "mirror"}
         Periodic: the first cell of a row is the neighbour of the last. Mirror: beyond the border, a cell's neighbour is
         its own image.
     before, beyond : bool
-        What lies outside the first and outside the last cell of every row in free space.
+        Values outside the first and the last cell of every row in free space.
 
     Examples
     --------
@@ -47,9 +47,9 @@ def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: boo
 
 
 def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> int:
-    """Number of faces between cells in contact and free ones, as :func:`neighbours` sees these.
+    """Return the number of faces between contact cells and free cells, see :func:`neighbours`.
 
-    With mirror images there are none at the border, as in free space with nothing beyond it.
+    The border of a mirrored surface has no such faces; count it as free space with nothing beyond the border.
     """
     count = 0
     for own, other in ((contact, free), (contact.T, free.T)):
@@ -65,16 +65,16 @@ def contact_area(
 ) -> tuple[float, float]:
     """Return the area of the cells in contact, counted and corrected for the grid. [m2]
 
-    The count is too large by a part of the strip along the perimeter.
+    Counting cells overestimates the area by a part of the strip along the perimeter.
 
     Parameters
     ----------
     contact, free : ndarray of bool, shape (nx, ny)
-        Cells in contact, and cells out of it where the material goes on.
+        Contact cells, and cells with material out of contact.
     cell_area : float
         [m2]
     periodic, before, beyond
-        As :func:`neighbours` has them.
+        See :func:`neighbours`.
     """
     counted = int(np.count_nonzero(contact)) * cell_area
     # a face across x is dy long and lies in a strip dx wide, and the other way round
@@ -83,14 +83,14 @@ def contact_area(
 
 
 def area_bounds(counted: Array, area: Array, inside: Array, outside: Array) -> tuple[Array, Array]:
-    """Bounds on a contact area where it is uncertain of some cells whether they are in contact. [m2]
+    """Return bounds on a contact area, if some cells are uncertain. [m2]
 
     Parameters
     ----------
     counted, area : float or ndarray
         Contact area, counted and corrected, see :func:`contact_area`. [m2]
     inside, outside : float or ndarray
-        Area of the uncertain cells in contact, and of those out of it. [m2]
+        Area of the uncertain cells in contact, and of the uncertain cells out of contact. [m2]
 
     Returns
     -------
@@ -99,9 +99,9 @@ def area_bounds(counted: Array, area: Array, inside: Array, outside: Array) -> t
 
     Notes
     -----
-    A cell that changes sides changes the count by one cell and the staircase by the cell's four faces at most. Each
-    cell in contact counts more than its faces take off: the area grows with each cell that comes into contact, and
-    is never more than the count.
+    A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four faces.
+    The area of a cell exceeds the correction for its faces. The area therefore grows with each cell that enters the
+    contact, and never exceeds the count.
 
     Examples
     --------

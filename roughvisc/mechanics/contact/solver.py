@@ -35,7 +35,7 @@ import numpy as np
 from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.grid import Grid, namespace
 
-Array = Any  # an array of NumPy or CuPy, as the grid has them
+Array = Any  # an array of NumPy or CuPy, depending on the grid
 
 #: A step is at most this many times its trial: the periodic kernel does not resist a uniform pressure.
 LONGEST_STEP = 30.0
@@ -47,18 +47,20 @@ SHORTEST_STEP = 1e-3
 PATIENCE = 30
 #: The relative duality gap may be this many times the tolerance if the estimated error of the pressure is small enough.
 GAP_SLACK = 1.5
-#: A first step is taken whole; the next one is conjugate to it if the minimum along it is at most this part of it away.
+#: A first step is taken whole. The next step is conjugate to it if the minimum along the first lies near its end,
+#: within this part of its length.
 NEARLY_MINIMUM = 0.1
-#: Factor of the estimated error, so that it is hardly ever too small; and with the second level of the preconditioner.
+#: Safety factor that makes the estimated error hardly ever too small; and the factor with the second level of the
+#: preconditioner.
 CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
-#: Cells from which steps are convolved in single precision, if the error at the start is so many times the tolerance:
-#: some four steps pay for the convolution in double precision that follows them.
+#: Number of cells from which steps are convolved in single precision, and the least ratio of the first error to the
+#: tolerance. About four steps pay for the final convolution in double precision.
 SINGLE_FROM, FAR = 96**2, 30.0
 #: Rounding of a displacement, relative to its largest value.
 ROUNDING = 8 * float(np.finfo(float).eps)
 #: Distance to the approach of full contact, over the approach, below which no load is searched for.
 NEAREST_TO_FULL = 1e-12
-#: Distance to the approach of full contact, over the approach, below which the mean gap needs weights of its own.
+#: Distance to the approach of full contact, over the approach, below which the mean gap needs separate weights.
 NEARLY_FULL = 1e-3
 #: Cells a side from which a cold start is solved on half as many first, and the tolerance there.
 COARSE_FROM, COARSE_TOLERANCE = 256, 0.03
@@ -140,7 +142,7 @@ def solve_contact(
     ValueError
         If both or neither of load and approach are given.
     ConvergenceError
-        If the tolerance is not reached, or if the approach is that of full contact or beyond.
+        If the tolerance is not reached, or if the approach reaches full contact.
     """
     if (load is None) == (approach is None):
         raise ValueError("expected either load or approach")
@@ -162,7 +164,7 @@ def solve_contact(
     level = overlap / unit
     is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
-        raise ConvergenceError("the approach is that of full contact or beyond, which does not determine the load")
+        raise ConvergenceError("the approach reaches full contact and does not determine the load")
 
     def separation_under(pressure: Array) -> Array:
         return given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
@@ -379,7 +381,7 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
 
 def onto_simplex(values: Array, total: float) -> Array:
     """Return the nearest non-negative vector of given sum."""
-    xp, shifted = namespace(values), values - values.max()  # a small sum is lost beside large values otherwise
+    xp, shifted = namespace(values), values - values.max()  # otherwise a small sum is lost next to large values
     ordered = xp.sort(shifted)[::-1]
     excess = (xp.cumsum(ordered) - total) / xp.arange(1, ordered.size + 1)
     return xp.maximum(shifted - excess[int((ordered > excess).sum()) - 1], 0)
@@ -391,7 +393,7 @@ def largest(values: Array, least: float = 0.0) -> float:
 
 
 def inner(one: Array, other: Array) -> float:
-    """Return the inner product; that of BLAS depends on the number of threads in its last bits."""
+    """Return the inner product. The last bits of the BLAS function would depend on the number of threads."""
     return float((one * other).sum())
 
 
@@ -432,7 +434,7 @@ def load_error(
 ) -> float:
     """Return the relative error of the load under a given approach with periodic boundaries.
 
-    Gaps in the contact that are off by ``e`` are those of a surface that is off by as much. That changes the load by
+    An error ``e`` of the gaps in the contact is equivalent to an error ``e`` of the surface. It changes the load by
     ``k`` times the mean of ``e``, where ``k = min w.(1/K)w / mean(w)^2`` over all ``w`` that vanish in the contact. The
     shape of the gap as ``w`` makes this a bound.
     """
@@ -476,7 +478,7 @@ BLOCKS_FROM, SPARSE = 768, 0.6
 #: Blocks pay if the number of blocks along a side, times the part of the free cells that lies in partly free blocks, is
 #: at least this. Within a contact spot that is wider than a block, they do harm.
 SPOTS = 45.0
-#: Part of the local compliance that is used: the fewest iterations lie between half of it and all of it.
+#: Part of the local compliance that is used. The number of iterations is least between 0.5 and 1.
 LOCAL_SHARE = 0.7
 #: Reduction of the residual of the equations of the blocks, and the most iterations.
 BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 100
@@ -500,7 +502,7 @@ class LongWaves(NamedTuple):
     free : array
         Number of free cells of each block.
     part : float
-        Area of a cell over that of a block.
+        Area of a cell over the area of a block.
     local : float
         Local compliance. [m]
 

@@ -75,7 +75,7 @@ class Creep:
         end = self.longest * self.time_factor
         if t.size and not np.max(t) <= end * (1 + 1e-12):  # beyond rounding of a sum of steps
             raise InputError(
-                f"creep is asked for at {np.max(t):g} s, and the table ends at {end:g} s: expected a table as long as "
+                f"creep is requested at {np.max(t):g} s, and the table ends at {end:g} s: expected a table as long as "
                 "the program; creep data are not extrapolated"
             )
         found = self.function(np.minimum(t, end) / self.time_factor, *self.parameters)

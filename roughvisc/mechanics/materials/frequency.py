@@ -21,8 +21,8 @@ from roughvisc.mechanics.materials.series import series
 
 Complex = NDArray[np.complex128]
 
-# A series must keep its error to times so many times shorter and longer than the frequencies need: a term whose time is
-# a hundred times off has a hundredth of its loss.
+# Factor by which the times of a series must extend beyond the times of the frequencies, shorter and longer: a term
+# whose time is a hundred times off contributes a hundredth of its loss.
 _BEYOND = 100.0
 
 

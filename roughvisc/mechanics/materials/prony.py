@@ -116,7 +116,7 @@ class Prony:
         Raises
         ------
         InputError
-            If there is no instantaneous compliance: the relaxation modulus then holds an impulse.
+            If the instantaneous compliance is zero: the relaxation modulus then contains an impulse.
 
         Notes
         -----

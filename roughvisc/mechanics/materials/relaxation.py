@@ -49,13 +49,13 @@ def from_relaxation(
     poisson : float
         Poisson ratio; a half unless given.
     instantaneous : float or str
-        ``G_0``, in place of `equilibrium`. [Pa]
+        ``G_0``, instead of `equilibrium`. [Pa]
     ratios : sequence of float
-        ``g_i = G_i / G_0``, in place of `moduli`; a sum of one makes a fluid. [-]
+        ``g_i = G_i / G_0``, instead of `moduli`; a sum of one makes a fluid. [-]
     kind : {"shear", "tensile"}
         Whether the moduli are shear moduli or Young's moduli, ``E = 2 G (1 + nu)``.
     bulk_modulus : float or str
-        Elastic bulk modulus ``K``, in place of a Poisson ratio. [Pa]
+        Elastic bulk modulus ``K``, instead of a Poisson ratio. [Pa]
 
     Returns
     -------
@@ -157,7 +157,7 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
     Notes
     -----
     In the transformed domain :math:`(1 - \nu)/G = \tfrac12 [1/G + 3/(3K + G)]`, and ``B`` is the creep compliance
-    that belongs to the relaxation modulus ``3K + G(t)``: regular up to incompressibility, where it vanishes.
+    of the relaxation modulus ``3K + G(t)``: regular up to incompressibility, at which ``B`` vanishes.
     With ``J^ = s J~``, ``B^ = J^/(1 + 3K J^) = 1/(3K) - 1/((3K)^2 (1/(3K) + J^))``: the rates of ``B`` are the zeros
     of ``1/(3K) + J_0 - phi/m + sum J_i r_i / (r_i - m)``.
     """

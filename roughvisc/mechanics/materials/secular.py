@@ -57,7 +57,7 @@ def secular_roots(strengths: Array, poles: Array, constant: float) -> list[tuple
 
 
 def _log_bracketed(function: Callable[[float], float], upper: float) -> float:
-    """Zero of a function that rises from -inf at 0+ to a value >= 0 at ``upper``, sought in the logarithm."""
+    """Return the zero of a function that rises from -inf at 0+ to at least 0 at ``upper``, found in log scale."""
     if function(upper) <= 0:
         return upper
     lower = upper
@@ -65,6 +65,6 @@ def _log_bracketed(function: Callable[[float], float], upper: float) -> float:
         lower *= 1e-3
         if lower < 1e-300:
             return lower
-    # a little wider: a zero at an end of the bracket must not slip out of it by the rounding of the logarithm
+    # slightly wider, so that rounding of the logarithm cannot exclude a zero at an end of the bracket
     low, high = math.log(lower) - 1e-9, math.log(min(upper, lower * 1e3)) + 1e-9
     return math.exp(scipy.optimize.brentq(lambda y: function(math.exp(y)), low, high, xtol=1e-15))

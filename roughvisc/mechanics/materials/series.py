@@ -95,7 +95,7 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
     if material.function is series_creep:
         terms: Prony = material.parameters[0].scaled(material.time_factor, material.modulus_factor)
-        exact = replace(terms, poisson=material.poisson)  # that of a table's terms is the default
+        exact = replace(terms, poisson=material.poisson)  # the terms of a table have the default Poisson ratio
         if error > tolerance or len(found.times) >= len(exact.times):
             return exact, 0.0
     return found, error

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-#: A term that nowhere makes up more of the target than this is left out.
+#: Terms whose part of the target is below this in all rows are left out.
 _UNSEEN = 1e-10
-#: Rows above which they are reduced first.
+#: Number of rows above which they are first reduced to a triangular factor.
 _MANY = 1000
 
 
@@ -22,14 +22,16 @@ def lattice(shortest: float, longest: float, per_decade: float) -> Array:
 
 
 def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
-    """Return the non-negative weights of the columns whose sum fits the target in least squares; mostly zeros.
+    """Return non-negative weights of columns, mostly zeros, whose weighted sum fits a target in least squares.
 
     Parameters
     ----------
     columns : ndarray, shape (rows, terms)
+        Columns to combine.
     target : ndarray, shape (rows,)
+        Target of the sum.
     scale : ndarray, shape (rows,)
-        Positive: the misfit of a row is relative to it.
+        Positive scale of the misfit of each row.
     """
     scaled = columns / scale[:, None]
     norms = np.sqrt(np.sum(scaled**2, axis=0))

@@ -185,7 +185,7 @@ def dynamic_table(
     storage, loss : sequence of float or str
         ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
     frequency_unit : {"rad/s", "Hz"}
-        Angular frequency, or cycles per second. There is no default, because the wrong one changes all times by the
+        Angular frequency, or cycles per second. It has no default, because the wrong unit changes all times by the
         factor 2 pi.
     shift_factors : sequence of float, optional
         ``a_T`` of each row (or one for all), the factor for its frequency.

@@ -9,7 +9,7 @@ The grid error, as measured on discs, squares at any angle, strips and Hertz con
 
 1. At an edge where the gap opens, counting cells overestimates the spot, and a punch of cells is too soft. The two
    errors cancel: the punch has the stiffness of the spot with the corrected area, and it is the derivative of force by
-   approach on the same grid. There is no correction.
+   approach on the same grid. A correction is not needed.
 2. At an edge of the material the outline is known, and the punch is too soft to first order. It is solved again on
    cells of half the side, and extrapolated: by twice the difference for an outline along the cells, and by 1.2 times
    for an oblique one, whose cells form a staircase around the smooth outline. The share of faces that belong to steps
@@ -86,7 +86,7 @@ def frozen_contact(
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic", "mirror"}
         With periodic or mirror boundaries the approach is measured to the mean plane of a half-space, and the stiffness
-        is that of one period or of the map.
+        refers to one period, or to the map.
     present : ndarray of bool, shape (nx, ny), optional
         Cells with material; None: all. The outline of a spot is known exactly next to absent cells and at the border of
         free space.

@@ -1,10 +1,10 @@
 r"""Flow through a large network on two grids: conjugate gradients on its cells, direct factors of a coarse one.
 
-A cell of the coarse network is what strong faces join of a block of cells. Smoothed aggregation [1]_ carries its
-pressure to the cells: that of the coarse cells, :math:`T p`, and one step of Jacobi's, :math:`(1 - \omega D^{-1} A) T`.
-What differs from one cell to the next is left to Jacobi's steps before and after. Since the coarse equations are solved
-directly, a channel that is one cell wide in a narrow place does not slow the iterations down, as it does with an
-algebraic multigrid of many levels.
+A cell of the coarse network is a set of cells of a block that strong faces connect. Smoothed aggregation [1]_ carries
+its pressure to the cells: the pressure of the coarse cell, :math:`T p`, followed by one Jacobi step,
+:math:`(1 - \omega D^{-1} A) T`. Jacobi steps before and after reduce errors that differ from one cell to the
+next. The coarse equations are solved directly. Therefore a channel that is one cell wide in a narrow place does not
+slow the iterations down, as it does with an algebraic multigrid of many levels.
 
 .. [1] P. Vaněk, J. Mandel, M. Brezina, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
    problems, Computing 56 (1996) 179-196.
