@@ -1,4 +1,4 @@
-"""Dask clients of a local cluster and of a running scheduler, and the number of processes that fit in the memory."""
+"""Dask clients of a local cluster or a running scheduler, and the number of processes that fit in the memory."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def local_client(processes: int) -> Iterator[Client]:
 
     refuse_unguarded_script()
     settings = {
-        "distributed.scheduler.worker-saturation": 1.0,  # no case is queued on a worker, and lost with it
+        "distributed.scheduler.worker-saturation": 1.0,  # a lost worker has no queued cases
         "distributed.comm.timeouts.connect": "60s",
         # a killed worker may take long to start again on a busy machine
         "distributed.deploy.lost-worker-timeout": "300s",
-        "distributed.worker.profile.enabled": False,  # samples would take time from a case
+        "distributed.worker.profile.enabled": False,  # profiling slows the cases down
     }
     with dask.config.set(settings):
         try:
@@ -75,12 +75,12 @@ def local_client(processes: int) -> Iterator[Client]:
 
 
 def refuse_unguarded_script() -> None:
-    """Refuse to start processes from a script without ``if __name__ == "__main__":``, which each of them would run.
+    """Refuse to start processes from a script without ``if __name__ == "__main__":``, which every process would run.
 
     Raises
     ------
     InputError
-        Stating the script.
+        If the script has no such condition; the message names the script.
     """
     main = sys.modules.get("__main__")
     path = getattr(main, "__file__", None)
@@ -103,7 +103,7 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
     address : str, optional
         Address of the scheduler, such as ``tcp://host:8786``.
     file : path, optional
-        File of ``dask scheduler --scheduler-file``, in place of the address.
+        File of ``dask scheduler --scheduler-file``, instead of the address.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
     from distributed import Client
 
     if (address is None) == (file is None):
-        raise InputError("found both an address and a file of the scheduler: expected one of them")
+        raise InputError("found both an address and a file of the scheduler: expected only one")
     if file is not None and not file.is_file():
         raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
@@ -134,9 +134,9 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
 
 
 def default_client() -> Client | None:
-    """Return the user's default client; None within a Dask task, which computes in its own process."""
+    """Return the user's default client; None within a Dask task, whose cases run in its own process."""
     distributed = sys.modules.get("distributed")
-    if distributed is None:  # nobody has made a client
+    if distributed is None:  # not imported, so there is no client
         return None
     with suppress(ValueError):
         distributed.get_worker()
@@ -147,12 +147,12 @@ def default_client() -> Client | None:
 
 
 def require_same_version(client: Client) -> None:
-    """Refuse a cluster that has a worker with another version of roughvisc, or without it.
+    """Refuse a cluster in which a worker has another version of roughvisc, or none.
 
     Raises
     ------
     InputError
-        Stating the address of the worker and both versions.
+        If a version differs; the message states the address of the worker and both versions.
     """
     here = metadata.version("roughvisc")
     for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
@@ -162,7 +162,7 @@ def require_same_version(client: Client) -> None:
 
 
 def processes_that_fit(sizes: Iterable[float], most: int, free: float) -> int:
-    """Return how many processes fit in the memory at the same time, one at least.
+    """Return the number of processes that fit in the memory at the same time, at least one.
 
     Parameters
     ----------
@@ -207,17 +207,17 @@ def side_by_side(cases: Sequence[Case], most: int) -> int:
 
 
 def _cells(case: Case) -> float:
-    """Return the number of cells of a surface; zero if it is small, or cannot be read now."""
+    """Return the number of cells of a surface; zero if the surface is small or cannot be read."""
     resample = case.surface.get("resample") or None
     stated = resample["shape"] if isinstance(resample, Mapping) else resample or case.surface.get("shape")
     shape = None if stated is None else counts("shape", stated)
     if shape is None and (file := case.surface.get("file")):
-        with suppress(OSError, ValueError):  # the case reports it
-            if Path(file).stat().st_size >= WORTH_ASKING:  # at least a byte per cell
+        with suppress(OSError, ValueError):  # the run of the case reports the error
+            if Path(file).stat().st_size >= WORTH_ASKING:  # a file has at least a byte per cell
                 shape = case.height().shape
     return math.prod(shape) if shape else 0.0
 
 
 def threads_each(processes: int) -> int:
-    """Return the number of threads of each of some processes on this machine."""
+    """Return the number of threads per process for some processes on this machine."""
     return max(1, cores() // max(processes, 1))

@@ -1,6 +1,6 @@
-"""Cases on the workers of a Dask client: the task of a worker, and the loop that submits cases and records their ends.
+"""Cases on the workers of a Dask client: the task of a worker, and the loop that submits and records cases.
 
-Dask submits the case of a lost worker again, and the case resumes from its checkpoint.
+If a worker is lost, Dask submits its case again, and the case resumes from its checkpoint.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ log = logging.getLogger("roughvisc")
 
 #: Time between two reports of one case. [s]
 _REPORT_EVERY = 0.5
-#: Time that running cases have to end their step when a sweep is interrupted. [s]
+#: Time for running cases to finish their step after an interrupt. [s]
 _PATIENCE = 120.0
-#: Time without any worker after which a message says so. [s]
+#: Time without any worker after which the sweep displays a warning. [s]
 _ALONE_AFTER = 30.0
-#: States of a worker that is leaving: by a signal, or at the end of its lifetime.
+#: States of a worker that closes, after a signal or at the end of its lifetime.
 _LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
 #: A worker computes one case at a time, with all its threads.
 _one_at_a_time = threading.Lock()
@@ -54,13 +54,13 @@ def distribute(
     texts : dict
         Key -> case as JSON.
     record : Record
-        Record of the sweep; its folder is that of the results.
+        Record of the sweep, whose folder contains the results.
     client : distributed.Client
         Client of the workers.
     threads : int or None
-        Number of threads of each case. None: those of its worker.
+        Number of threads of each case. None: all threads of its worker.
     own : bool
-        Whether the workers are child processes of this one, which answers their signals.
+        Whether the workers are child processes of this process, which then handles their signals.
 
     Raises
     ------
@@ -69,14 +69,14 @@ def distribute(
     OSError
         If the disk is full.
     KeyboardInterrupt, SystemExit
-        If interrupted. The running cases have written a checkpoint by then, unless their workers were lost.
+        If interrupted. Running cases write a checkpoint first, unless their workers were lost.
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
     stop_file = record.folder / f".{name}.stop"
     shared: dict[str, Any] = {"folder": str(record.folder), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
     number, taken_over = count(), set[str]()
-    workers: dict[str, list[str]] = {key: [] for key in texts}  # that began each case
+    workers: dict[str, list[str]] = {key: [] for key in texts}  # in the order in which they began each case
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
 
     def submit(keys: Sequence[str], *, takes_over: bool = False) -> None:
@@ -104,11 +104,11 @@ def distribute(
                 key = futures.pop(future)
                 outcome = _outcome(key, found)
                 if outcome.kind == "held" and len(workers[key]) > 1 and key not in taken_over:
-                    taken_over.add(key)  # a worker of this sweep that does not answer holds it
+                    taken_over.add(key)  # a lost worker of this sweep still holds the lock
                     submit([key], takes_over=True)
                 elif outcome.kind != "interrupted":
                     record.ended(outcome)
-                elif client.status == "running":  # its worker is leaving, or another client has restarted the workers
+                elif client.status == "running":  # its worker closes, or another client has restarted the workers
                     submit([key])
                 else:
                     raise ConnectionError
@@ -123,12 +123,12 @@ def distribute(
                     "worker), or check whether their jobs are queued (squeue); the cases start as soon as one joins. "
                     "Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
                 )
-    except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue makes a Ctrl-C a SystemExit
+    except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue turns Ctrl-C into SystemExit
         if isinstance(error, OSError) and client.status != "running":
             lost = "the scheduler was lost: finished results are kept; repeat the command to resume"
             raise RoughviscError(lost) from error
         record.display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
-        with suppress(OSError):  # the disk is full, or the scheduler is lost now
+        with suppress(OSError):  # a full disk, or a lost scheduler
             stop_file.touch()
             until = time.monotonic() + _PATIENCE
             while time.monotonic() < until:
@@ -145,7 +145,7 @@ def distribute(
 
 
 def _outcome(key: str, found: Any) -> Outcome:
-    """Return the outcome of a case from what its future holds: an outcome, or an exception as of ``sys.exc_info``."""
+    """Return the outcome of a case from the value of its future: an outcome, or an exception or ``sys.exc_info()``."""
     if isinstance(found, Outcome):
         return found
     error = found[1] if isinstance(found, tuple) else found
@@ -164,7 +164,7 @@ def _outcome(key: str, found: Any) -> Outcome:
 def on_worker(
     text: str, key: str, *, folder: str, name: str, threads: int | None, own: bool, takes_over: bool
 ) -> Outcome:
-    """Compute a case on a worker; the outcome is ``interrupted``, with a checkpoint, if the case is to stop.
+    """Compute a case on a worker; the outcome of a stopped case is ``interrupted``, and it has a checkpoint.
 
     Parameters
     ----------
@@ -175,9 +175,9 @@ def on_worker(
     name : str
         Name of the sweep, the topic of its reports.
     threads : int or None
-        Number of threads. None: those of the worker.
+        Number of threads. None: all threads of the worker.
     own : bool
-        Whether the worker is a child process of that of the sweep.
+        Whether the worker is a child process of the process of the sweep.
     takes_over : bool
         Whether the lock of the case belongs to a lost worker.
     """
@@ -192,7 +192,7 @@ def on_worker(
             worker.log_event(name, {"key": key, "worker": worker.address, "now": float(now), "end": float(end)})
 
     def stop() -> bool:
-        state = worker.state.tasks.get(task)  # cancelled if the client has gone
+        state = worker.state.tasks.get(task)  # None or cancelled if the client has closed
         return worker.status in _LEAVING or state is None or state.state == "cancelled" or stop_file.exists()
 
     with _one_at_a_time:
@@ -210,17 +210,18 @@ def on_worker(
             if takes_over:
                 lock_path(Path(folder), key).unlink(missing_ok=True)
             return attempt(case, Path(folder), progress=report, stop=stop, threads=threads or worker.state.nthreads)
-        except RoughviscError as error:  # a file that this machine does not have
+        except RoughviscError as error:  # a file is missing on this machine
             expected = "expected the files of the study where every worker can read them, under the same path"
             return Outcome(key, "hindered", f"on {worker.address}: {error}; {expected}", type(error).__name__)
-        except KeyboardInterrupt:  # would end the worker
+        except KeyboardInterrupt:  # the exception would end the worker
             return Outcome(key, "interrupted")
 
 
 def _take_signals(worker: Worker, own: bool) -> None:
-    """Have the process of a sweep answer the signals of its workers, and another worker close in order at SIGTERM.
+    """Ignore signals in a child process of a sweep; let any other worker close in an orderly way at SIGTERM.
 
-    Terminals send Ctrl-C, and batch systems SIGTERM, to every process of a job.
+    Terminals send Ctrl-C, and batch systems SIGTERM, to every process of a job. The process of the sweep handles both
+    for its child processes.
     """
     if threading.current_thread() is not threading.main_thread():  # a worker in a thread of the user's process
         return

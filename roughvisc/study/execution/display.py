@@ -1,4 +1,4 @@
-"""Display of a running sweep: a bar for the sweep, one for each running case, and lines on cases that end badly."""
+"""Display of a running sweep: bars of the sweep and of each running case, and a message on each failed case."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from roughvisc.study.case import Case
 from roughvisc.study.execution.outcome import IN_WORDS, Outcome
 from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
 
-#: Largest number of messages on cases that end badly.
+#: Largest number of messages on failed and unconverged cases.
 _SHOWN = 8
 
 
@@ -66,7 +66,7 @@ class Display:
                 self._move()
 
     def ended(self, outcome: Outcome) -> None:
-        """Close the bar of a case, and write its message if it ended badly."""
+        """Close the bar of a case, and write the message of a failed or unconverged case."""
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
@@ -80,7 +80,7 @@ class Display:
                 self._bars.say("further cases that end badly are counted here, and named in the log")
 
     def say(self, text: str, key: str = "") -> None:
-        """Write a line, on a case if `key` names one."""
+        """Write a line; with `key` the name of this case comes first."""
         self._bars.say(f"{self._names[key]}: {text}" if key else text)
 
     def warn(self, text: str) -> None:

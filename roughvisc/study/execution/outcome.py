@@ -1,4 +1,4 @@
-"""How a case of a sweep ended, with every error of its run turned into a message."""
+"""Outcome of a case of a sweep; every error of its run becomes a message."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from roughvisc.study.case import Case
 from roughvisc.study.execution.run import run_case, unconverged
 from roughvisc.study.storage.index import Entry, read_entry
 
-#: How a case ended. ``hindered``: by something outside the case (a full disk, too little memory, a killed process), so
-#: that the same command resumes it; ``held``: another run computes it; ``failed``: it would fail again.
+#: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
+#: process), so that the same command resumes it; ``held``: another run computes it; ``failed``: it would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "held", "interrupted"]
 #: Words of the display and of the log.
 IN_WORDS: dict[Kind, str] = {kind: kind for kind in get_args(Kind)} | {"held": "held by another run"}
@@ -43,7 +43,7 @@ class Outcome:
     seconds : float
         Wall time. [s]
     entry : Entry or None
-        Contents of the result file but the fields.
+        Contents of the result file without the fields.
     reused : bool
         Whether an earlier run computed it.
     disk_full : bool
@@ -68,7 +68,7 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
 
 
 def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:
-    """Run a case with some settings of :func:`run_case`; only :class:`KeyboardInterrupt` is raised."""
+    """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
     began = time.perf_counter()
 
     def ended(kind: Kind, message: str, error: Exception, **more: Any) -> Outcome:
@@ -84,9 +84,9 @@ def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None
     except MemoryError as error:
         advice = "roughvisc plan says how much a case needs, and fewer --workers leave more to each"
         return ended("hindered", f"not enough memory; the last checkpoint is kept: {advice}", error)
-    except OSError as error:  # a full disk, a folder that has gone
+    except OSError as error:  # for example a full disk, or a removed folder
         place = f"{error.filename}: " if error.filename else ""
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         return ended("hindered", f"{place}{error.strerror or error}", error, disk_full=full)
-    except Exception as error:  # noqa: BLE001  (an unexpected error of one case stops no other case)
+    except Exception as error:  # noqa: BLE001  (an unexpected error of one case must not stop the others)
         return ended("failed", f"{type(error).__name__}: {error}", error, trace=traceback.format_exc())

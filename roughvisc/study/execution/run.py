@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
-#: Facts that the attribute ``case`` of a stored result states.
+#: Facts that a stored result omits, because its attribute ``case`` contains them.
 _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale", "base")
 
 
@@ -79,9 +79,9 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
 def compute(
     case: Case, keeper: CheckpointWriter, *, progress: bool | Progress = True, threads: int | None = None
 ) -> xr.Dataset:
-    """Return the result of a case, with all that is needed to run it again in its attributes.
+    """Compute a case and return the result; its attributes contain everything that a second run needs.
 
-    The run continues from the checkpoint of the keeper, from which the fields of the result are read.
+    The run continues from the checkpoint of the keeper, which also provides the fields of the result.
 
     Raises
     ------
@@ -127,17 +127,18 @@ def run_case(
 ) -> Path:
     """Run one case unless its file exists, and return the path of the file.
 
-    An interrupted case continues from its last checkpoint, and ends with the same bits as an uninterrupted one;
-    ``wall_time`` does not count lost work. A friction curve continues with the speed at which it was interrupted.
+    An interrupted case continues from its last checkpoint, and its result has the same bits as the result of an
+    uninterrupted run; ``wall_time`` does not include lost work. A friction curve continues with the speed at which it
+    was interrupted.
 
     Parameters
     ----------
     case : Case
         The case.
     folder : path
-        Folder of the file, which is named by the key of the case. Checkpoints are hidden folders there.
+        Folder of the file, which is named by the key of the case. Checkpoints are hidden folders in it.
     progress : bool or callable
-        Whether to draw a progress bar; or a function of the time reached and the length of the program [s], or of the
+        Whether to draw a progress bar; or a function of the current time and the length of the program [s], or of the
         number of finished speeds and their total number.
     stop : callable, optional
         Called at every accepted step, or speed; if it returns true, a checkpoint is written and
@@ -145,14 +146,14 @@ def run_case(
     checkpoint_seconds : float
         Least time between checkpoints, which take at most a twentieth of the run. [s]
     checkpoint_steps : int, optional
-        Number of accepted steps between checkpoints, in place of that time.
+        Number of accepted steps after which a checkpoint is also written.
     threads : int, optional
         As for :func:`roughvisc.simulate`.
 
     Raises
     ------
     InputError, ConvergenceError
-        As for :func:`roughvisc.run`. An unconverged result is stored and is no error here.
+        As for :func:`roughvisc.run`, except that an unconverged result is stored without an error.
     BlockingIOError
         If another run computes this case in this folder.
     RoughviscError
@@ -163,7 +164,7 @@ def run_case(
     folder = Path(folder)
     path = result_path(folder, case.key)
     if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
-        return path  # and there are no leftovers to remove
+        return path  # finished, without leftovers to remove
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -205,7 +206,7 @@ def run_case(
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
     finally:
-        for place in made:  # removes empty folders only
+        for place in made:  # rmdir removes only empty folders
             with suppress(OSError):
                 place.rmdir()
     return path
@@ -226,21 +227,22 @@ def run_stated(
 
 
 def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = None) -> bool:
-    """Return whether a file is the result of a case; an absent or damaged one is not.
+    """Return whether a file is the result of a case; an absent or damaged file is not.
 
     Parameters
     ----------
     case : Case
         The case.
     path : Path
-        File named by its key.
+        File named by the key of the case.
     warn : callable, optional
-        Rename a damaged file and call this with a message about it. The lock of the case must be held.
+        If given, a damaged file is renamed and `warn` is called with a message. The caller must hold the lock of the
+        case.
 
     Raises
     ------
     InputError
-        If a file of that name cannot be read, or is something else.
+        If the file cannot be read, or is not a result of this case.
     """
     if not path.exists():
         return False
@@ -272,7 +274,7 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
-    # another program may have left the estimates out
+    # a file of another program may lack the estimates
     left = np.asarray(histories["residual"], dtype=float)[bad] if "residual" in histories else np.zeros(0)
     known = left[np.isfinite(left)]
     by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""

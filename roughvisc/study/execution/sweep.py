@@ -1,4 +1,4 @@
-"""Many cases: one file each, in this process or on Dask; a finished case is kept, and a failed one stops no other."""
+"""Sweeps: many cases in this process or on Dask, with one file each; a failed case does not stop the others."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
-#: Time between two savings of the index and the table of a running sweep. [s]
+#: Time after which a running sweep writes its index and its table again. [s]
 _SAVE_EVERY = 60.0
 
 
@@ -70,8 +70,8 @@ def sweep(
         the study.
     client : distributed.Client, optional
         Client of the cluster. Default: the default client, which ``Client()`` sets. If there is none, or `workers` is
-        given, a cluster on this machine, or this process for a single case. It has one process per core, or fewer with
-        more threads each if the memory does not hold as many cases.
+        given, a cluster on this machine, or this process for a single case. The cluster has one process per core, or
+        fewer processes with more threads each if the memory is too small.
     retry_failed : bool
         Compute cases that failed before again.
     progress : bool
@@ -79,8 +79,8 @@ def sweep(
     workers : int, optional
         Number of processes of the default cluster; 0: this process.
     threads : int, optional
-        Number of threads of each case on a large grid. Default: its share of the cores; on the workers of a client, all
-        their threads.
+        Number of threads of each case on a large grid. Default: an equal share of the cores; with a client, all threads
+        of a worker.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def sweep(
         or grid.
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
-        that needs more memory than its worker has is refused by itself and not recorded, because it may fit elsewhere.
+        that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -141,13 +141,13 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong, or a file under the name of a result cannot be read.
+        If a setting is wrong, or a file with the name of a result cannot be read.
     OSError
-        If the disk is full; no further case is begun.
+        If the disk is full; no further case is started.
     RoughviscError
         If the scheduler was lost.
     KeyboardInterrupt
-        If interrupted; the running cases have reached the end of a step by then.
+        If interrupted; running cases finish their step first.
     """
     if workers is not None and (client is not None or workers < 0):
         problem = "a client has workers of its own" if client is not None else "expected 0 or more"
@@ -185,7 +185,7 @@ def run_cases(
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
             for key, case in todo.items():
-                if (path := result_path(folder, key)).exists():  # damaged, unless a run is at work on it; else refused
+                if (path := result_path(folder, key)).exists():  # damaged, unless another run computes the case
                     with suppress(OSError), lock_case(lock_path(folder, key), patience=0.0):
                         is_result_of(case, path, record.warn)
             _compute(todo, record, client, processes, threads)
@@ -232,7 +232,7 @@ class Record:
     cases : sequence of Case
         Cases in the order of the study.
     outcomes : dict
-        Key -> outcome of each case that has ended, to which this adds.
+        Key -> outcome of each finished case; the record adds further outcomes.
     display : Display
         Display of the sweep.
     """
@@ -260,7 +260,7 @@ class Record:
         Raises
         ------
         OSError
-            If the disk was full, which further cases would only repeat.
+            If the disk was full, because further cases would also fail.
         """
         self._outcomes[outcome.key] = outcome
         case, level = self._by_key[outcome.key], logging.INFO if outcome.kind == "done" else logging.WARNING
