@@ -1,4 +1,4 @@
-"""The xarray engine "roughvisc": scans by ``xr.open_dataarray(path, engine="roughvisc")``.
+"""xarray engine "roughvisc": ``xr.open_dataarray(path, engine="roughvisc")`` opens a scan.
 
 xarray asks every engine whether it can open a file, so importing this module must cost nothing: the readers are
 imported when a scan is opened.
@@ -25,13 +25,13 @@ class RoughviscBackend(BackendEntrypoint):
     open_dataset_parameters = ("filename_or_obj", "drop_variables", *_OPTIONS)
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, **options: Any) -> xr.Dataset:
-        """Read a scan with the options of :func:`roughvisc.open_scan`, without the variables to drop."""
+        """Read a scan with the options of :func:`roughvisc.open_scan`, and drop `drop_variables`."""
         from roughvisc.topography.scans import open_scan
 
         dataset = open_scan(filename_or_obj, **options).to_dataset(name="height")
         return dataset.drop_vars(drop_variables or [], errors="ignore")
 
     def guess_can_open(self, filename_or_obj: Any) -> bool:
-        """Return whether the suffix is that of one scan format and of nothing else."""
+        """Return whether only scan files have the suffix."""
         is_path = isinstance(filename_or_obj, str | os.PathLike)
         return is_path and Path(filename_or_obj).suffix.lower().removeprefix(".") in _SUFFIXES.split()

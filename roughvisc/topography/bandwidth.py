@@ -6,7 +6,7 @@ import math
 from typing import Literal
 
 import numpy as np
-import scipy  # which imports a submodule when it is first used: scipy.ndimage takes 0.1 s
+import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.arguments import one_of
@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
 from roughvisc.units import Quantity, quantities
 
-#: Points on each side over which a sum is as fast as transforms, whose library takes half a second to import.
+#: Half-width of a filter [points] up to which a sum is as fast as FFTs, whose library takes half a second to import.
 _SUMMED = 64
 
 
@@ -36,7 +36,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     Raises
     ------
     InputError
-        If the order is none of these, or the points present do not determine the polynomial.
+        If the order is not one of these, or the points present do not determine the polynomial.
     """
     if not isinstance(order, int | np.integer) or not 0 <= order <= 3:
         raise InputError(key="order", found=order, expected="0, 1, 2 or 3")
@@ -47,14 +47,16 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
 
 
 def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
-    """Heights less their least-squares polynomial of total degree `order` over the finite points; of a strip too. [m]
+    """Return heights minus their least-squares polynomial of total degree `order`; strips are allowed. [m]
+
+    Only the finite points determine the polynomial.
 
     Raises
     ------
     InputError
         If the points present do not determine the polynomial.
     """
-    heights = heights - np.nanmean(heights)  # absolute heights of instruments would cost digits
+    heights = heights - np.nanmean(heights)  # large absolute heights would cost digits
     for _ in range(2):  # the second pass refines the first: normal equations lose half the digits
         left, coefficients, right = _polynomial(heights, order)
         heights -= left @ coefficients @ right.T
@@ -62,7 +64,7 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
 
 
 def off_plane(h: xr.DataArray) -> xr.DataArray:
-    """Height less its mean plane; less its mean where the points present determine no plane. [m]"""
+    """Return heights minus their mean plane, or minus their mean if the finite points determine no plane. [m]"""
     try:
         return like(h, less_polynomial(h.values, 1))
     except InputError:
@@ -82,7 +84,7 @@ def gaussian_filter(
     cutoff : float or str
         Wavelength at which half the amplitude passes; at least three cells. [m]
     keep : {"long", "short"}, default "long"
-        "long": wavelengths above the cut-off (an S-filter). "short": the rest (an L-filter, the roughness).
+        "long": wavelengths above the cut-off (an S-filter). "short": those below (an L-filter, the roughness).
     periodic : bool, default False
         Whether the surface is periodic; otherwise the weights end at its border.
 
@@ -94,7 +96,7 @@ def gaussian_filter(
     Raises
     ------
     InputError
-        If the cut-off is less than three cells, or `keep` is neither.
+        If the cut-off is less than three cells, or `keep` is unknown.
 
     Notes
     -----
@@ -122,9 +124,9 @@ def gaussian_filter(
 
 
 def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least-squares polynomial over the finite points: basis along x, coefficients, basis along y.
+    """Return the least-squares polynomial over the finite points: basis along x, coefficients, basis along y.
 
-    From moments, so that no design matrix is stored.
+    The normal equations are built from moments, so that no design matrix is stored.
     """
     bases = [np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order) for n in heights.shape]
     degrees = [order if n > 1 else 0 for n in heights.shape]  # heights do not vary across a strip
@@ -143,12 +145,12 @@ def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray
 
 
 def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np.ndarray:
-    """Waves longer than cut-offs in cells along each axis, missing where the heights are. [m]"""
+    """Return the waves longer than a cut-off along each axis (in cells); missing points stay missing. [m]"""
     mean, present = np.nanmean(heights), np.isfinite(heights)
     long = np.where(present, heights - mean, 0.0)
     for axis, cutoff in enumerate(cutoffs):
         long = _smoothed(long, axis, cutoff, periodic)
-    if present.all():  # the shares of all points are products of those along each axis
+    if present.all():  # the sum of weights at a point is a product of sums along the axes
         shares = [_smoothed(np.ones((n, 1)), 0, c, periodic) for n, c in zip(heights.shape, cutoffs, strict=True)]
         share = shares[0] * shares[1].T
     else:
@@ -160,14 +162,14 @@ def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np
 
 
 def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:
-    """Gaussian of a cut-off in cells along one axis, without normalisation at the border."""
+    """Apply a Gaussian filter along one axis (cut-off in cells), without normalisation at the border."""
     alpha = math.sqrt(math.log(2) / math.pi)
     if periodic:
         transmission = np.exp(-np.pi * (alpha * cutoff * scipy.fft.rfftfreq(field.shape[axis])) ** 2)
         field_q = scipy.fft.rfft(field, axis=axis)
         field_q *= transmission[:, None] if axis == 0 else transmission
         return scipy.fft.irfft(field_q, field.shape[axis], axis=axis)
-    reach = min(math.ceil(1.5 * cutoff), field.shape[axis] - 1)  # the weight has fallen to 1e-14
+    reach = min(math.ceil(1.5 * cutoff), field.shape[axis] - 1)  # where the weight is 1e-14
     at = np.arange(-reach, reach + 1)
     weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
     weights /= weights.sum()

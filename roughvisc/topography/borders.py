@@ -1,4 +1,4 @@
-"""Borders of surfaces: whether one repeats, and whether its opposite borders meet."""
+"""Borders of surfaces: periodicity, mirror symmetry, and steps between opposite borders."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from numpy.typing import NDArray
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import is_indenter
 
-#: Borders jump that differ by more than so many times what neighbouring rows do.
+#: Opposite borders form a step if their difference exceeds this multiple of the difference of neighbouring rows.
 JUMP = 2.0
-#: Line of the history of a surface that was given its mirror images.
+#: History line of a surface that was extended by its mirror images.
 MIRRORED = "mirrored along x and y"
-#: Rounding that two mirror images may differ by, relative to the largest height.
+#: Largest difference of two mirror images by rounding, relative to the largest height.
 _ROUNDING = 16 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class BorderMismatch:
-    """How much opposite borders of a surface differ, along x and along y.
+    """Difference of opposite borders of a surface, along x and along y.
 
     Attributes
     ----------
     of_rms : pair of float
         Root mean square difference of the first and the last row over the root mean square height Sq. [-]
     of_neighbours : pair of float
-        The same over the root mean square difference of neighbouring rows. [-]
+        The same difference over the root mean square difference of neighbouring rows. [-]
     """
 
     of_rms: tuple[float, float]
@@ -37,17 +37,17 @@ class BorderMismatch:
 
     @property
     def jumps(self) -> bool:
-        """Whether the surface has a step where it repeats: borders differ by more than twice what neighbours do."""
+        """Whether the repeated surface has a step: its borders differ more than twice as much as neighbouring rows."""
         return max(self.of_neighbours) > JUMP
 
 
 def border_mismatch(h: xr.DataArray) -> BorderMismatch:
-    """Mismatch of opposite borders.
+    """Return the mismatch of opposite borders.
 
     Parameters
     ----------
     h : xarray.DataArray, dims (x, y)
-        Heights; missing points take no part. [m]
+        Heights; missing points are ignored. [m]
 
     Returns
     -------
@@ -67,16 +67,16 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
 
 
 def period_of(h: xr.DataArray) -> list[float]:
-    """Sides of a grid, as the attribute ``period`` of one that is a period of a surface gives them. [m]"""
+    """Return the sides of a grid, which the attribute ``period`` of a periodic surface records. [m]"""
     (nx, ny), (dx, dy) = h.shape, spacing(h)
     return [nx * dx, ny * dy]
 
 
 def is_periodic(h: xr.DataArray) -> bool:
-    """Whether a surface was made to repeat, and the grid still is one period of it.
+    """Return whether a surface was generated as periodic and its grid is still one period.
 
-    Attributes stay through selection and arithmetic. Therefore the attribute ``period`` is believed only where it gives
-    the sides of the grid, and the step at the borders is at most four times what neighbouring rows differ by.
+    Attributes survive selection and arithmetic. Therefore the attribute ``period`` counts only if it equals the sides
+    of the grid and the step at the borders is at most four times the difference of neighbouring rows.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def is_periodic(h: xr.DataArray) -> bool:
 
 
 def is_analytic(h: xr.DataArray) -> bool:
-    """Whether heights are those of an indenter or a regular wave.
+    """Return whether a surface is an indenter or a regular wave.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def is_analytic(h: xr.DataArray) -> bool:
 
 
 def recipe_name(h: xr.DataArray) -> str:
-    """Name of the recipe of a surface whose grid still is the one that it was made on; empty otherwise."""
+    """Return the name of the recipe of a surface; empty if its grid differs from the recipe."""
     try:
         recipe = json.loads(h.attrs["recipe"])
         fits = list(h.shape) == recipe["shape"] and np.allclose(period_of(h), recipe["size"], rtol=1e-6, atol=0)
@@ -114,12 +114,12 @@ def recipe_name(h: xr.DataArray) -> str:
 
 
 def is_mirrored(height: NDArray[np.float64]) -> bool:
-    """Whether a surface is its own mirror image in both axes, between the cells: an even number of them each way."""
+    """Return whether a surface equals its mirror images along x and y; the numbers of cells must be even."""
     nx, ny = (n // 2 for n in height.shape)
     if height.shape != (2 * nx, 2 * ny):
         return False
     allowed = _ROUNDING * max(float(np.fmax.reduce(height, axis=None)), -float(np.fmin.reduce(height, axis=None)))
-    # the second half of the rows stands for the first, once they are known to be alike
+    # once the halves of the rows are found equal, the second comparison needs one half only
     return _alike(height[nx - 1 :: -1], height[nx:], allowed) and _alike(
         height[nx:, ny - 1 :: -1], height[nx:, ny:], allowed
     )
@@ -132,6 +132,6 @@ def _alike(a: NDArray[np.float64], b: NDArray[np.float64], allowed: float) -> bo
 
 
 def _rms(values: np.ndarray) -> float:
-    """Root mean square of the finite values; zero if there are none."""
+    """Return the root mean square of the finite values; zero if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt((known**2).mean())) if known.size else 0.0

@@ -1,4 +1,4 @@
-"""Conditioning of scans: one function for each step, and the steps in the order in which they act.
+"""Conditioning of scans: one function for each step, and the order of the steps.
 
 Every function takes a grid and returns a new one. The attribute ``history`` records the steps. Missing points are NaN
 until :func:`fill`.
@@ -44,15 +44,15 @@ class Step(NamedTuple):
     function : callable
         Takes heights and arguments, and returns heights.
     argument : str
-        Name of the argument that a value states which is neither true nor a table; empty if there is none.
+        Name of the argument set by a plain value (neither a truth value nor a table); empty if there is none.
     """
 
     function: Callable[..., xr.DataArray]
     argument: str = ""
 
 
-#: Conditioning steps in the order in which they act. A value is true (the function with its defaults), false (the step
-#: is left out), the value of one argument, or a table of arguments.
+#: Conditioning steps in the order in which they are applied. A value is true (the function with its defaults), false
+#: (the step is skipped), the value of one argument, or a table of arguments.
 STEPS: dict[str, Step] = {
     "crop": Step(crop),
     "rotate90": Step(rotate90, "turns"),
@@ -65,21 +65,21 @@ STEPS: dict[str, Step] = {
     "realisation": Step(surrogate, "number"),
     "resample": Step(resample, "shape"),
 }
-#: Steps that a face may have before a second face lies on it.
+#: Steps allowed for each face before two faces are combined.
 FACE_STEPS = ("crop", "rotate90", "invert", "level", "outliers", "fill", "filter")
 #: Steps that leave a periodic surface periodic.
 _KEEP_PERIOD = ("rotate90", "invert", "shortest_wave", "resample")
 
 
 def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.DataArray:
-    """Condition heights.
+    """Apply conditioning steps to heights.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
     steps : mapping
-        Any of :data:`STEPS` with their values, in any order; they act in the order of that list.
+        Any of :data:`STEPS` with their values, in any order; they are applied in the order of :data:`STEPS`.
     where : str
         Dotted name of the table, for messages.
 
@@ -114,7 +114,7 @@ def check_steps(steps: Mapping[str, Any], where: str = "") -> None:
 
 @contextmanager
 def _named(steps: Mapping[str, Any], where: str, name: str) -> Iterator[None]:
-    """Put the key of a step in front of errors about its argument, which the value of the key may be itself."""
+    """Add the key of a step to errors about its arguments; a plain value of the key is itself the argument."""
     try:
         yield
     except InputError as error:
@@ -125,7 +125,7 @@ def _named(steps: Mapping[str, Any], where: str, name: str) -> Iterator[None]:
 
 
 def _stated(steps: Any, where: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield name and arguments of each step that is not left out, in order."""
+    """Yield the name and the arguments of each requested step, in order."""
     refuse_unknown(where, a_table(where or "conditioning", steps), STEPS)
     for name, step in STEPS.items():
         value = steps.get(name, False)
@@ -142,15 +142,15 @@ def _stated(steps: Any, where: str) -> Iterator[tuple[str, dict[str, Any]]]:
 def boundary_after(
     steps: Mapping[str, Any], made: Literal["free", "periodic"] | None
 ) -> Literal["free", "periodic"] | None:
-    """Boundary of a surface after conditioning steps; None where it has to be said.
+    """Return the boundary of a surface after conditioning steps; None if the user has to state it.
 
     Parameters
     ----------
     steps : mapping
-        As :func:`condition` takes them. ``realisation`` makes any surface periodic; turns, cuts of short waves and
-        other numbers of cells leave a periodic one so; all else leaves open what lies beyond the border.
+        As for :func:`condition`. ``realisation`` makes any surface periodic. Rotation, inversion, removal of short
+        waves and resampling keep a periodic surface periodic. After any other step the boundary is unknown.
     made : {"free", "periodic"} or None
-        Boundary that the surface was made for.
+        Boundary for which the surface was made.
 
     Examples
     --------

@@ -1,17 +1,17 @@
-"""The measured scan that ships with roughvisc, to try things with."""
+"""Example scan that ships with roughvisc."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-#: Name of the file, and the folders where it may be: in an installation, and in a checkout.
+#: Name of the file, and its folder in an installation and in a checkout.
 EXAMPLE = "focus_variation.x3p"
 _PACKAGE = Path(__file__).parents[1]
 _HELD_IN = (_PACKAGE / "example", _PACKAGE.parent / "surfaces")
 
 
 def example_scan() -> Path:
-    """Path of the measured scan that ships with roughvisc.
+    """Return the path of the measured scan that ships with roughvisc.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from roughvisc.topography.missing_points import harmonic
 from roughvisc.topography.resampling import resample
 from roughvisc.units import Quantity, quantities
 
-#: Part of a cell by which rounding may move a border of two faces.
+#: Largest shift of a cell border by rounding, relative to the cell.
 _ON_BORDER = 1e-9
 
 
@@ -58,7 +58,7 @@ def crop(
         inside = (h[axis].values >= low) & (h[axis].values <= high)
         if inside.sum() < 2:
             held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
-            raise InputError(key=axis, found=(low, high), expected=f"limits that hold two cells at least of {held} m")
+            raise InputError(key=axis, found=(low, high), expected=f"limits that hold at least two cells of {held} m")
         h = h.isel({axis: inside})
     line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
     return noted(h, line, **({} if h.shape == whole else {"period": None}))
@@ -139,10 +139,10 @@ def combine(
         Axis along which the second face is reversed when a scan taken from above is turned over onto the first.
         Default: `h2` is already in the coordinates of `h1`.
     align : {"grid", "centre"}, default "grid"
-        "grid": both faces are on the same grid. "centre": the centre of the second face, turned over, is aligned with
-        that of the first; the sum is on the cells of the first that the second covers completely. If the cells of the
-        second are smaller, it is resampled to cells as large first (:func:`resample`). A cubic spline
-        between its cell centres gives its heights at those of the first.
+        "grid": both faces are on the same grid. "centre": the second face, turned over, is centred on the first; the
+        sum is on the cells of the first that the second covers completely. If the cells of the second face are
+        smaller, it is first resampled to cells of the same size (:func:`resample`). A cubic spline between its cell
+        centres then gives its heights at the cell centres of the first face.
     offset : pair of float or str
         Position of the second centre relative to the first, along x and y; with `align` "centre". [m]
 
@@ -159,8 +159,9 @@ def combine(
 
     Notes
     -----
-    The frictionless contact of two elastic or viscoelastic half-spaces is equivalent to that of one rigid profile, the
-    sum of both, on a flat half-space whose contact compliance is the sum of theirs, :func:`roughvisc.pair`.
+    The frictionless contact of two elastic or viscoelastic half-spaces is equivalent to the contact of one rigid
+    profile, the sum of both faces, with a flat half-space. Its contact compliance is the sum of both compliances
+    (:func:`roughvisc.pair`).
 
     References
     ----------
@@ -178,7 +179,7 @@ def combine(
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
     about, sha = "; ".join(str(h2.attrs.get("history", "")).splitlines()), h2.attrs.get("source_sha256")
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
-    if flip is not None:  # heights and masks are reversed along a coordinate that stays
+    if flip is not None:  # reverse heights and masks; the coordinate stays
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
         line += f", reversed along {flip}"
     if align == "centre":
@@ -240,10 +241,10 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> 
         if covered.sum() < 2:
             raise InputError(
                 f"combine: the second face covers {covered.sum()} of {n1} cells of the first along {axis}: they are "
-                f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected two cells at least"
+                f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected at least two cells"
             )
         kept[axis] = covered
-        at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, counted in old ones
+        at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells
     first = h1.isel(kept)
 
     def laid(values: np.ndarray, order: int) -> np.ndarray:
@@ -292,7 +293,7 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
 
 
 def with_images(values: np.ndarray) -> np.ndarray:
-    """Return a map and its mirror images: one period."""
+    """Return one period: a map with its mirror images."""
     nx, ny = values.shape
     whole = np.empty((2 * nx, 2 * ny), values.dtype)
     whole[:nx, :ny] = values

@@ -1,7 +1,7 @@
-"""The labelled grid that every reader, recipe and conditioning step gives: height over (x, y).
+"""Labelled grid, the result of every reader, recipe and conditioning step: height over (x, y).
 
-Coordinates are those of the cell centres, in metres; the grid covers ``n`` cells of one size in each direction, so
-that the spacing is size over n. Missing points are NaN. Whatever a user gives as heights passes :func:`checked`.
+Coordinates are the cell centres, in metres. The grid covers ``n`` equal cells in each direction, so that the spacing is
+size over n. Missing points are NaN. All heights from users pass :func:`checked`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from roughvisc.errors import InputError, short_repr
 from roughvisc.units import quantity
 from roughvisc.variables import VARIABLES
 
-#: Attributes of numbers as a file packs them, before xarray decodes them.
+#: Attributes of packed numbers, before xarray decodes them.
 _PACKED = {"scale_factor", "add_offset", "_FillValue", "missing_value"}
 
 #: 16384 squared: a field of doubles takes 2 GB.
@@ -27,7 +27,7 @@ MOST_CELLS = 1 << 28
 
 
 def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] | None = None) -> xr.DataArray:
-    """Height over cell-centre coordinates that start half a cell from zero.
+    """Return heights over cell-centre coordinates that start half a cell from zero.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] |
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     attrs : dict, optional
-        Attributes beside units and names.
+        Attributes in addition to units and names.
     """
     values = np.asarray(heights, dtype=float)
     x, y = ((np.arange(n) + 0.5) * d for n, d in zip(values.shape, spacing, strict=True))
@@ -51,7 +51,7 @@ def with_coordinates(
     *,
     filled: np.ndarray | None = None,
 ) -> xr.DataArray:
-    """Height over the given coordinates of the cell centres, with the declared attributes.
+    """Return heights over given cell-centre coordinates, with the declared attributes.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def with_coordinates(
     x, y : array_like
         Cell centres. [m]
     attrs : dict, optional
-        Attributes beside the declared ones.
+        Attributes in addition to the declared ones.
     filled : ndarray of bool, shape (nx, ny), optional
         See :func:`filled_points`.
     """
@@ -76,29 +76,29 @@ def with_coordinates(
 
 
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
-    """The grid as float64 in metres over ``("x", "y")``, after a check that it is one: the door for all heights.
+    """Check a height grid and return it as float64 in metres over ``("x", "y")``; all heights pass this function.
 
-    Heights and coordinates that state a unit of length in the attribute ``units`` are converted; those that state none
-    are metres. A Dataset stands for its variable ``height``; masked points become NaN; any
-    order of the dimensions and any type of real numbers will do.
+    Heights and coordinates with the attribute ``units`` are converted to metres; without it, they are in metres. A
+    Dataset is replaced by its variable ``height``. Masked points become NaN. Any order of the dimensions and any type
+    of real numbers is accepted.
 
     Parameters
     ----------
     h : xarray.DataArray or xarray.Dataset
         Heights over x and y, or a Dataset that holds them as ``height``.
     step : str
-        Who asks, for the message.
+        Name of the calling step, for messages.
     least : int
-        Points that there have to be in each direction.
+        Least number of points in each direction.
 
     Raises
     ------
     InputError
-        If `h` holds no real numbers over exactly the dimensions x and y, has fewer than `least` points in a
-        direction, no numeric coordinates, unequal steps, or a unit that is no length; the message names the `step`
-        that asked.
+        If the dimensions of `h` are not exactly x and y, its values are not real numbers, a direction has fewer than
+        `least` points, the coordinates are not numeric or have unequal steps, or a unit is not a length. The message
+        names the `step`.
     DataNeeded
-        If `h` only stands for heights: the step has checked its arguments.
+        If `h` is a placeholder for heights: the step has checked its arguments.
     """
     if isinstance(h, NoData):
         raise DataNeeded(step)
@@ -127,13 +127,13 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
 
 
 def unit_of(numbers: Any) -> str | None:
-    """Attribute ``units`` of a DataArray; None if there is none."""
+    """Return the attribute ``units`` of a DataArray; None if it has none."""
     stated = numbers.attrs.get("units") if isinstance(numbers, xr.DataArray) else None
     return None if stated is None else str(stated)
 
 
 def metres_in(unit: str, name: str) -> float:
-    """Metres in a unit of length; an :class:`InputError` that names who is in it, if it is none."""
+    """Return the length of a unit in metres; raise :class:`InputError` if the unit of `name` is not a length."""
     try:
         return quantity(f"1 {unit}", "m")
     except InputError as error:
@@ -141,19 +141,19 @@ def metres_in(unit: str, name: str) -> float:
 
 
 def in_metres(numbers: Any, name: str) -> np.ndarray:
-    """Plain float64 numbers of heights or positions, converted from the unit that they state; NaN where masked. [m]
+    """Return heights or positions as plain float64 numbers, converted from their unit; NaN where masked. [m]
 
     Parameters
     ----------
     numbers : DataArray or array_like
-        Real numbers; metres if they state no unit.
+        Real numbers; in metres if they have no unit.
     name : str
-        What they are, for the message.
+        Name of the numbers, for messages.
 
     Raises
     ------
     InputError
-        If they are no real numbers, are packed as in a file or held by pint, or their unit is no length.
+        If they are not real numbers, are packed as in a file or held by pint, or their unit is not a length.
     """
     unit = unit_of(numbers)
     factor = 1.0 if unit in (None, "m") else metres_in(unit, name)
@@ -178,7 +178,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
-    """Cell sides (dx, dy) of a grid [m]; an :class:`InputError` if the steps along a coordinate are not equal."""
+    """Return the cell sides (dx, dy) of a grid [m]; raise :class:`InputError` if a coordinate has unequal steps."""
     sides = []
     for axis in ("x", "y"):
         if axis not in h.coords:
@@ -189,31 +189,31 @@ def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float,
 
 
 def filled_points(h: xr.DataArray) -> np.ndarray | None:
-    """Mask over (x, y) of the points that were missing and filled in, None if nothing was ever filled."""
+    """Return the mask over (x, y) of the points that were missing and filled in; None if no point was filled."""
     return h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else None
 
 
 def with_filled_points(h: xr.DataArray, filled: np.ndarray | None) -> xr.DataArray:
-    """The same grid with these points marked as filled in, without any mark if there is no mask."""
+    """Return the grid with these points marked as filled in; unmarked if `filled` is None."""
     if filled is None:
         return h.drop_vars("filled", errors="ignore")
     return h.assign_coords(filled=(("x", "y"), filled, {"long_name": "height was missing and filled in"}))
 
 
 def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
-    """Area of the whole grid, absent cells included, to which the nominal pressure refers. [m2]"""
+    """Return the area of the whole grid, including absent cells: the area of the nominal pressure. [m2]"""
     return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))
 
 
 def cell_side(centres: Any, name: str = "the coordinate") -> float:
-    """Side of the equal cells of an axis: the step between their centres; a lone cell begins at zero.
+    """Return the side of the equal cells of an axis: the step between their centres; a single cell begins at zero.
 
     Parameters
     ----------
     centres : array_like, shape (n,)
         Centres of the cells, ascending. [m]
     name : str
-        What they are, for the message.
+        Name of the numbers, for messages.
 
     Returns
     -------
@@ -223,8 +223,8 @@ def cell_side(centres: Any, name: str = "the coordinate") -> float:
     Raises
     ------
     InputError
-        If there is no centre, a number is not finite, the steps are not equal and positive, or the centre of a lone
-        cell is not above zero.
+        If `centres` is empty, a number is not finite, the steps are not equal and positive, or the centre of a
+        single cell is not above zero.
 
     Examples
     --------
@@ -248,7 +248,7 @@ def cell_side(centres: Any, name: str = "the coordinate") -> float:
 
 
 def cell_edges(centres: Any) -> np.ndarray:
-    """Borders of the equal cells of an axis, one more than there are cells. [m]
+    """Return the borders of the equal cells of an axis, one more than cells. [m]
 
     Examples
     --------
@@ -258,12 +258,12 @@ def cell_edges(centres: Any) -> np.ndarray:
     at = np.asarray(centres, dtype=float)
     side = cell_side(at)
     edges = np.append(at - side / 2, at[-1] + side / 2)
-    edges[np.abs(edges) < 1e-9 * side] = 0.0  # where grids begin; rounding
+    edges[np.abs(edges) < 1e-9 * side] = 0.0  # removes rounding where the grid begins
     return edges
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
-    """The same grid with one more line in its history, and further attributes; those given as None are dropped."""
+    """Return the grid with one more line in its history and with further attributes; None removes an attribute."""
     history = h.attrs.get("history")
     h = h.copy(deep=False)
     if "filled" in h.coords:
@@ -274,24 +274,24 @@ def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
 
 
 def like(h: xr.DataArray, values: np.ndarray) -> xr.DataArray:
-    """New heights on the grid of `h`, with its attributes and coordinates."""
+    """Return new heights on the grid of `h`, with its attributes and coordinates."""
     return h.copy(deep=False, data=values)
 
 
 def require_heights(h: xr.DataArray, step: str) -> None:
-    """Refuse a grid of which all points are missing."""
+    """Reject a grid if all its points are missing."""
     if not np.isfinite(h.values).any():
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
 
 
 def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)") -> None:
-    """Refuse a grid of which points are missing."""
+    """Reject a grid with missing points."""
     if missing := int(h.size - np.isfinite(h.values).sum()):
         raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
 
 
 def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf) -> float:
-    """A finite number above `low` and not above `high`."""
+    """Check that a value is a finite number above `low` and at most `high`; return it as float."""
     right = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
     if not (right and low < value <= high):
         below = f" and at most {high:g}" if math.isfinite(high) else ""
@@ -300,7 +300,7 @@ def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = 
 
 
 def pair(name: str, value: Any) -> tuple[float, float]:
-    """Two positive lengths, or one for both. [m]"""
+    """Return two positive lengths; one length counts for both axes. [m]"""
     both = _both(value)
     if len(both) != 2:
         raise InputError(key=name, found=value, expected="one number or a pair (x, y) [m]")
@@ -308,7 +308,7 @@ def pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
-    """Two whole numbers of cells, or one for both."""
+    """Return two whole numbers of cells; one number counts for both axes."""
     both = _both(value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole:
@@ -321,5 +321,5 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
 
 
 def _both(value: Any) -> Any:
-    """What is given for x and y, or once for both."""
+    """Return a pair for x and y; a single value counts for both."""
     return value if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str) else (value, value)

@@ -1,4 +1,4 @@
-"""Single indenters, known beyond their grid too: sphere, cone and flat punch.
+"""Single indenters, defined beyond their grid: sphere, cone and flat punch.
 
 Heights are the analytic functions at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``. The recipe stays in the
 attributes, so that the grid can grow (:func:`grown`).
@@ -28,7 +28,7 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
     ----------
     radius : float or str
         Radius of curvature. [m]
-    size : float or str, or pair of them
+    size : float or str, or a pair
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
@@ -58,7 +58,7 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     ----------
     slope : float
         Tangent of the angle between the flank and the plane. [-]
-    size : float or str, or pair of them
+    size : float or str, or a pair
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
@@ -84,7 +84,7 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     ----------
     radius : float or str
         Radius of the punch. [m]
-    size : float or str, or pair of them
+    size : float or str, or a pair
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
@@ -92,7 +92,7 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     Returns
     -------
     xarray.DataArray
-        Height over (x, y) with ``attrs["missing"] == "absent"``: there is no material where it is NaN. [m]
+        Height over (x, y), NaN where material is absent (``attrs["missing"] == "absent"``). [m]
 
     Raises
     ------
@@ -103,9 +103,9 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
 
 
 def is_indenter(h: xr.DataArray) -> bool:
-    """Return whether heights are those of a sphere, cone or flat punch on cells of its grid, which can grow.
+    """Return whether a surface is a sphere, cone or flat punch on cells of its grid, so that the grid can grow.
 
-    xarray keeps attributes through arithmetic, so the recipe is believed only if it reproduces the heights given.
+    xarray keeps attributes through arithmetic, so the recipe counts only if it reproduces the given heights.
     """
     known = _known(h)
     if known is None:
@@ -118,19 +118,19 @@ def is_indenter(h: xr.DataArray) -> bool:
 
 
 def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
-    """The same indenter on a larger grid: further cells all around, those that exist unchanged.
+    """Return the same indenter on a larger grid: new cells on all sides, existing cells unchanged.
 
     Parameters
     ----------
     h : xarray.DataArray
         Height over (x, y). [m]
     factor : float, default 1.5
-        How many times larger each side becomes, at least; never less than one cell more on each side.
+        Least ratio of each new side to the old one; every side gains at least one cell at each end.
 
     Returns
     -------
     xarray.DataArray or None
-        None if `h` is no sphere, cone or flat punch, see :func:`is_indenter`.
+        None if `h` is not a sphere, cone or flat punch, see :func:`is_indenter`.
     """
     known = _known(h) if is_indenter(h) else None
     if known is None:
@@ -154,7 +154,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
 
 
 def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | None = None) -> xr.DataArray | None:
-    """The same indenter on another number of cells; None if it is none.
+    """Return the same indenter on another number of cells; None if `h` is not an indenter.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | 
     shape : tuple of int
         Number of cells.
     size : tuple of float, optional
-        Sides of the domain; default: those that it was made for. [m]
+        Sides of the domain; default: the sides in its recipe. [m]
     """
     if not is_indenter(h):
         return None
@@ -172,10 +172,9 @@ def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | 
 
 
 def highest(h: xr.DataArray) -> float:
-    """Height at which a surface is touched first: an indenter's apex, wherever it lies between the cells. [m]
+    """Return the height of first contact: the apex of an indenter, also between cells, or the highest cell. [m]
 
-    That is where its recipe still reproduces the heights and the apex lies within the cells' outline; anything else is
-    touched first at its highest cell.
+    The apex counts if the recipe reproduces the heights and the apex lies within the outline of the cells.
 
     Parameters
     ----------
@@ -197,7 +196,10 @@ def highest(h: xr.DataArray) -> float:
 
 
 def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
-    """Height as a function of x and y from the apex, cell sides and the apex's place; None if the recipe fails. [m]"""
+    """Return height as a function of x and y from the apex, cell sides, and position of the apex. [m]
+
+    None if the recipe does not reproduce the heights.
+    """
     try:
         recipe = json.loads(h.attrs["recipe"])
         evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
@@ -229,7 +231,7 @@ def _flat_punch(x: np.ndarray, y: np.ndarray, radius: float) -> np.ndarray:
     return np.where(np.hypot(x, y) <= radius, 0.0, np.nan)
 
 
-#: Profiles that are known outside their grid too: (x, y from the centre, parameters) -> height.
+#: Profiles, defined beyond their grid: (x, y from the centre, parameters) -> height.
 _INDENTERS = {"sphere": _sphere, "cone": _cone, "flat_punch": _flat_punch}
 
 
@@ -240,18 +242,20 @@ def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> x
     h.values = _INDENTERS[name](x, y, **parameters)
     absent = np.isnan(h.values)
     if absent.all():
-        raise InputError(f"radius is {parameters['radius']!r}: expected one that holds a cell of {spacing(h)} m")
+        raise InputError(
+            f"radius is {parameters['radius']!r}: expected one that contains a cell centre, for cells of {spacing(h)} m"
+        )
     if absent.any():
         h.attrs["missing"] = "absent"
     return h
 
 
 def cell_of(size: Any, shape: Any) -> tuple[float, float]:
-    """Cell sides (dx, dy) of a domain. [m]"""
+    """Return the cell sides (dx, dy) of a domain. [m]"""
     return size[0] / shape[0], size[1] / shape[1]
 
 
 def recipe_of(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> dict[str, str]:
-    """Attributes from which the heights can be made again."""
+    """Return attributes from which the heights can be generated again."""
     recipe = {"name": name, "parameters": parameters, "size": list(size), "shape": list(shape)}
     return {"recipe": json.dumps(recipe), "history": f"generated: {name}"}

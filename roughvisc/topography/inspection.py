@@ -1,4 +1,4 @@
-"""What a scan needs before it is pressed: findings in the scan, each with the conditioning step that follows."""
+"""Inspection of scans: findings, each with the conditioning step that it calls for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-import scipy  # which imports a submodule when it is first used: scipy.ndimage takes 0.1 s
+import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.topography.borders import border_mismatch
@@ -19,25 +19,27 @@ from roughvisc.topography.parameters import parameters
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
 
-#: Share of the surface in large holes from which a part without them is proposed.
+#: Share of the surface in large holes from which a crop without large holes is recommended.
 _HOLES = 0.01
 #: Beyond this share of the points, spikes may be the surface itself.
 _MOST_SPIKES = 0.02
-#: Share of the mean square height from which a quadratic form is removed.
+#: Share of a quadratic form in the mean square height from which its removal is recommended.
 _FORM = 0.5
-#: Root mean square slope above which a unit or the spacing is probably wrong, and kurtosis of Gaussian heights, which
-#: scatters from patch to patch. [-]
+#: Root mean square slope above which a unit or the spacing is probably wrong, and range of the kurtosis of samples of
+#: Gaussian heights. [-]
 _STEEP, _GAUSSIAN = 1.0, (2.4, 4.0)
-#: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. Where the
-#: spectrum is less than so many times the tail, noise is as strong as the surface.
+#: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. If the spectrum
+#: is below this multiple of the tail, noise is at least as strong as the surface.
 _WHITE, _ABOVE = -1.5, 2.0
-#: A floor this far below the rms height is rounding. A floor with no more of the mean square slope is not filtered.
+#: A noise floor below this part of the rms height is rounding. Noise below this share of the mean square slope is not
+#: filtered.
 _ROUNDING, _HARMLESS = 1e-6, 0.02
-#: Largest share of missing points for a spectrum.
+#: Largest share of missing points for which a spectrum is computed.
 _MOST_MISSING = 0.5
-#: Hiding as many points again raises a true noise floor by at most 1.2, an artefact of interpolation by at least 2.
+#: Twice the missing points raise a true noise floor by a factor of at most 1.2, an artefact of interpolation by a
+#: factor of at least 2.
 _OF_GAPS = 1.5
-#: Waves of fewer cells are not resolved in contact.
+#: Waves shorter than this number of cells are not resolved in contact.
 _RESOLVED = 8
 
 
@@ -48,7 +50,7 @@ class Finding:
     Attributes
     ----------
     name : str
-        What was measured.
+        Name of the property.
     seen : str
         The result in words.
     advice : str
@@ -72,9 +74,9 @@ class Inspection:
     findings : dict of str to Finding
         By their names.
     steps : dict
-        Conditioning steps as surface cards and studies write them.
+        Conditioning steps in the notation of surface cards and studies.
     boundary : {"periodic", "mirror"}
-        Boundary with which the surface repeats without a step.
+        Boundary without a step between a surface and its repetition.
     shape, area, rms_slope : tuple of int, float, float
         Of the surface after the steps. [-, m2, -]
     """
@@ -103,7 +105,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     Raises
     ------
     InputError
-        If all points are missing, or those present determine no plane.
+        If all points are missing, or the points present do not determine a plane.
 
     Examples
     --------
@@ -177,7 +179,7 @@ def inspect(h: xr.DataArray) -> Inspection:
         advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" to press the form as well'
     found.append(Finding("Form", seen, advice, {"share": form, "rms_without": flat}))
 
-    if steps["level"] == 1 and not doubtful:  # these steps are done
+    if steps["level"] == 1 and not doubtful:  # these steps are already done
         treated = kept
     else:
         treated = level(h, steps["level"])
@@ -290,7 +292,7 @@ def _without_holes(h: xr.DataArray) -> tuple[dict[str, tuple[float, float]], flo
 
 
 def _largest_rectangle(present: np.ndarray) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return rows and columns, the last excluded, of the rectangle of the most cells of which all are present."""
+    """Return the rows and the columns (end excluded) of the largest rectangle without missing cells."""
     best, found = 0, ((0, 0), (0, 0))
     run = np.zeros(present.shape[1], dtype=int)  # cells present above, up to this row
     for row, line in enumerate(present):
@@ -305,18 +307,18 @@ def _largest_rectangle(present: np.ndarray) -> tuple[tuple[int, int], tuple[int,
 
 
 def _noise(h: xr.DataArray) -> dict[str, Any] | None:
-    """Measure the short-wave end of the spectrum; None if few points were measured, or the surface is flat.
+    """Measure the short-wave end of the spectrum; None if too few points were measured or the surface is flat.
 
-    Filled points raise it. Noise of 2 % of the rms height is overestimated by up to a third if 10 % of the points are
-    missing; weaker noise by more.
+    Filled points raise this end of the spectrum. Noise of 2 % of the rms height is overestimated by up to a third if
+    10 % of the points are missing, and weaker noise by more.
 
     Returns
     -------
     dict
-        ``rms``: of white noise as strong as the spectrum at its short-wave end [m]; ``floor``: whether the spectrum is
-        flat there, so that `rms` is the noise and not its bound; ``wavelength``: the shortest wave above the noise, two
-        cells if there is no floor [m]; ``fine_slopes``, ``noisy_slopes``: shares of the mean square slope below eight
-        cells, and below the floor [-].
+        ``rms``: rms height of white noise as strong as the spectrum at its short-wave end [m]; ``floor``: whether the
+        spectrum is flat there, so that `rms` is the noise and not an upper bound; ``wavelength``: the shortest wave
+        above the noise, two cells without a floor [m]; ``fine_slopes``, ``noisy_slopes``: shares of the mean square
+        slope of waves below eight cells, and of waves below `wavelength` [-].
     """
     missing, filled = np.isnan(h.values), filled_points(h)
     gaps = missing if filled is None else missing | filled
@@ -351,7 +353,7 @@ def _noise(h: xr.DataArray) -> dict[str, Any] | None:
 
 
 def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return wavevector [rad/m], density [m4] and modes of the complete rings, with a membrane over the gaps."""
+    """Return wavevector [rad/m], density [m4] and number of modes of the complete rings; a membrane fills the gaps."""
     spectrum = psd(fill(h.where(~gaps)) if gaps.any() else h, "hann")
     seen = spectrum["wavevector"].values <= np.pi / max(spacing(h))
     q, density, modes = (spectrum[name].values[seen] for name in ("wavevector", "psd", "modes"))

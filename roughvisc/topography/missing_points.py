@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
-import scipy  # which imports a submodule when it is first used: scipy.ndimage takes 0.1 s
+import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.arguments import one_of
@@ -24,9 +24,9 @@ from roughvisc.topography.grid import (
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
-#: Side of the window that tells large holes from small, in points.
+#: Side of the window that distinguishes large holes from small ones, in points.
 _HOLE = 9
-#: Numbers in the windows that are sorted at once.
+#: Largest count of numbers sorted in one block.
 _AT_ONCE = 2_000_000
 
 
@@ -101,9 +101,7 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
     one_of("method", method, ("harmonic", "nearest"))
     h = checked(h, "fill")
     if h.attrs.get("missing") == "absent":
-        raise InputError(
-            "fill: the missing cells are absent (there is no material): expected a scan with missing points"
-        )
+        raise InputError("fill: the missing cells are absent (without material): expected a scan with missing points")
     require_heights(h, "fill")
     missing = np.isnan(h.values)
     heights = h.values.copy()
@@ -116,21 +114,21 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
 
 
 def in_large_holes(missing: np.ndarray) -> np.ndarray:
-    """Mask of the points that lie in large holes: most of the points around them are missing, they or not.
+    """Return the mask of points in large holes, missing or not: most of the points around them are missing.
 
     Parameters
     ----------
     missing : ndarray of bool, shape (nx, ny)
-        Where no height is.
+        Mask of the missing points.
     """
     return scipy.ndimage.uniform_filter(missing.astype(float), _HOLE, mode="nearest") > 0.5
 
 
 def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.ndarray]]:
-    """Rows, and the median over a square window of the finite values about each of their points.
+    """Yield blocks of rows, and the median of the finite values in a square window about each of their points.
 
-    NaN where there are none; smaller windows at the border. In blocks: a window's worth of copies of the whole would
-    be large.
+    The median is NaN if a window has no finite value. Windows are smaller at the border. Blocks limit the memory, which
+    holds one copy of the rows for each point of a window.
     """
     reach = window // 2
     rows = max(1, _AT_ONCE // (window**2 * values.shape[1]))
@@ -150,10 +148,10 @@ def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.n
 
 
 def harmonic(heights: np.ndarray, missing: np.ndarray) -> np.ndarray:
-    r"""Heights of the membrane that is spanned over each hole, row by row. [m]
+    r"""Return the heights of a membrane over each hole, row by row. [m]
 
-    :math:`\sum_n (h_n - h_p) = 0` over the neighbours of every missing point: four, fewer at the border of the scan,
-    across which nothing flows.
+    :math:`\sum_n (h_n - h_p) = 0` over the neighbours of every missing point: four, or fewer at the border of the scan,
+    which has zero flux.
     """
     from scipy.sparse.linalg import spsolve  # slow to import
 
@@ -175,6 +173,6 @@ def harmonic(heights: np.ndarray, missing: np.ndarray) -> np.ndarray:
 
 
 def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:
-    """The nearest height present, of each missing point. [m]"""
+    """Return the nearest present height for each missing point. [m]"""
     nearest = scipy.ndimage.distance_transform_edt(missing, sides, return_distances=False, return_indices=True)
     return heights[nearest[0][missing], nearest[1][missing]]

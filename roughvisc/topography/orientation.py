@@ -1,9 +1,9 @@
-"""How the map of each format lies, and how that was told: a scan read the wrong way round is a mirror image."""
+"""Orientation of the map in each format, and its evidence: a scan with a wrong orientation is a mirror image."""
 
 from __future__ import annotations
 
-#: Formats whose reader gives the top line of the map first, and how that was told. The first two by a feature in a
-#: real file; the others by what two programs that read them say of each other.
+#: Formats whose reader returns the top line of the map first, and the evidence. For the first two, it is a feature in a
+#: real file; for the others, mostly the agreement of two programs.
 _GWYDDION = "the reader matches the map of Gwyddion, whose first line is the top one; by no feature in a real file"
 _TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
@@ -21,23 +21,23 @@ _TOP_FIRST = {
     "ps": _GWYDDION,
     "wsxm": _GWYDDION,
 }
-#: Formats that say themselves which way y goes.
+#: Formats that define the direction of y.
 _STATED = {
     "wyko": "each line is a column of the map from the bottom up, as Gwyddion reads it; by no feature in a real file",
     "nc": "verified: the coordinates in the file",
     "xyz": "verified: the coordinates in the file",
 }
-#: Formats that are a matrix and no more: what one is called.
+#: Formats of bare matrices, and how messages call the file.
 _MATRICES = {"asc": "text matrix", "csv": "CSV matrix", "npy": "NumPy array"}
 
 
 def top_line_first(format: str) -> bool:
-    """Whether a format's reader gives the line of the largest y first."""
+    """Return whether the reader of a format returns the line of the largest y first."""
     return format in _TOP_FIRST
 
 
 def orientation(format: str) -> str:
-    """How the orientation of a format was told.
+    """Return the evidence for the orientation of a format.
 
     Parameters
     ----------
@@ -47,7 +47,8 @@ def orientation(format: str) -> str:
     Returns
     -------
     str
-        Begins with ``verified`` where a feature in a real file, or the file itself, tells; else with ``not verified``.
+        Begins with ``verified`` if the evidence is a feature in a real file, or the file itself states the orientation;
+        otherwise with ``not verified``.
 
     Examples
     --------

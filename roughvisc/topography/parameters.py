@@ -27,7 +27,7 @@ PARAMETERS = {
 
 
 def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
-    r"""Areal surface parameters about the mean height.
+    r"""Compute areal surface parameters about the mean height.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
 
 
 def levelled_parameters(h: xr.DataArray) -> xr.Dataset:
-    """:func:`parameters` of heights less their mean plane, as tables, pages and figures state them."""
+    """Return the :func:`parameters` of heights minus their mean plane, for tables, pages and figures."""
     return parameters(off_plane(h))
 
 
 def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:
-    """Root mean square slope, Sdq of :func:`parameters`, where the surface lies within a depth of its highest point.
+    """Return the root mean square slope, Sdq of :func:`parameters`, within a depth of the highest point.
 
     Parameters
     ----------
@@ -98,19 +98,19 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
     periodic : bool
         Whether differences are also taken across the border.
     depth : float
-        A corner of three neighbouring points counts if one of them lies no deeper. [m]
+        A corner of three neighbouring points counts if its highest point is not deeper. [m]
 
     Returns
     -------
     float
-        NaN where no point is left for it. [-]
+        NaN if no corner counts. [-]
     """
     slope_x, slope_y = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
     return float(np.sqrt((slope_x**2 + slope_y**2).mean())) if slope_x.size else math.nan
 
 
 def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
-    """First differences along x and y where both are there, in the corner of the points (i, j), (i+1, j), (i, j+1)."""
+    """Return the slopes along x and y at the corners of the points (i, j), (i+1, j), (i, j+1) that are all present."""
     (dx, dy), (nx, ny) = spacing(h), h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
@@ -123,7 +123,7 @@ def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[n
 
 
 def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:
-    """Sum of the second differences along x and y where all five points are there."""
+    """Return the sum of the second differences along x and y where all five points are present."""
     (dx, dy), (nx, ny) = spacing(h), h.shape
     z = np.pad(h.values, [(n, n) for n in (int(periodic or nx == 1), int(periodic or ny == 1))], mode="wrap")
     middle = z[1:-1, 1:-1]

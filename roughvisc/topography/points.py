@@ -1,4 +1,4 @@
-"""Points x, y, z as a grid: by the lattice on which they lie, or in cells of a given size."""
+"""Conversion of points x, y, z to a grid: on their own lattice, or in cells of a given size."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import MOST_CELLS
 
-#: Largest distance of a point from its lattice, in steps, and gaps within one line of it, in largest gaps.
+#: Largest distance of a point from its lattice, in steps, and largest gap within a lattice line, in gaps between lines.
 _OFF, _GAP = 0.01, 0.1
 #: Largest deviation of the axes of a lattice from x and y. [rad]
 _OBLIQUE = 0.01
-#: Most nodes of a lattice for each point.
+#: Largest number of lattice nodes per point.
 _SPARSE = 64
 
 
 def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
-    """Return heights and steps of the lattice on which points lie, to a hundredth of a step; None if there is none.
+    """Return the heights and steps of the lattice of some points, to a hundredth of a step; None without a lattice.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
 def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
     """Return the mean height of the points in each square cell, and the number of cells without a point.
 
-    Cells without a point are missing. If there are fewer points than cells, all cells have the height between the
-    points, linear over triangles, and those outside the points are missing.
+    Cells without a point are missing. If there are fewer points than cells, the heights of all cells are interpolated
+    linearly over triangles of points instead, and cells outside the triangles are missing.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     shape = np.maximum(np.ceil((high - low) / side - 1e-9), 1)
     if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
-        raise InputError(key="grid", found=side, expected=f"cells of which {high - low} holds two at least each way")
+        raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")
     nx, ny = (int(n) for n in shape)
     i, j = np.minimum((points[:, :2] - low) / side, shape - 1).astype(int).T
     count = np.bincount(i * ny + j, minlength=nx * ny).reshape(nx, ny)

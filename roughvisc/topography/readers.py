@@ -1,6 +1,6 @@
-"""Scan files as labelled height grids: units, missing values, orientation and plausibility are decided here.
+"""Conversion of scan files to labelled height grids: units, missing values, orientation and plausibility.
 
-Every problem is one :class:`~roughvisc.errors.InputError` that names the file, what was found, and what to pass.
+Every problem raises one :class:`~roughvisc.errors.InputError` that names the file, the cause and the argument to pass.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ from roughvisc.units import Quantity, quantities, quantity
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
 #: of 76 mm too.
 WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
-#: Fewest points whose heights are judged.
+#: Fewest points for a check of the heights.
 _FEWEST = 16
-#: Beyond this distance from zero, heights of an array stand for missing points. [m]
+#: Heights of an array further from zero than this mark missing points. [m]
 FARTHEST = 1e3
-#: A number stands for missing points if it is the extreme of the heights, at least this large in the file, occurs at
-#: least so often, and is further from the next height than so many times the range of all others. Exactly flat pits of
-#: a made texture are smaller numbers.
+#: A number marks missing points under four conditions: it is the lowest or highest height, it is at least this large in
+#: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
+#: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
 _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
 _READER = threading.RLock()
 
 
 class Reading(NamedTuple):
-    """How a user wants a file to be read.
+    """Options with which a user reads a file.
 
     Attributes
     ----------
     unit, height_unit : str or None
-        Unit of length where the file states none; of the heights if it differs.
+        Unit of length if the file states none, and of the heights if they have another unit.
     spacing : tuple of float or None
         Cell sides. [m]
     grid : float or None
         Side of the cells into which points are sorted. [m]
     no_data : float or None
-        Number that stands for a missing height in the file.
+        Number that marks a missing height in the file.
     height_scale : float or None
         Factor of the heights.
     """
@@ -69,7 +69,7 @@ class Reading(NamedTuple):
 def read_file(
     path: Path, *, format: str | None = None, channel: int | str | None = None, **options: Any
 ) -> xr.DataArray:
-    """Read one channel of an instrument or grid file; the options are those of :func:`roughvisc.open_scan`."""
+    """Read one channel of an instrument or grid file, with the options of :func:`roughvisc.open_scan`."""
     how = _valid(Reading(**options))
     with _reading(path), closing(open_file(path, format)) as file:
         chosen = _chosen(file, channel)
@@ -90,7 +90,7 @@ def read_file(
 
 
 def _valid(how: Reading) -> Reading:
-    """Return the options with numbers in SI, after a check."""
+    """Check the options, and return them with numbers in SI."""
     for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
         if unit is not None:
             quantity(f"1 {unit}", "m", key)
@@ -127,7 +127,7 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
         h = labelled(values, spacing)
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
-    if isinstance(raw, xr.DataArray):  # keep what a grid file states beside heights and coordinates
+    if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
         masks = {
             name: one for name, one in raw.coords.items() if name not in ("x", "y") and set(one.dims) == {"x", "y"}
         }
@@ -140,7 +140,7 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
 
 
 def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
-    """Return the metres in one unit of x and y, and of the heights: as the file states them, or else as given."""
+    """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
     stated = {
         unit: quantity(f"1 {unit}", "m", "the unit in the file")
         for unit in (channel.unit, channel.lateral_unit)
@@ -201,7 +201,7 @@ def _of_points(
 
 
 def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
-    """Return heights with NaN where a number stands for a missing point: the given one, or one that is out of range."""
+    """Return heights with NaN at missing points, which a given number or an outlying number marks."""
     if no_data is not None:
         return np.where(np.isclose(values, no_data, rtol=1e-6, atol=0.0), np.nan, values)
     if values.size < _FEWEST:
@@ -254,7 +254,7 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     heights : array_like, shape (nx, ny)
         Heights over (x, y), peaks up, NaN or masked where missing. [m] Transpose a matrix whose rows run along x, as in
         the files that :func:`roughvisc.open_scan` reads.
-    spacing : float or str, or pair of them
+    spacing : float or str, or a pair
         Cell sides (dx, dy). [m]
 
     Returns
@@ -310,12 +310,12 @@ def supported_formats() -> dict[str, tuple[str, ...]]:
         Name -> suffixes, in alphabetical order.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the library's imports
+        warnings.simplefilter("ignore")  # warnings of the library's imports
         return dict(sorted(suffixes().items()))
 
 
 def sha256(path: Path) -> str:
-    """Checksum of a file's content; of a folder's files in order of their names."""
+    """Return the checksum of the content of a file, or of all files of a folder in order of their names."""
     regular(path)
     if path.is_dir():
         parts = (f"{p.relative_to(path)} {sha256(p)}" for p in sorted(path.rglob("*")) if p.is_file())
@@ -325,13 +325,13 @@ def sha256(path: Path) -> str:
 
 
 def existing(path: Any) -> Path:
-    """The path of a file that is there; an :class:`~roughvisc.errors.InputError` otherwise."""
+    """Return the path of an existing file; raise :class:`~roughvisc.errors.InputError` otherwise."""
     try:
         path = Path(path)
     except TypeError as error:
         raise InputError(f"path is {type(path).__name__}: expected the name of a file") from error
     if not path.exists():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path}: the file does not exist")
     regular(path)
     if path.is_dir() and path.suffix != ".zarr":
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
@@ -340,9 +340,9 @@ def existing(path: Any) -> Path:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Name the file in every error, and keep the libraries' warnings to ourselves.
+    """Add the name of the file to every error, and hide the warnings of libraries.
 
-    One reader at a time in a process: netCDF is not safe in threads, nor are the filters of warnings.
+    Only one reader runs at a time in a process: netCDF and the filters of warnings are not thread-safe.
     """
     if path.is_file() and not path.stat().st_size:
         raise InputError(f"{path}: the file is empty")
@@ -352,7 +352,7 @@ def _reading(path: Path) -> Iterator[None]:
             yield
         except InputError as error:
             raise error.prefixed(str(path)) from error
-        except Exception as error:  # damaged files raise of every kind, MemoryError and struct.error among them
+        except Exception as error:  # damaged files raise many types, such as MemoryError and struct.error
             forget(error)
             raise InputError(
                 f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format"
@@ -372,9 +372,9 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
 
 
 def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
-    """Refuse heights that are all missing, or further from zero than is plausible.
+    """Reject heights that are all missing or implausibly far from zero.
 
-    In a file of a dozen points, which is an example, heights of metres are accepted.
+    Heights of metres are accepted in a file of a dozen points, which is an example.
     """
     values = h.values
     if np.isnan(values).all():
@@ -384,5 +384,5 @@ def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
         raise InputError(
             f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} "
             "m from zero): expected height_scale, such as 1e-6, if they are in another unit than the file or `unit` "
-            "states; no_data, or NaN in an array, if the number stands for missing points"
+            "states; no_data, or NaN in an array, if the number marks missing points"
         )

@@ -27,7 +27,7 @@ from roughvisc.topography.grid import (
 from roughvisc.topography.missing_points import harmonic
 from roughvisc.units import Quantity, quantities
 
-#: Part of a cell that rounding may take off an overlap.
+#: Largest reduction of an overlap by rounding, relative to a cell.
 _ROUNDING = 1e-9
 
 
@@ -47,7 +47,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     Returns
     -------
     xarray.DataArray
-        Height at the centres of the new cells, with the same mean. A cell is missing if less than half of it is
+        Height at the centres of the new cells, with the same mean. A cell is missing if less than half of its area is
         present. [m]
 
     Raises
@@ -59,9 +59,9 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     -----
     A periodic surface is expanded in a Fourier series. Any other surface and its mirror images are expanded in cosines.
     Missing points are filled as by :func:`fill` first. A coarser grid keeps the wavelengths longer than two of its
-    cells, and their slopes. Means over its cells would damp wavelengths of up to ten cells and alias shorter ones: on
-    cells twice as long the error of the contact area would be 1.2 to 1.8 times as large, and that of mean gap and
-    approach 2 to 100 times.
+    cells, and their slopes. Means over its cells would damp wavelengths of up to ten cells and alias shorter
+    wavelengths: on cells twice as long, the error of the contact area would be 1.2 to 1.8 times as large, and the
+    errors of mean gap and approach 2 to 100 times.
 
     Along each axis of :math:`n` cells the Fourier transform :math:`h_k` gives, at the centres of :math:`m` cells,
 
@@ -139,7 +139,7 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
 
 
 def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept: bool = False) -> np.ndarray:
-    """One period of a field at the centres of other cells, by Fourier interpolation.
+    """Return one period of a field at the centres of other cells, by Fourier interpolation.
 
     Parameters
     ----------
@@ -148,25 +148,25 @@ def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept:
     shape : tuple of int
         New number of cells.
     first_kept : bool
-        Whether the new grid is moved so that the first centres coincide, which does where only the waves matter, not
-        their place. Otherwise both grids cover the same domain.
+        Whether the new grid is shifted so that the first centres coincide, which suffices if the position of the waves
+        does not matter. Otherwise both grids cover the same domain.
 
     Returns
     -------
     ndarray
-        Of that shape and the same mean; see :func:`resample`.
+        Field of the new shape, with the same mean; see :func:`resample`.
     """
     return _waves(_waves(values, shape[0], 0, first_kept), shape[1], 1, first_kept)
 
 
 def _repeats(step: str, h: xr.DataArray, periodic: bool | None) -> bool:
     if periodic not in (None, True, False):
-        raise InputError(f"{step}: periodic is {periodic!r}: expected True, False or None (what the surface says)")
+        raise InputError(f"{step}: periodic is {periodic!r}: expected True, False or None (as the surface states)")
     return is_periodic(h) if periodic is None else bool(periodic)
 
 
 def _waves(values: np.ndarray, count: int, axis: int, first_kept: bool) -> np.ndarray:
-    """Fourier interpolation onto so many cells along an axis."""
+    """Interpolate onto `count` cells along an axis by a Fourier series."""
     before = values.shape[axis]
     if count == before:
         return values
@@ -174,21 +174,21 @@ def _waves(values: np.ndarray, count: int, axis: int, first_kept: bool) -> np.nd
     moved = 0.0 if first_kept else 0.5 / count - 0.5 / before  # from the first old centre to the first new one
     turned = np.exp(2j * np.pi * np.arange(values_q.shape[axis]) * moved)
     fewer = min(count, before)
-    if fewer % 2 == 0:  # a wave of two cells: a coarser grid holds no such wave, a finer one has two halves of it
+    if fewer % 2 == 0:  # a wave of two cells: a coarser grid drops it, a finer grid splits it in two halves
         turned[fewer // 2] *= 0.0 if count < before else 0.5
     values_q *= turned[:, None] if axis == 0 else turned
     return scipy.fft.irfft(values_q, n=count, axis=axis) * (count / before)
 
 
 def _cosines(values: np.ndarray, count: int, axis: int) -> np.ndarray:
-    """The cosines that both grids hold, at the centres of so many cells along an axis."""
+    """Interpolate onto `count` cells along an axis by the cosines that both grids resolve."""
     values_q = scipy.fft.dct(values, axis=axis, norm="ortho")
     return scipy.fft.idct(values_q, n=count, axis=axis, norm="ortho") * math.sqrt(count / values.shape[axis])
 
 
 def _shares(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Part of each new cell that a mask of the old cells covers."""
-    for count in shape:  # along the first axis, and turned
+    """Return the part of each new cell that a mask of the old cells covers."""
+    for count in shape:  # along the first axis, then transposed
         borders = np.arange(count + 1) * (len(mask) / count)
         before = np.minimum(borders.astype(int), len(mask) - 1)
         total = np.concatenate([np.zeros((1, mask.shape[1])), np.cumsum(mask, axis=0)])

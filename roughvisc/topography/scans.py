@@ -1,7 +1,7 @@
 """Surfaces: scan files, surface cards and the table ``[surface]`` of a study.
 
 The table names a scan ``file`` and how to read it, or a recipe to ``generate`` and its parameters, and the conditioning
-steps. A surface card is such a table in a TOML file of its own, with the origin of the surface.
+steps. A surface card is this table in a separate TOML file, with the origin of the surface.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from roughvisc.topography.readers import existing, finite, read_file, sha256
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, in_si, quantities
 
-#: Keys of a card that change no height.
+#: Keys of a card that do not affect the heights.
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
 
 
@@ -54,24 +54,25 @@ def open_scan(
     unit : str, optional
         Unit of length in a file that states none, such as ``"um"``.
     height_unit : str, optional
-        Unit of the heights in a file that states none, if it differs from that of x and y: for points in mm, mm, um use
+        Unit of the heights in a file that states none, if x and y have another unit: for points in mm, mm, um use
         ``unit="mm", height_unit="um"``.
-    spacing : float or str, or pair of them, optional
+    spacing : float or str, or a pair, optional
         Cell sides (dx, dy), instead of those in the file. [m]
     grid : float or str, optional
         Side of the square cells into which points x, y, z are sorted: each has the mean height of its points. Default:
         the lattice on which the points lie, to a hundredth of its steps. [m]
     no_data : float, optional
-        Number that stands for a missing point, in the unit of the file. Default: an extreme of at least 999 that
-        four points or more share, further from all other heights than ten times their range; a warning states it.
+        Number that marks a missing point, in the unit of the file. Default: the lowest or highest number, if it is at
+        least 999 in size, occurs at four points or more, and is further from all others than ten times their range; a
+        warning reports it.
     height_scale : float, optional
-        Factor of the heights, of a file that states a wrong unit: 1e-6 for micrometres in place of metres. [-]
+        Factor of the heights, for a file that states a wrong unit: 1e-6 if micrometres are labelled as metres. [-]
 
     Returns
     -------
     xarray.DataArray
-        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are those of the cell centres; the spacing is
-        the size over the number of points. The attributes contain the name and checksum of the file, format,
+        Height over (x, y), peaks up, NaN where missing. [m] Coordinates are the cell centres; the spacing is the size
+        over the number of points. The attributes contain the name and checksum of the file, format,
         instrument, channel, orientation (whether y is known to point up, or the map may be a mirror image) and
         ``history``. Rows of a matrix in text, CSV or NumPy run along x: row j of the file is ``y[j]``.
 
@@ -117,7 +118,7 @@ def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
     Raises
     ------
     InputError
-        If the card is no TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
+        If the card is not TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
     """
     path = Path(path)
     about, table = read_card(path)
@@ -129,7 +130,7 @@ def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
             found = sha256(existing(table["file"]))
             if stated.lower() != found:
                 raise InputError(
-                    f"the checksum of {Path(table['file']).name} is {found}, sha256 says {stated}: the file was "
+                    f"the checksum of {Path(table['file']).name} is {found}, sha256 states {stated}: the file was "
                     "changed or damaged"
                 )
         h = raw_height("", table)
@@ -159,12 +160,12 @@ def read_card(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def is_card(path: Path, format: str | None) -> bool:
-    """Whether a file is a surface card: by its suffix, unless the format is given."""
+    """Return whether a file is a surface card: by its suffix, unless the format is given."""
     return format == "card" or (format is None and path.suffix.lower() == ".toml")
 
 
 def measured_file(path: Path, format: str | None) -> Path | None:
-    """File with the measured heights of a surface file: the file named in a card, otherwise the file itself.
+    """Return the file with the measured heights: the file named in a surface card, otherwise the file itself.
 
     None for a card with a recipe.
 
@@ -180,12 +181,12 @@ def measured_file(path: Path, format: str | None) -> Path | None:
 
 
 def read_toml(path: Path, wanted: str) -> dict[str, Any]:
-    """Tables of a TOML file, with a byte-order mark or without.
+    """Return the tables of a TOML file, with or without a byte-order mark.
 
     Raises
     ------
     InputError
-        If it is no regular file, cannot be read, or is not what is ``wanted``.
+        If it is not a regular file, cannot be read, or is not `wanted`.
     """
     regular(path)
     try:
@@ -197,14 +198,14 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
         where = f"line {line} contains a byte that is not UTF-8"
         found = "it is in UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else where
         raise InputError(f"{path}: is not {wanted}: {found}: expected a text in UTF-8") from error
-    except ValueError as error:  # of TOML, of an integer of thousands of digits
+    except ValueError as error:  # wrong TOML, or an integer of thousands of digits
         raise InputError(f"{path}: is not {wanted}: {error}") from error
     except RecursionError as error:
         raise InputError(f"{path}: is not {wanted}: it is nested too deeply") from error
 
 
 def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
-    """Return the heights of a table ``[surface]``, conditioned; of two faces their sum. [m]"""
+    """Return the conditioned heights of a table ``[surface]``; for two faces, their sum. [m]"""
     second = table.get("second")
     height = _face_height("surface", table)
     if second is not None:
@@ -261,7 +262,7 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
 
 
 def surface_boundary(table: Mapping[str, Any]) -> Any:
-    """Return the boundary that a surface is made for, without its heights; None if the study has to state it."""
+    """Return the boundary for which a surface is made, without its heights; None if the study has to state it."""
     made = BOUNDARIES.get(table.get("generate", ""))
     if "file" in table:
         path = Path(table["file"])

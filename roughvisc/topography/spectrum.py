@@ -11,12 +11,12 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, require_complete, spacing
 
-# Of the mean square slope, what tells the shortest wave of a surface.
+# Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
 
 
 def hann(z: np.ndarray) -> np.ndarray:
-    """Heights under a Hann window whose mean square is one. [m]"""
+    """Return heights under a Hann window with a mean square of one. [m]"""
     weights = [1 - np.cos(2 * np.pi * (np.arange(n) + 0.5) / n) for n in z.shape]
     along_x, along_y = (weight / np.sqrt(np.mean(weight**2)) for weight in weights)
     return z * along_x[:, None] * along_y
@@ -25,7 +25,7 @@ def hann(z: np.ndarray) -> np.ndarray:
 def modes(
     z: np.ndarray, cells: tuple[float, float], norm: Literal["backward", "forward"] = "backward"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Modes of heights that repeat.
+    """Return the modes of periodic heights.
 
     Parameters
     ----------
@@ -34,14 +34,15 @@ def modes(
     cells : tuple of float
         Cell sides. [m]
     norm : {"backward", "forward"}
-        Of the transform: the squares of sums over the points, or of means (the variances). [m2]
+        Norm of the transform. "backward": amplitudes are sums over the points. "forward": amplitudes are means, whose
+        squares are variances.
 
     Returns
     -------
     q_x, q_y : ndarray, shapes (nx, 1) and (1, ny // 2 + 1)
         Wavevectors. [rad/m]
     power, count : ndarray, shape (nx, ny // 2 + 1)
-        Squared moduli [m2], and how many modes each stands for: two where its conjugate is not stored.
+        Squared moduli [m2], and the number of modes of each entry: two if its conjugate is not stored.
     """
     q_x, q_y, count = _wavevectors(z.shape, cells)
     power = np.abs(scipy.fft.rfft2(z, norm=norm)) ** 2
@@ -49,7 +50,7 @@ def modes(
 
 
 def _wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Wavevectors along x and, from zero on, along y [rad/m]; how many modes a column stands for."""
+    """Return the wavevectors along x and, from zero on, along y [rad/m], and the number of modes of each column."""
     (nx, ny), (dx, dy) = shape, cells
     q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy)
     count = np.full(q_y.size, 2.0)
@@ -60,12 +61,12 @@ def _wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np
 
 
 def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
-    """Wave number beyond which the shortest octave of waves lies; zero of a surface without slopes. [rad/m]
+    """Return the wave number at which the shortest octave of waves begins; zero for a flat surface. [rad/m]
 
     Parameters
     ----------
     q, slope : ndarray
-        Length of each wavevector [rad/m], and its share in the mean square slope, on any scale.
+        Length of each wavevector [rad/m], and its share of the mean square slope, on any scale.
     """
     order = np.argsort(q, axis=None)
     summed = np.cumsum(slope.ravel()[order])
@@ -104,7 +105,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     incomplete.
 
     A steep spectrum falls by many orders of magnitude from long to short wavelengths. Missing points that are filled by
-    a membrane (:func:`roughvisc.fill`) have kinks at their rims, which raise its short-wavelength end: with 10 % of
+    a membrane (:func:`roughvisc.fill`) have kinks at their rims, which raise the short-wavelength end: with 10 % of
     missing points and noise of a hundredth of the rms height, by a factor of 1.7.
 
     References

@@ -19,7 +19,7 @@ from roughvisc.topography.synthesis import half_spectrum, random_heights
 def surrogates(
     h: xr.DataArray, count: int, *, seed: int, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
 ) -> xr.DataArray:
-    r"""Random surfaces with the spectrum of a surface, as models of other patches of the same roughness.
+    r"""Generate random surfaces with the spectrum of a surface, as models of other samples of the same roughness.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def surrogate(
     if is_mirrored(h.values):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
-    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # its rings are as wide
+    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
     sides = spacing(h)
     q_x, q_y, _ = half_spectrum(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)

@@ -1,4 +1,4 @@
-"""Recipes of surfaces, by the names of surface cards and studies; the indenters come from :mod:`.indenters`.
+"""Recipes of surfaces, by their names in surface cards and studies; indenters are in :mod:`.indenters`.
 
 Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the recipe stays in the attributes.
 """
@@ -30,7 +30,7 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
         Amplitude :math:`a`. [m]
     wavelength : float or str
         Wavelength :math:`2 \pi / k`; each side must be a whole number of wavelengths. [m]
-    size : float or str, or pair of them
+    size : float or str, or a pair
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; with one cell along y the crests run along y.
@@ -86,7 +86,7 @@ def self_affine(
 
     Parameters
     ----------
-    size : float or str, or pair of them
+    size : float or str, or a pair
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``.
@@ -101,15 +101,15 @@ def self_affine(
         domain.
     shortcut : float or str, optional
         Shortest wavelength. [m] Default: two cells (the longer of the two sides). With it, the heights are the same on
-        every grid that resolves it. Without it a finer grid has more wavelengths, and the common ones are lower by one
-        factor, so that the whole surface has the given `rms_slope` or `rms_height`.
+        every grid that resolves it. Without it, a finer grid has more wavelengths, and one factor reduces the common
+        wavelengths so that the whole surface has the given `rms_slope` or `rms_height`.
     anisotropy : float, default 1
         Length of the texture along x over that along y. [-] Wavelengths then refer to the geometric mean of both
         directions.
     amplitudes : {"fixed", "gaussian"}, default "fixed"
         "fixed": each mode has the amplitude of the spectrum, and only phases are random. The rms height and the rms
         slope are then the same for every seed, and quantities that depend on them scatter too little: the mean gap 3 to
-        10 times less than over patches of a random surface. "gaussian": amplitudes are random too, as in patches. Use
+        10 times less than over samples of a random surface. "gaussian": amplitudes are random too, as in samples. Use
         it if the scatter over realisations matters.
     seed : int or numpy.random.Generator
         Source of random phases and amplitudes.
@@ -133,7 +133,7 @@ def self_affine(
 
     Random numbers belong to wavevectors :math:`2 \pi (k_x / L_x, k_y / L_y)`: each :math:`k_x` has its own stream,
     spawned from the seed [2]_ and drawn from :math:`k_y = 0` upwards. The grid only determines the number of streams
-    and the length drawn from each. Phases are those at the corner :math:`x = y = 0`.
+    and the length drawn from each. Phases refer to the corner :math:`x = y = 0`.
 
     References
     ----------
@@ -193,7 +193,7 @@ def half_spectrum(shape: Any, cell: tuple[float, float]) -> tuple[np.ndarray, np
 def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal: bool) -> np.ndarray:
     """Return periodic heights at the cell centres from amplitudes and random phases.
 
-    Each wave number along x has its own stream of random numbers, whatever the grid.
+    Each wave number along x has its own stream of random numbers, independent of the grid.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
     ny : int
         Number of cells along y.
     entropy : list of int
-        From the seed.
+        Random integers from the seed.
     normal : bool
         Whether amplitudes are multiplied by moduli of complex normal numbers of mean square one.
 
@@ -233,7 +233,7 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
 RECIPES: dict[str, Callable[..., xr.DataArray]] = {
     recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
 }
-#: Boundary that the surfaces of each recipe are made for.
+#: Boundary for which the surfaces of each recipe are made.
 BOUNDARIES: dict[str, Literal["free", "periodic"]] = {
     name: "periodic" if name in ("wavy", "self_affine") else "free" for name in RECIPES
 }

@@ -1,6 +1,6 @@
-"""Writers: a height grid to netCDF, X3P or SDF; a surface card, and the [surface] table of a study, for a file.
+"""Writers: height grids in netCDF, X3P and SDF; surface cards, and [surface] tables of studies, for scan files.
 
-Libraries write, as they read.
+Each format is written by the library that reads it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.readers import sha256
 
-#: Suffixes that :func:`save_scan` knows.
+#: Suffixes that :func:`save_scan` writes.
 WRITABLE = (".nc", ".x3p", ".sdf")
 
 
@@ -59,13 +59,13 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
 
 
 def _save_netcdf(h: xr.DataArray, path: Path) -> None:
-    """Write a grid with all that it holds."""
+    """Write a grid with all its coordinates and attributes."""
     compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
     h.to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
 
 
 def known_suffix(path: Path) -> None:
-    """Refuse a file name that :func:`save_scan` cannot write to."""
+    """Reject a file name that :func:`save_scan` cannot write to."""
     if path.suffix.lower() not in WRITABLE:
         raise InputError(f"{path}: found the suffix {path.suffix!r}: expected one of {', '.join(WRITABLE)}")
 
@@ -73,7 +73,7 @@ def known_suffix(path: Path) -> None:
 def card_text(
     file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
 ) -> str:
-    """Return the surface card of a scan file as TOML: its checksum, how it is read, and how it is conditioned.
+    """Return the surface card of a scan file as TOML: checksum, reading options and conditioning steps.
 
     Parameters
     ----------
@@ -109,13 +109,13 @@ def surface_table(
     file : path
         The scan, or a surface card.
     folder : path
-        Folder of the study: a file below it is named relative to it, any other by its whole path.
+        Folder of the study: a file below it is named relative to it, any other file by its full path.
     options : mapping
-        Options of :func:`roughvisc.open_scan` that the file needs; None for the others.
+        Options of :func:`roughvisc.open_scan` that the file needs; None for unused options.
     steps : mapping
-        Conditioning steps, as :func:`~roughvisc.topography.conditioning.condition` takes them. [m]
+        Conditioning steps, as for :func:`~roughvisc.topography.conditioning.condition`. [m]
     remarks : mapping, optional
-        Comment behind a line, by its key.
+        Comment at the end of a line, by its key.
     """
     remarks = remarks or {}
     near = Path(os.path.relpath(file, folder))
@@ -127,7 +127,7 @@ def surface_table(
 
 
 def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:
-    """Return the keys of a table of a surface and their values as TOML."""
+    """Return the keys of a table ``[surface]`` and their values as TOML."""
     entries = {"file": _toml(file.as_posix())}
     for key, value in options.items():
         if value is not None:
@@ -141,7 +141,7 @@ def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -
 
 
 def written_quantity(value: float, unit: str, digits: int = 6) -> str:
-    """A quantity as study files have it, with a prefix.
+    """Return a quantity with a prefix, in the notation of study files.
 
     Examples
     --------
@@ -155,12 +155,12 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
 
 
 def _lengths(value: Any, digits: int = 6) -> str:
-    """Return one length, or a list of them, as TOML."""
+    """Return one length, or a list of lengths, as TOML."""
     if isinstance(value, tuple | list):
         return "[" + ", ".join(_lengths(part, digits) for part in value) + "]"
     return _toml(written_quantity(float(value), "m", digits))
 
 
 def _toml(value: Any) -> str:
-    """Return a text, a number or a truth value as TOML: that of JSON, except for one character."""
+    """Return a text, a number or a truth value as TOML, which equals JSON except for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

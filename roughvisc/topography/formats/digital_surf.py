@@ -1,4 +1,4 @@
-"""Digital Surf (``.sur``): SurfaceTopography reads it, after compressed heights are expanded here."""
+"""Digital Surf (``.sur``): this module expands compressed heights, SurfaceTopography reads the result."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import ScanFile
 
 _MAGIC, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
-#: Size of the header, and the place in it of the sizes of the comment and of the private zone after the header. [byte]
+#: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
 _HEADER, _SIZES = 512, 334
 
 
 def read_digital_surf(path: Path) -> ScanFile:
     """Read a Digital Surf file, compressed or not.
 
-    The heights of a compressed file follow the comment and the private zone: the number of streams, the raw and the
-    compressed size of each, and the streams of zlib.
+    In a compressed file, the comment and the private zone are followed by the number of streams, the raw and the
+    compressed size of each stream, and the zlib streams.
     """
     with path.open("rb") as stream:
         if stream.read(len(_COMPRESSED)) != _COMPRESSED:

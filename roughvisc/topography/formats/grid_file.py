@@ -36,7 +36,7 @@ def is_labelled(path: Path) -> bool:
     """Return whether an HDF5 file holds a variable over x and y, as netCDF does."""
     try:
         return any(channel.is_height for channel in read_grid(path).channels)
-    # of another layout, or damaged: its own reader will say so
+    # of another layout, or damaged: the reader of its format reports it
     except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError):
         return False
 
@@ -76,9 +76,9 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
         return
     with path.open("rb") as stream:
         begins = stream.read(4)
-    if begins in _CLASSIC:  # netCDF's own library crashes on some damaged files; scipy holds no more than the content
+    if begins in _CLASSIC:  # the netCDF library crashes on some damaged files; scipy allocates the content only
         with xr.open_dataset(io.BytesIO(path.read_bytes()), engine="scipy", **options) as dataset:
             yield dataset
-    else:  # netCDF-4 is not safe in threads, and xarray would lock only the reading
+    else:  # netCDF-4 is not thread-safe, and xarray would lock only the reading
         with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, engine="netcdf4", lock=False, **options) as dataset:
             yield dataset

@@ -1,7 +1,7 @@
-"""Text files of one maker, recognised by their first line.
+"""Text formats of instrument makers, recognised by their first line.
 
-Each function takes the text of a file. Rows are taken to run along x and the first to be y = 0, if the format does not
-say otherwise.
+Each function takes the text of a file. Rows run along x and the first row is y = 0, unless the format states
+otherwise.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.tables import decimal_mark, plain_number
 from roughvisc.topography.formats.registry import Channel, ScanFile
 
-#: Zygo: phase counts in one wave by the resolution in the header, and the counts from which a point is missing.
+#: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING = {0: 4096, 1: 32768, 2: 131072}, 2147483640
 
 

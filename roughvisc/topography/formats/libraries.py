@@ -113,7 +113,7 @@ def _channel(found: Any, load: Any) -> Channel:
     from SurfaceTopography.Support.UnitConversion import is_length_unit
 
     shape = tuple(int(n) for n in found.nb_grid_pts or ())
-    # a reader may take an odd unit for a length: phases of Bruker files come as heights in ('µm', None)
+    # a reader may mistake another unit for a length: phases in Bruker files come as heights in ('µm', None)
     units = [unit for unit in (found.unit, found.data_unit) if unit is not None]
     is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
     if len(shape) == 1 or 1 in shape:

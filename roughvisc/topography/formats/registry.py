@@ -1,4 +1,4 @@
-"""Formats by name and suffix, and what a reader returns."""
+"""Formats by name and suffix, and the result of a reader."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from roughvisc.errors import InputError
 
-#: Format -> suffixes without the dot, and the function that reads it, of formats that SurfaceTopography does not read
-#: here. Formats without a suffix are recognised by their first line.
+#: Format -> suffixes without the dot, and its reader, for formats with a reader in this package. Formats without a
+#: suffix are recognised by their first line.
 _OWN: dict[str, tuple[tuple[str, ...], str]] = {
     "x3p": (("x3p",), "libraries.read_x3p"),
     "sdf": (("sdf",), "libraries.read_sdf"),
@@ -51,7 +51,7 @@ class Channel:
         Points along x and y; one number for a profile or for points.
     load : callable
         Returns the heights over (x, y), peaks up, NaN where missing, in `unit`: an array, or a DataArray whose
-        attributes and coordinates are kept; of points an array of shape (n, 3).
+        attributes and coordinates are kept; for points an array of shape (n, 3).
     unit : str, optional
         Unit of the heights; None if the file states none.
     lateral_unit : str, optional
@@ -59,9 +59,9 @@ class Channel:
     spacing : tuple of float, optional
         Cell sides in `lateral_unit`; None if the file states none.
     positions : tuple of ndarray, optional
-        Cell centres along x and y in `lateral_unit`, of files that state them.
+        Cell centres along x and y in `lateral_unit`; None if the file states none.
     kind : {"height", "points", "profile", ...}
-        ``"height"`` of an areal grid, ``"points"`` of points x, y, z; otherwise what the channel holds, in words.
+        ``"height"`` for an areal grid, ``"points"`` for points x, y, z, otherwise a description of the content.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class ScanFile:
-    """A file whose header was read.
+    """Scan file with its header read.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class ScanFile:
     channels : sequence of Channel
         All channels of the file.
     default : int or None
-        Position of the channel to take if none is named; by default the first height.
+        Index of the channel to read if the user names none. None: the first height.
     instrument : str
         Maker and model if known.
     complaints : list of str
@@ -108,7 +108,7 @@ class ScanFile:
 
 
 def open_file(path: Path, format: str | None) -> ScanFile:
-    """Read the header of a scan file, by the name of its format, its content (``"auto"``) or its suffix (None)."""
+    """Read the header of a scan file; find its format by name, by content (``"auto"``) or by suffix (None)."""
     if format == "auto":
         format = _detected(path)
     names = (format,) if format else formats_of(path)
@@ -120,14 +120,14 @@ def open_file(path: Path, format: str | None) -> ScanFile:
             return _reader(name)(path)
         except InputError:
             raise
-        except Exception as error:  # noqa: BLE001  (each reader has its own kinds, struct.error and KeyError among them)
+        except Exception as error:  # noqa: BLE001  (readers raise many types, such as struct.error and KeyError)
             forget(error)
             failures[name] = error
     raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
 
 
 def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
-    """Make a format known to :func:`roughvisc.open_scan` in this process; one of the same name is replaced.
+    """Add a format to :func:`roughvisc.open_scan` in this process, or replace an added format of the same name.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def _detected(path: Path) -> str:
     try:
         return detect_format(str(path))
     except CannotDetectFileFormat as error:
-        raise InputError("no reader knows its content: expected the name of its format", key="format") from error
+        raise InputError("no reader recognises its content: expected the name of its format", key="format") from error
 
 
 def brief(error: BaseException) -> str:

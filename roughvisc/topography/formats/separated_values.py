@@ -1,4 +1,4 @@
-"""Text scans with commas, semicolons or tabs between the numbers, as a text that has blanks there."""
+"""Conversion of scans with commas, semicolons or tabs between the numbers to text with blanks between them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from roughvisc.tables import decimal_mark, name_and_unit, plain_number
 from roughvisc.units import is_quantity
 
 _NUMBER = r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?"
-#: What separates -> a row of numbers with decimal points.
+#: Separator -> pattern of a row of numbers with decimal points.
 _ROW = {sign: re.compile(rf" *{_NUMBER}(?: *{sign} *{_NUMBER})* *") for sign in ";\t,"}
 _ROW[" "] = re.compile(rf"\s*{_NUMBER}(?:\s+{_NUMBER})*\s*")
-#: What may be a number with a decimal comma where blanks separate.
+#: Pattern of a possible number with a decimal comma, if blanks are the separators.
 _WITH_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
-#: A length with a decimal comma in a line that is none of numbers, such as ``# Width: 12,5 um``.
+#: Length with a decimal comma in a line that is not a row of numbers, such as ``# Width: 12,5 um``.
 _LENGTH = re.compile(r"(?<=[:=])(\s*)(\d[\d.]*,\d+)(?=\s*\w{0,2}m\b)")
 #: Cells of a heading, such as ``x [mm]; y [mm]; z [um]``.
 _HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
-#: What stands for a missing height.
+#: Marks of a missing height.
 _MISSING = ("", "nan", "bad", "-", "#n/a", "n/a")
 
 
@@ -30,9 +30,9 @@ def separated_by_blanks(text: str) -> str:
     Parameters
     ----------
     text : str
-        Values between blanks, commas, semicolons or tabs, with a decimal point or a decimal comma. Empty values are
-        missing heights. A heading ``x [mm], y [mm], z [um]`` of points or ``height [um]`` of a matrix becomes comments
-        that state the units. Lines of other text, such as ``# Width: 26 um``, stay as they are.
+        Values separated by blanks, commas, semicolons or tabs, with a decimal point or a decimal comma. Empty values
+        are missing heights. A heading ``x [mm], y [mm], z [um]`` of points or ``height [um]`` of a matrix becomes
+        comments that state the units. Lines of other text, such as ``# Width: 26 um``, stay unchanged.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def separated_by_blanks(text: str) -> str:
     Raises
     ------
     InputError
-        If a line of the matrix holds what is no number, the decimal mark is ambiguous, or x and y differ in their unit.
+        If a value of the matrix is not a number, the decimal mark is ambiguous, or the units of x and y differ.
     """
     lines = _units_as_comments(text.splitlines())
     text = "\n".join(lines) + "\n"
@@ -73,7 +73,7 @@ def _units_as_comments(lines: list[str]) -> list[str]:
 
 
 def _rewritten(lines: list[str]) -> list[str]:
-    """Lines with blanks between their numbers, which have decimal points."""
+    """Return the lines with decimal points in their numbers and blanks between them."""
     split = [_values(line) for line in lines]
     matrix = [number for number, found in enumerate(split) if _is_row(lines[number], *found)]
     if not matrix:
@@ -93,7 +93,7 @@ def _rewritten(lines: list[str]) -> list[str]:
             continue
         plain = [value if value == "nan" else plain_number(value, mark) for value in values]
         odd = [value for value, found in zip(values, plain, strict=True) if found is None]
-        # a damaged row is not to be left out as other text is: the map would be a row shorter
+        # a damaged row must not be skipped like other text: the map would lose a row
         inside = number not in rows and whole[0] < number < whole[-1] and bool(line.strip())
         as_wide = len(odd) < len(values) == len(last) and (between != " " or number > first)
         mostly = len(values) - len(odd) >= max(3, width / 2, len(odd) + 1)
@@ -109,7 +109,7 @@ def _rewritten(lines: list[str]) -> list[str]:
 
 
 def _values(line: str) -> tuple[str, list[str]]:
-    """What separates the values of a line, and these, ``nan`` where one is missing."""
+    """Return the separator of a line and its values, ``nan`` for a missing value."""
     separator = next((sign for sign in ";\t," if sign in line), " ")
     cells = line.split()
     if separator == "," and len(cells) > 1 and all(map(_WITH_COMMA.fullmatch, cells)):
@@ -124,7 +124,7 @@ def _values(line: str) -> tuple[str, list[str]]:
 
 
 def _is_row(line: str, separator: str, values: list[str]) -> bool:
-    """Whether the values of a line are two numbers at least, or missing ones among numbers."""
+    """Return whether a line is a row of a matrix: at least two values, all numbers or missing, and one number."""
     if len(values) < 2 or _ROW[separator].fullmatch(line):
         return len(values) > 1
     known = [value for value in values if value != "nan"]

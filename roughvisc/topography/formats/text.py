@@ -1,4 +1,4 @@
-"""Text files: those of one maker by their first line, points x, y, z, and matrices of heights.
+"""Text files: formats of instrument makers (by their first line), points x, y, z, and matrices of heights.
 
 A matrix has its rows along x. An index row or column next to the heights, as pandas writes it, is removed.
 """
@@ -28,24 +28,25 @@ _HEADED: dict[str, Callable[[str], ScanFile]] = {
     "Wyko ASCII Data File": headed.read_wyko,
     "ncols": headed.read_esri,
 }
-#: A text without a header that has fewer columns than this and so many times as many lines is a table, not a map.
+#: A text without a header is a table, not a map, if its columns are fewer than the first number, and its lines more than
+#: the second number times the columns.
 _COLUMNS, _TALL = 8, 20
 #: Largest deviation of index numbers from equal steps, in steps.
 _EQUAL = 1e-3
 #: Comments of Gwyddion that state the size of a matrix, in any language, and the units of points.
 _MATRIX_SIZE = re.compile(r"#[^:=：]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[mA\u00c5]\s*$")
 _UNITS = re.compile(r"#\s*(Lateral|Value) units:\s*(\S+)")
-#: Fewest numbers that make an index.
+#: Fewest numbers of an index.
 _FEWEST = 4
 
 
 def read_headed(path: Path) -> ScanFile:
-    """Read a text file of one maker.
+    """Read a text file in the format of an instrument maker.
 
     Raises
     ------
     InputError
-        If its first line is none of the known ones.
+        If its first line is not one of the known first lines.
     """
     found = _of_a_maker(read_text(path))
     if found is None:
@@ -54,7 +55,7 @@ def read_headed(path: Path) -> ScanFile:
 
 
 def read_csv(path: Path) -> ScanFile:
-    """Read separated values: of one maker, points, or a matrix."""
+    """Read separated values: the format of an instrument maker, points, or a matrix."""
     text = read_text(path)
     return _of_a_maker(text) or _points(separated_by_blanks(text)) or _matrices(path, "csv", text)
 
@@ -114,7 +115,7 @@ def _is_numbers(line: str) -> bool:
 
 
 def _matrix(channel: Channel, complaints: list[str]) -> Channel:
-    """Return a matrix without index numbers; a table of few columns is marked as one."""
+    """Return a matrix without index numbers; a channel with few columns is marked as a table."""
     if not channel.is_height:
         return channel
     columns, rows = channel.shape
@@ -123,7 +124,7 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     z = channel.load().T  # as in the file
     row, column = _step(z[0, 1:], z[1:, 1:]), _step(z[1:, 0], z[1:, 1:].T)
     corner_fits = not z[0, 0] or np.isnan(z[0, 0]) or (row is not None and column is not None)
-    if not corner_fits:  # the corner belongs to the one that it continues
+    if not corner_fits:  # the corner belongs to the index that it continues
         row = None if row is None or _step(z[0], z[1:]) is None else row
         column = None if column is None or _step(z[:, 0], z[:, 1:].T) is None else column
     if row is None and column is None:
@@ -141,7 +142,7 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
 
 
 def _step(line: np.ndarray, others: np.ndarray) -> float | None:
-    """Return the step of numbers that rise or fall by equal steps next to lines that mostly do not; None otherwise."""
+    """Return the step of a line in equal steps if most of its neighbours are not in equal steps; None otherwise."""
 
     def uneven(lines: np.ndarray) -> np.ndarray:
         steps = np.diff(lines, axis=1)

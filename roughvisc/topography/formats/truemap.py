@@ -14,7 +14,7 @@ _MAGIC = b"Binary TrueMap Data File v2.0"
 
 
 def read_truemap(path: Path) -> ScanFile:
-    """Read a TrueMap file of version 2; its first line is the top one."""
+    """Read a TrueMap file of version 2; the first line of its map is the top line."""
     content = path.read_bytes()
     if not content.startswith(_MAGIC):
         raise InputError(f"found {content[: len(_MAGIC)]!r} at its beginning: expected {_MAGIC.decode()!r}")
