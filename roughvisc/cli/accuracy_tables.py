@@ -24,7 +24,7 @@ def audit_table(audit: Audit) -> Group:
     Parameters
     ----------
     audit : Audit
-        Of :func:`roughvisc.audit`.
+        Result of :func:`roughvisc.audit`.
     """
     table = Table(box=None, pad_edge=False)
     for heading in ("assumption", "verdict"):
@@ -38,12 +38,12 @@ def audit_table(audit: Audit) -> Group:
 
 
 def budget_table(dataset: xr.Dataset) -> Group:
-    """Return the number with its interval, and the size, method and cost of each source.
+    """Return the result with its interval, and the size, method and cost of each source of error.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.budget`, of one quantity.
+        Result of :func:`roughvisc.budget`, for one quantity.
     """
     axis = axis_of(dataset.variables)
     unit = unit_for(dataset["value"].values, dataset["value"].attrs["units"])
@@ -90,7 +90,7 @@ def _error(source: xr.Dataset) -> str:
     return shown if shown == "0" else {1: "+", -1: "-"}.get(side, "±") + shown
 
 
-#: Headings of quantities that are not their names.
+#: Headings of quantities that differ from their names.
 _HEADINGS = {
     "leak_rate": "leak",
     "thermal_conductance": "conductance",
@@ -99,7 +99,7 @@ _HEADINGS = {
     "contact_area": "area",
     "mean_gap": "gap",
 }
-#: Number of errors that fit into 80 characters.
+#: Number of error columns that fit into 80 characters.
 _COLUMNS = 4
 
 
@@ -109,9 +109,9 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.trade`.
+        Result of :func:`roughvisc.trade`.
     quantity : str
-        Quantity whose error is to be small.
+        Quantity whose error has to reach the target.
     target : float
         Wanted relative error. [-]
     """

@@ -31,7 +31,7 @@ QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 
 
 class Quantity(click.ParamType):
-    """A number in SI, or text with a unit, which the functions of the package check."""
+    """Number in SI, or text with a unit; the functions of the package check it."""
 
     name = "value"
 
@@ -56,7 +56,7 @@ def quantity(name: str, metavar: str, meaning: str, **settings: Any) -> Any:
 
 
 class Failure(click.ClickException):
-    """One message on the standard error stream, and an exit status."""
+    """Failure with one message on the standard error stream, and an exit status."""
 
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
@@ -72,7 +72,7 @@ def complain(message: str) -> None:
 
 
 def screen(quiet: bool = False) -> Console:
-    """Return the terminal, or a file in its place."""
+    """Return the console: the terminal, or the file to which output is redirected."""
     from rich.console import Console  # slow to import
 
     return Console(quiet=quiet)
@@ -106,7 +106,7 @@ def say_figures(console: Console, written: Sequence[Path]) -> None:
 
 
 class _Screen(logging.Handler):
-    """Warnings of roughvisc, each once."""
+    """Handler that shows each warning of roughvisc once."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -120,17 +120,17 @@ class _Screen(logging.Handler):
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, which batch systems send some time before they kill."""
+    """SIGTERM, which batch systems send some time before they kill a process."""
 
 
 def _terminate(number: int, _: Any) -> None:
-    signal.signal(number, signal.SIG_IGN)  # another one would interrupt the writing of the checkpoint
+    signal.signal(number, signal.SIG_IGN)  # another signal would interrupt the writing of the checkpoint
     raise Terminated
 
 
 @contextmanager
 def _settings_of_process() -> Iterator[None]:
-    """Show logged warnings as messages, and have SIGTERM act as an interrupt; both only if nothing else is set up."""
+    """Show logged warnings as messages and treat SIGTERM as an interrupt, unless other handlers are set up."""
     otherwise = logging.lastResort
     logging.lastResort = _Screen()
     main_thread = threading.current_thread() is threading.main_thread()
@@ -146,7 +146,7 @@ def _settings_of_process() -> Iterator[None]:
 
 
 def _failure(error: BaseException) -> Failure | None:
-    """Return the message and the exit status of a known error; None of any other."""
+    """Return the message and the exit status of a known error; None for any other error."""
     match error:
         case RoughviscError():
             return Failure(str(error), 2 if isinstance(error, InputError) else 1)
@@ -176,7 +176,7 @@ class Commands(click.Group):
 
     def main(self, *arguments: Any, **settings: Any) -> Any:
         for stream in (sys.stdout, sys.stderr):
-            if isinstance(stream, io.TextIOWrapper):  # letters that its encoding lacks are spelt out
+            if isinstance(stream, io.TextIOWrapper):  # characters that its encoding lacks are escaped
                 stream.reconfigure(errors="backslashreplace")
         return super().main(*arguments, **settings)
 

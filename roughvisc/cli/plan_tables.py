@@ -1,4 +1,4 @@
-"""Table of a plan on the command line: what a study models, and what it costs."""
+"""Table of a plan on the command line: model and cost of a study."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roughvisc.cli.tables import readable, two_columns
 from roughvisc.experiment.resources import amount, byte_unit
 from roughvisc.units import unit_for
 
-#: Cases that a plan lists one by one.
+#: Largest number of cases that a plan lists one by one.
 _LISTED = 20
 
 
@@ -25,7 +25,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
     Parameters
     ----------
     costs : xarray.Dataset
-        Of :func:`roughvisc.plan`.
+        Result of :func:`roughvisc.plan`.
     """
     total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
     whole = [
@@ -58,13 +58,13 @@ def plan_tables(costs: xr.Dataset) -> Group:
 
 
 def _distinct(texts: Any) -> str:
-    """Return the first three different texts, and the number of further ones."""
+    """Return the first three distinct texts, and the number of further texts."""
     found = [one for one in dict.fromkeys(str(text).rstrip(".") for text in texts) if one]
     return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
 
 
 def _grid(row: xr.Dataset) -> str:
-    """Return the cells of a case, and of the part that is solved on."""
+    """Return the numbers of cells of a case, and of its solved part."""
     whole, part = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "solved_"))
     solved = f", solved on {part[0]} x {part[1]} of them" if part not in ((0, 0), whole) else ""
     return f"{whole[0]} x {whole[1]} cells{solved}"
@@ -79,7 +79,7 @@ def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
 
 
 def _case_table(costs: xr.Dataset, total: int) -> Table:
-    """Return settings and costs of each case: a column has one unit, in its heading.
+    """Return the settings and costs of each case; every column has one unit, in its heading.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def _case_table(costs: xr.Dataset, total: int) -> Table:
 
 
 def _column(values: xr.DataArray, name: str, digits: int) -> tuple[str, list[str]]:
-    """Return a heading with the unit that suits all values, and the values in it; texts as they are."""
+    """Return a heading with a unit that suits all values, and the values in this unit; texts stay unchanged."""
     if values.dtype.kind not in "iuf":
         return name, [str(value) for value in values.values]
     known = values.values[np.isfinite(values.values)]

@@ -14,7 +14,7 @@ from roughvisc.errors import printable
 
 @click.command()
 @click.argument("result", type=PATH)
-@click.option("--out", type=PATH, help="Folder for the figures. [default: beside the result]")
+@click.option("--out", type=PATH, help="Folder for the figures. [default: folder of the result]")
 @click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
 def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw figures of a result, a folder of results, or a trade.

@@ -33,13 +33,13 @@ class _Sides(click.ParamType):
 #: Options of :func:`roughvisc.open_scan`.
 _READING = options(
     click.option("--unit", help="Unit of length, if the file states none: um."),
-    click.option("--height-unit", help="Unit of the heights, if it is another."),
+    click.option("--height-unit", help="Unit of the heights, if it differs."),
     click.option("--spacing", type=_Sides(), help="Distance between points, if the file states none: 1um, or 1um,2um."),
     quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
-    click.option("--no-data", type=float, help="Number in the file that stands for a missing point: -9999."),
+    click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
     click.option("--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."),
     click.option("--channel", help="Name or number of the channel. [default: the height]"),
-    click.option("--format", help="Format, if the suffix does not tell it; auto: detect it."),
+    click.option("--format", help="Format, if the suffix is ambiguous; auto: detect it."),
 )
 #: Question for an argument that a file lacks, and the type of the answer.
 _QUESTIONS: dict[str, tuple[str, Any]] = {
@@ -85,7 +85,7 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
     is_flag=False,
     flag_value=Path(),
     metavar="[OUT.toml]",
-    help="Write a surface card with these recommendations. [name: FILE's name.toml, beside it]",
+    help="Write a surface card with these recommendations. [name: FILE's name.toml, next to it]",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
 @_READING
@@ -189,7 +189,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
 
 
 def _advice(found: Inspection) -> Group:
-    """Return the findings in a scan, each with the recommendation that follows."""
+    """Return the findings in a scan, each with its recommendation."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

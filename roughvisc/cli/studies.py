@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from roughvisc.study.case import Case
     from roughvisc.study.execution.outcome import Outcome
 
-#: Most messages on failed cases.
+#: Largest number of messages on failed cases.
 _SHOWN = 5
 
 
 @click.command()
 @click.argument("study", type=PATH)
-@click.option("--out", type=PATH, help="Folder for the results; its disk must have room.")
+@click.option("--out", type=PATH, help="Folder for the results; its disk must have enough space.")
 @WORKERS
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
-    """Show what a study will model and what it will cost.
+    """Show the model and the cost of a study.
 
     Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 128 x 128 cells, and
     the time by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on
@@ -64,13 +64,13 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 
 @click.command()
 @click.argument("study", type=PATH)
-@click.option("--out", type=PATH, help="Folder for the results. [default: results/STUDY beside it]")
+@click.option("--out", type=PATH, help="Folder for the results. [default: results/STUDY next to it]")
 @click.option(
     "--for",
     "targets",
     multiple=True,
     metavar="TARGET",
-    help="Wanted error of a number: '1 % friction_coefficient'; may be repeated.",
+    help="Target error of a result: '1 % friction_coefficient'; may be repeated.",
 )
 @click.option("--no-plots", is_flag=True, help="Draw no figures.")
 @click.option("--workers", type=click.IntRange(0), help="Parallel processes; 0: this one only. [default: one per core]")
@@ -96,8 +96,8 @@ def run(
     others continue. Repeat the command to resume an interrupted run: finished cases are not computed again, failed
     ones only with --retry-failed.
 
-    With --for, the grid and the tolerance are chosen: coarse to fine, until the whole error of the number is as small
-    as wanted. If no grid can give that, the command names the sources of the error.
+    With --for, the command chooses the grid and the tolerance: coarse to fine, until the total error of the result
+    reaches the target. If no grid can reach it, the command names the sources of the error.
 
     \b
     Example:
@@ -166,7 +166,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
 
 
 def _observe(cases: list[Case], folder: Path, console: Console) -> str:
-    """Add the observables of the study to the results; return what went wrong, empty if nothing."""
+    """Add the observables of the study to the results; return the problem, empty if there is none."""
     if not any(case.observed for case in cases):
         return ""
     with console.status("observing") as status:
@@ -263,17 +263,17 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
 @click.option(
     "--population",
     type=click.Choice(["patch", "ensemble"]),
-    help="Number of this patch, or of the roughness of which the scan is one sample. [default: patch]",
+    help="Result for this patch, or for the roughness of which the scan is one sample. [default: patch]",
 )
 @click.option("--out", type=PATH, help="Folder of the budget. [default: budget in the results]")
 @WORKERS
 @QUIET
 def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **known: Any) -> None:
-    """Estimate the total uncertainty of a number, by source.
+    """Estimate the total uncertainty of a result, by source.
 
     Solves the case again on other grids, without its shortest waves, on other patches of the same roughness and with
-    another material, as needed. Prints a table, and writes a NetCDF file and a figure for each quantity. All solves are
-    kept and used again.
+    another material, as needed. Prints a table, and writes a NetCDF file and a figure for each quantity. Keeps all
+    solutions for later use.
 
     \b
     Example:
@@ -291,7 +291,7 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
 
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
-    """Print the budget of a number, write it, and draw it."""
+    """Print, write and draw the budget of a result."""
     from roughvisc.cli.accuracy_tables import budget_table
 
     console.print(budget_table(found))

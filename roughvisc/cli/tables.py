@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from roughvisc.study.execution.outcome import Outcome
 
-#: Stated error and its parts, of which the largest are printed.
+#: Stated error and its parts; the largest values are printed.
 _ERRORS = {
     "stated_error": "worst stated error",
     "time_error": "worst error of time steps",
@@ -58,7 +58,7 @@ def result_table(dataset: xr.Dataset) -> Group:
     for name in dict.fromkeys(GRID_ERROR.values()):
         if name in dataset and (dataset[name] != 0).any():
             rows.append((f"Accuracy: worst {VARIABLES[name].long_name}", number(dataset[name])))
-    if "convolutions" in dataset:  # a file that another program has written may not state its cost
+    if "convolutions" in dataset:  # a file of another program may lack its cost
         rows.append(("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"))
     if "wall_time" in dataset:
         rows.append(("Cost: wall time", readable(float(dataset["wall_time"].max()), "s")))
@@ -126,7 +126,7 @@ def realisations_tables(table: pd.DataFrame) -> Group:
     Parameters
     ----------
     table : pandas.DataFrame
-        Of :func:`roughvisc.study.storage.results_table.realisations_table`.
+        Result of :func:`roughvisc.study.storage.results_table.realisations_table`.
     """
     headings, rows, notes = realisation_rows(table)
     shown = Table(box=None, pad_edge=False, collapse_padding=True)
@@ -145,7 +145,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     height : xarray.DataArray
         Heights over (x, y). [m]
     measures : xarray.Dataset
-        Of :func:`roughvisc.parameters`.
+        Result of :func:`roughvisc.parameters`.
     name : str
         Name of the file.
     channels : sequence, optional
@@ -183,7 +183,7 @@ def _channel_row(index: int, channel: Any) -> tuple[str, str]:
 
 
 def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
-    """Return the largest stated error of some results and its parts; without `tolerance` for a sweep."""
+    """Return the largest stated error of some results, and its parts; a sweep has no `tolerance`."""
     rows = []
     for name, label in _ERRORS.items():
         values = [np.ravel(one[name]) for one in found if name in one]

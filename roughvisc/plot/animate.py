@@ -27,13 +27,13 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result; of fields on Dask one frame is in memory at a time.
+        One case's result; if its fields are on Dask, one frame is in memory at a time.
     path : path-like
         File to write: ``.gif`` or ``.webp``, or ``.mp4`` if ffmpeg is installed. It appears only when complete.
     field : {"pressure", "gap", "displacement"}, optional
         Field that the map shows. Default: pressure, or gap if the result holds no pressure.
     frames : int
-        Largest number of kept times shown; of more, evenly spread ones.
+        Largest number of kept times to show, evenly spread.
     rate : float
         Frames per second. [1/s]
 
@@ -45,7 +45,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     Raises
     ------
     InputError
-        If the file name or the missing ffmpeg does not allow it, or the result holds no such field.
+        If the suffix is not supported, ffmpeg is missing, or the result does not hold the field.
     """
     path = Path(path)
     expect_result(dataset, "x", "y")
@@ -75,7 +75,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
 
 
 def _film(dataset: xr.Dataset, name: str, count: int) -> FuncAnimation:
-    """Animation of one map, with one colour scale for all frames."""
+    """Return the animation of one map, with one colour scale for all frames."""
     rows = rows_of(dataset).size
     chosen = np.unique(np.linspace(0, rows - 1, min(rows, count)).round().astype(int)).tolist()
     ends = [colour_limits(name, frame_of(dataset, name, frame).values) for frame in chosen]
@@ -90,7 +90,7 @@ def _film(dataset: xr.Dataset, name: str, count: int) -> FuncAnimation:
     figure.colorbar(image, ax=ax, pad=0.02, aspect=22).set_label(unit.label(VARIABLES[name].label))
     title, outline = ax.set_title(frame_title(dataset, chosen[0]), loc="left"), []
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # the layout of the first picture holds for all
+    figure.set_layout_engine("none")  # all frames use the layout of the first
 
     def draw(frame: int) -> list[Artist]:
         title.set_text(frame_title(dataset, frame))

@@ -36,9 +36,9 @@ _COLOURS = {
     "thermal_conductance": style.VERMILION,
     "electrical_conductance": style.VERMILION,
 }
-#: Quantity -> others that are drawn in its panel, with their labels.
+#: Quantity -> other quantities in its panel, with their labels.
 _BESIDE = {"contact_area": {"contact_area_counted": "counted cells", "persson_contact_area": "Persson"}}
-#: Rows up to which each has a dot.
+#: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
 
@@ -46,17 +46,17 @@ _DOTS = 40
 def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, *, over: str | None = None) -> Figure:
     """Draw quantities over time, over the distance slid, over the speed, or over each other.
 
-    Lines pass through every time step that the result holds, dots mark the kept times. Values over more than thirty
-    times their smallest have a logarithmic axis.
+    Lines pass through every time step in the result, dots mark the kept times. The axis is logarithmic if the largest
+    value exceeds thirty times the smallest.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result. Merged with :func:`roughvisc.observables.area_by_theory`, the theory is drawn as well. Of
-        several cases one quantity is drawn as by :func:`sweep`.
+        One case's result. If it is merged with :func:`roughvisc.observables.area_by_theory`, the theory is drawn as
+        well. For several cases, one quantity is drawn as in :func:`sweep`.
     quantities : sequence of str, optional
-        One panel for each. Default: force, approach, contact area, mean gap, work, friction coefficient, leak rate
-        and conductances, if the result holds them; over the sliding distance friction coefficient and contact area.
+        One panel for each quantity. Default: force, approach, contact area, mean gap, work, friction coefficient, leak
+        rate and conductances, if in the result; over the sliding distance, friction coefficient and contact area.
     over : str, optional
         Quantity on the horizontal axis, such as ``"sliding_distance"``, or ``"approach"`` for a loop of hysteresis.
         Default: time or speed.
@@ -85,7 +85,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
         raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
-    if over == "sliding_distance":  # the loading before the first slide lies at one place
+    if over == "sliding_distance":  # the loading before the first slide has one sliding distance
         begins = max(int((steps[over].values > 0).argmax()) - 1, 0)
         steps, kept = steps.isel(time=slice(begins, None)), kept.sel(time=slice(float(steps["time"][begins]), None))
     columns = 1 if len(names) <= 3 else 2
@@ -113,7 +113,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
 def _draw_history(ax: Axes, steps: xr.Dataset, kept: xr.Dataset, name: str, over: str) -> None:
     """Draw a quantity as a line through the steps and dots at the kept rows."""
     declared = VARIABLES[name]
-    if name == "leak_rate":  # zero has no place among decades
+    if name == "leak_rate":  # a logarithmic axis has no zero
         steps, kept = (one.assign({name: one[name].where(one[name] > 0)}) for one in (steps, kept))
     steps, kept = (one.assign({name: one[name].where(np.isfinite(one[name]))}) for one in (steps, kept))
     unit, across = unit_for(steps[name], declared.units), style.row_unit(steps[over])
@@ -144,11 +144,11 @@ def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
 
     Parameters
     ----------
-    results : xarray.Dataset, or mapping of them
+    results : xarray.Dataset, or mapping of str to xarray.Dataset
         One case's result, several over ``case``, or a mapping whose keys name the lines.
-    contact_modulus : float or str, or mapping of them, optional
-        Contact modulus, or several by name such as ``{"glassy": 4e6, "rubbery": 1e6}``, for which to draw the lines
-        of the theories. [Pa]
+    contact_modulus : float or str, or mapping of str to float or str, optional
+        Contact modulus for the lines of the theories, or several moduli by name, such as
+        ``{"glassy": 4e6, "rubbery": 1e6}``. [Pa]
 
     Returns
     -------
@@ -156,9 +156,9 @@ def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
 
     Notes
     -----
-    The line for low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_, that of Persson's theory [2]_
-    :math:`A = A_0 \, \mathrm{erf}(\sqrt2 F / (A_0 E^* h'_\mathrm{rms}))`. Both use the root-mean-square slope of the
-    first case's surface, and are drawn up to the nominal area.
+    The line for low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_. The line of Persson's theory
+    [2]_ is :math:`A = A_0 \, \mathrm{erf}(\sqrt2 F / (A_0 E^* h'_\mathrm{rms}))`. Both use the root-mean-square slope
+    of the first case's surface, and are drawn up to the nominal area.
 
     References
     ----------
@@ -208,7 +208,7 @@ def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
     return figure
 
 
-#: What a friction curve shows: computed, by Persson's theory, and the error of the grid.
+#: Variables of a friction curve: computed value, value of Persson's theory, and error of the grid.
 _FRICTION = (
     ("friction_coefficient", "persson_friction_coefficient", "grid_error_friction", style.BLUE),
     ("contact_fraction", "persson_contact_fraction", "grid_error_area", style.CONTACT),
@@ -217,19 +217,19 @@ _FRICTION = (
 
 @style.apply
 def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
-    """Friction coefficient and contact fraction against the logarithm of the speed.
+    """Draw friction coefficient and contact fraction against the logarithm of the speed.
 
-    Bands show the error of the grid, if the result states it. Speeds without a solution are missing.
+    Bands show the error of the grid, if it is in the result. Speeds without a solution are missing.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.friction`, or of a study of friction. Merged with the result of
-        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines. Of several cases the friction
-        coefficient is drawn as by :func:`sweep`.
+        Result of :func:`roughvisc.friction`, or of a study of friction. If it is merged with the result of
+        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines. For several cases, the friction
+        coefficient is drawn as in :func:`sweep`.
     reduced : bool
-        Of several cases: against the speed times the shift factor of the temperature, ``a_T V``. Curves of several
-        temperatures then fall on one master curve.
+        Whether to draw several cases against the speed times the shift factor of the temperature, ``a_T V``. Curves of
+        several temperatures then fall on one master curve.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     Raises
     ------
     InputError
-        If the Dataset is not one of friction over the speed.
+        If the Dataset does not hold friction over the speed.
     """
     if isinstance(dataset, xr.Dataset) and "case" in dataset.dims:
         return sweep(dataset, "friction_coefficient", along="reduced_speed" if reduced else "speed")

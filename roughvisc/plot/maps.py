@@ -27,27 +27,27 @@ from roughvisc.variables import FIELDS, VARIABLES, axis_of
 
 #: Perceptually even colour maps without the colour of contact. Pressure and flux darken as they rise.
 COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "flux": "cividis_r"}
-#: Colour of the values below the scale, and what they are.
+#: Colour and name of the values below the scale.
 _BELOW = {
     "pressure": (style.NO_CONTACT, "no contact"),
     "gap": (style.CONTACT, "contact"),
     "flux": (style.NO_CONTACT, "no flow"),
 }
-#: What one cell of a coarsened map shows of a block of cells; the mean of any other field.
+#: Reduction of a block of cells to one cell of a coarsened map; other fields use the mean.
 _OF_BLOCK = {"pressure": "max", "gap": "min", "flux": "max", "contact": "max"}
-#: Cells along the longer side up to which every cell is drawn.
+#: Largest number of drawn cells along the longer side.
 MOST_CELLS = 1024
-#: Part of the values within a colour scale [%], and how far the largest lies beyond before it is left out.
+#: Part of the values within a colour scale [%], and ratio of their full range to it above which the scale is limited.
 _SHOWN, _SPIKE = 99.8, 1.2
 
 
 def block_side(field: xr.DataArray | xr.Dataset) -> int:
-    """Side of the block of cells that one drawn cell stands for."""
+    """Return the side of the block of cells in one drawn cell."""
     return max(1, -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS))
 
 
 def drawn(field: xr.DataArray) -> xr.DataArray:
-    """Map as it is drawn: of large ones blocks of cells, by their largest pressure and smallest gap."""
+    """Return the map to draw: for a large one, blocks of cells with their largest pressure and smallest gap."""
     every = block_side(field)
     if every == 1:
         return field.load()
@@ -62,12 +62,12 @@ def drawn(field: xr.DataArray) -> xr.DataArray:
 
 
 def plane_unit(field: xr.DataArray | xr.Dataset) -> Unit:
-    """Unit for both sides of a map."""
+    """Return the unit for both sides of a map."""
     return unit_for([np.ptp(cell_edges(field[axis])) for axis in ("x", "y")], "m")
 
 
 def plane_ratio(field: xr.DataArray | xr.Dataset) -> float:
-    """Side of a map along y over its side along x."""
+    """Return the side of a map along y over its side along x."""
     return float(np.ptp(cell_edges(field["y"])) / np.ptp(cell_edges(field["x"])))
 
 
@@ -108,7 +108,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, colours: str, **limits: 
 
 
 def colour_limits(name: str, values: np.ndarray) -> tuple[float, float, str]:
-    """Ends of a colour scale [SI], and at which end its colour bar has an arrow."""
+    """Return the ends of a colour scale [SI], and the ends at which its colour bar has an arrow."""
     known = values[np.isfinite(values)]
     above_zero = known[known > 0] if name in _BELOW else known
     if not above_zero.size:
@@ -123,7 +123,7 @@ def colour_limits(name: str, values: np.ndarray) -> tuple[float, float, str]:
 
 
 def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
-    """One frame of a field as it is drawn; rounding leaves no gap in contact."""
+    """Return one frame of a field to draw; the gap in contact is exactly zero."""
     at = dataset.isel({axis_of(dataset.variables): frame})
     field = at[name] if "height" not in at else at[name].where(at["height"].notnull())
     if name == "gap" and "pressure" in at:
@@ -132,7 +132,7 @@ def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
 
 
 def draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Sequence[int]) -> dict[str, Artist]:
-    """Draw one field at some rows on one colour scale; return what its legend names."""
+    """Draw one field at some rows on one colour scale; return the entries of its legend."""
     shown = [frame_of(dataset, name, frame) for frame in frames]
     low, high, extend = colour_limits(name, np.concatenate([one.values.ravel() for one in shown]))
     unit = unit_for([high], VARIABLES[name].units)
@@ -161,7 +161,7 @@ def draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Seq
 
 
 def draw_outline(ax: Axes, dataset: xr.Dataset, frame: int) -> list[Artist]:
-    """Outline of the contact in one row; empty if nothing or everything touches."""
+    """Draw and return the outline of the contact in one row; empty without contact and in full contact."""
     touching = drawn(contact(dataset.isel({axis_of(dataset.variables): frame})).astype(float).rename("contact"))
     if min(touching.shape) < 2 or not 0 < float(touching.mean()) < 1:
         return []
@@ -175,7 +175,7 @@ _ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
 
 
 def frame_title(dataset: xr.Dataset, frame: int) -> str:
-    """Time or speed of a row, and the friction coefficient or the nominal pressure there."""
+    """Return the time or speed of a row, with its friction coefficient or nominal pressure."""
     at, text = dataset.isel({axis_of(dataset.variables): frame}), style.row_text(rows_of(dataset), frame)
     if axis_of(dataset.variables) == "speed":
         arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
@@ -188,26 +188,26 @@ def frame_title(dataset: xr.Dataset, frame: int) -> str:
 
 @style.apply
 def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
-    """Maps of fields at some times or speeds, with one colour scale for each field.
+    """Draw maps of fields at some times or speeds, with one colour scale for each field.
 
     Cells without contact are light blue on a map of the pressure, cells in contact are orange on maps of the gap and
     of the flux; on a map of the displacement the contact has an outline. Above 1024 cells a side, one drawn cell
-    stands for a block of cells: for their largest pressure and flux, and their smallest gap. The colour scale may
-    leave out two of a thousand values; an arrow at the colour bar says so. The flux has a logarithmic scale of three
-    decades. Only the measured part of a mirrored surface is drawn. For friction, an arrow shows in which direction
-    the profile moves.
+    shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
+    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. Only
+    the measured part of a mirrored surface is drawn. For friction, an arrow shows the direction of motion of the
+    profile.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result; of fields on Dask only the frames drawn are loaded.
-    times : float or str, or list of them, optional
+        One case's result; if its fields are on Dask, only the drawn frames are loaded.
+    times : float or str, or a list, optional
         The nearest kept times [s], or speeds [m/s], are drawn; negative whole numbers count from the end. Default: up
-        to four times in contact; the lowest speed, that of the largest friction, and the highest.
+        to four times in contact; for friction, the lowest speed, the speed of the largest friction, and the highest.
     fields : sequence of str
-        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; those that the result does not hold are left out. Or
-        ``"flux"`` of a leaking fluid, computed from the gap as the ``leak_rate`` in the result or ``[observe]``
-        states, else with the defaults of :func:`roughvisc.observables.leakage`.
+        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
+        ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result or in
+        ``[observe]``, else with the defaults of :func:`roughvisc.observables.leakage`.
 
     Returns
     -------
@@ -258,7 +258,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
 
 
 def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
-    """Magnitude of the flux over (time, x, y), missing in contact, computed frame by frame as it is drawn."""
+    """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
     stated = dataset if "leak_rate" in dataset else asked(dataset)
     names = ("along", "sides", "viscosity", "pressure_drop")
     options = {name: stated["leak_rate"].attrs[name] for name in names} if "leak_rate" in stated else {}

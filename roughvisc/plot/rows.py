@@ -13,12 +13,12 @@ from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.units import in_si
 from roughvisc.variables import AXES, OTHER_DIMS, VARIABLES, axis_of
 
-#: Most times or speeds of one figure.
+#: Largest number of times or speeds in one figure.
 MOST = 24
 
 
 def expect_result(dataset: Any, *names: str) -> None:
-    """Refuse what is not the result of one case, has no rows, or lacks variables."""
+    """Reject a Dataset that is not the result of one case, has no rows, or lacks variables."""
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
     axis = axis_of(dataset.variables)
@@ -30,12 +30,12 @@ def expect_result(dataset: Any, *names: str) -> None:
 
 
 def rows_of(dataset: xr.Dataset) -> xr.DataArray:
-    """Coordinate of the rows of a result: its times or speeds."""
+    """Return the coordinate of the rows of a result: its times or speeds."""
     return dataset[axis_of(dataset.variables)]
 
 
 def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
-    """Numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
+    """Return the numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
     rows = rows_of(dataset)
     name = str(rows.name)
     asked = np.atleast_1d(np.asarray(in_si(places, VARIABLES[name].units, f"{name}s"), dtype=float)).ravel()
@@ -52,7 +52,7 @@ def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
 
 
 def largest_contact(dataset: xr.Dataset) -> int:
-    """Number of the last row whose contact area is the largest, or of the last row if areas are not known."""
+    """Return the number of the last row with the largest contact area, or of the last row if areas are not known."""
     if "contact_area" not in dataset:
         return rows_of(dataset).size - 1
     area = np.nan_to_num(dataset["contact_area"].values)
@@ -60,7 +60,7 @@ def largest_contact(dataset: xr.Dataset) -> int:
 
 
 def representative_frames(dataset: xr.Dataset) -> list[int]:
-    """Up to four rows: evenly spread ones in contact with the largest contact, or the ends of a friction curve."""
+    """Return up to four rows: the largest contact and others in contact; for friction, the ends and the maximum."""
     rows, key = rows_of(dataset), AXES[axis_of(dataset.variables)].telling
     if key in dataset:
         chosen = {int(rows.values.argmin()), int(np.nanargmax(dataset[key].values)), int(rows.values.argmax())}
@@ -76,9 +76,9 @@ def representative_frames(dataset: xr.Dataset) -> list[int]:
 
 
 def measured_part(surface: Any) -> Any:
-    """Measured part of a result, or of heights, of a surface that was extended by its mirror images.
+    """Return the measured part of a result or surface that was extended by its mirror images.
 
-    The history stays if a surface is cropped afterwards, so the heights must still be their own mirror images.
+    A cropped surface keeps its history, so the heights must still equal their own mirror images.
     """
     mirrored = MIRRORED in str(surface.attrs.get("history", "")).split("\n")
     height = surface if isinstance(surface, xr.DataArray) else surface.get("height")

@@ -1,4 +1,4 @@
-"""Files of figures: those of one result, of a sweep, and of a whole folder drawn in parallel."""
+"""Files of figures: of one result, of a sweep, and of a whole folder in parallel."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ DEFAULT = ("friction", "history", "maps", "leakage")
 
 
 def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Iterator[tuple[str, str, Figure]]:
-    """Name, caption and figure of everything that a result allows, one at a time; or only of those of some names."""
+    """Yield name, caption and figure of everything that a result allows, or of the requested names only."""
     for name, (draw, needed, caption) in FIGURES.items():
         if (names is None or name in names) and all(one in dataset for one in needed):
             yield name, caption, draw(dataset)
@@ -67,27 +67,27 @@ def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Ite
 
 @matplotlib.rc_context(style.STYLE)
 def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
-    """Write a figure to a file of the kind that its suffix names, complete or not at all.
+    """Write a figure to a file in the format of its suffix, complete or not at all.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        What to write.
+        Figure to write.
     path : Path
-        Where to.
+        File to write.
     dpi : float
         Resolution of pictures made of pixels.
     title : str
-        Text above the figure, such as the case that it shows.
+        Text above the figure, such as its case.
 
     Raises
     ------
     InputError
-        If the suffix names no kind of picture, or the folder cannot be written to.
+        If the suffix is not a picture format, or the folder cannot be written to.
     """
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
-        raise InputError(f"{path}: is no kind of picture: expected one of .png, .pdf, .svg")
+        raise InputError(f"{path}: is not a picture format: expected one of .png, .pdf, .svg")
     if title:
         figure.suptitle(style.verbatim(textwrap.fill(title, int(13 * figure.get_figwidth()))))
     with atomic_write(path) as temporary:
@@ -112,17 +112,17 @@ def save_figures(
     dataset : xarray.Dataset
         One case's result.
     folder : path-like
-        Where to write; made if absent.
+        Folder for the files; created if absent.
     stem : str
         First part of every file name.
     suffix : str
-        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+        Format of the files, as in matplotlib: ``".png"``, ``".pdf"``, ``".svg"``.
     dpi : float
         Resolution of pictures made of pixels.
     title : str
-        Text above each figure, such as the case that it shows.
+        Text above each figure, such as its case.
     every : bool
-        False: only history or friction curve, maps, and the flow of a leak.
+        False: only history or friction curve, maps, and leakage flux.
 
     Returns
     -------
@@ -153,13 +153,13 @@ def save_figures_of_files(
     Parameters
     ----------
     paths : sequence of Path
-        Results. Of several, file names and titles state what was varied.
+        Results. For several results, file names and titles state the varied settings.
     folder : Path, optional
-        Where to write. Default: beside each result.
+        Folder for the figures. Default: the folder of each result.
     every : bool
-        False: only the default figures of each.
+        False: only the default figures of each result.
     processes : int
-        Number of processes. More than one need a main module that may be imported again.
+        Number of processes. Several processes need a main module that may be imported again.
     label : str
         Text of the progress bar.
     """
@@ -187,7 +187,7 @@ def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
 
 
 def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: int, label: str) -> list[_Result]:
-    """Results of a function of some jobs, in their order, with a progress bar; computed by several processes."""
+    """Return the results of a function of some jobs, in order; several processes compute, with a progress bar."""
     from roughvisc.progress import reporting  # slow to import
 
     jobs = list(jobs)
@@ -198,7 +198,7 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: 
                 results.append(work(job))
                 report(len(results), len(jobs))
             return results
-        # a process that is forked while threads run may hang; a server is forked before any work
+        # a process that is forked while threads run may hang; a fork server starts before any work
         method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
         context = multiprocessing.get_context(method)
         if method == "forkserver":
@@ -212,7 +212,7 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: 
 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
-    """Results of the sweep that ran last in a folder; None if there are fewer than two."""
+    """Return the results of the last sweep in a folder; None if there are fewer than two."""
     from roughvisc.study.storage.sweep_data import open_results  # slow to import
 
     try:
@@ -230,9 +230,9 @@ def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png"
     results : xarray.Dataset
         Result of :func:`roughvisc.open_results`.
     folder : path-like
-        Where to write; made if absent.
+        Folder for the files; created if absent.
     suffix : str
-        Kind of file, as matplotlib knows it: ``".png"``, ``".pdf"``, ``".svg"``.
+        Format of the files, as in matplotlib: ``".png"``, ``".pdf"``, ``".svg"``.
     dpi : float
         Resolution of pictures made of pixels.
 

@@ -27,7 +27,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     dataset : xarray.Dataset
         One case's result with ``height``, and ``gap`` or ``displacement``.
     time : float or str, optional
-        The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last one of
+        The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
         the largest contact area. [s]
     axis : {"x", "y"}
         Direction of the cut.

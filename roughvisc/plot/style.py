@@ -47,41 +47,41 @@ STYLE = {
     "svg.fonttype": "none",
 }
 
-#: Okabe and Ito's colours, which all common kinds of colour vision tell apart.
+#: Okabe and Ito's colours, distinguishable with all common kinds of colour vision.
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000", "0.5")
 #: Contact in all figures; cells without contact on a map of the pressure; missing cells.
 CONTACT, NO_CONTACT, MISSING = VERMILION, "#dceaf5", "0.72"
-#: Mean width of a letter of a legend, and of what an entry has besides its text. [inch]
+#: Mean width of a letter in a legend, and width of an entry without its text. [inch]
 _LETTER, _ENTRY = 0.065, 0.5
-#: Largest over smallest value from which an axis is logarithmic.
+#: Ratio of the largest to the smallest value from which an axis is logarithmic.
 _DECADES = 30.0
 
 
 def apply(draw):
-    """Decorator: draw a figure in the package's style, whatever the reader's own settings are."""
+    """Decorate a function to draw its figure in the package's style, independent of the user's settings."""
     return matplotlib.rc_context(STYLE)(draw)
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Figure of a size [inch] that belongs to no window and to no global state."""
+    """Return a figure of a size [inch], independent of windows and of matplotlib's global state."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def verbatim(text: str) -> str:
-    """Text of a user, letter by letter: dollars begin no formula."""
+    """Return a user's text with its dollar signs escaped, since they would start a formula."""
     return printable(text).replace("$", r"\$")
 
 
 def letter_panels(axes: Sequence[Axes], titles: Sequence[str] = ()) -> None:
-    """Write (a), (b), ... and a title at the top left of the panels; a single panel needs no letter."""
+    """Write (a), (b), ... and a title at the top left of the panels; a single panel has a title only."""
     for number, ax in enumerate(axes):
         letter = rf"$\mathbf{{({string.ascii_lowercase[number]})}}$  " if 1 < len(axes) <= 26 else ""
         ax.set_title(letter + (titles[number] if number < len(titles) else ""), loc="left")
 
 
 def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -> None:
-    """Legend above all panels, in as many columns as the figure has room for."""
+    """Draw a legend above all panels, in as many columns as fit into the figure."""
     if named:
         width = figure.get_figwidth() - 0.2
         longest = max(len(line) for label in named for line in label.split("\n"))
@@ -91,7 +91,7 @@ def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -
 
 
 def named_in(*axes: Axes) -> dict[str, Artist]:
-    """Label -> artist of everything that has a label in some panels."""
+    """Return label -> artist of everything with a label in some panels."""
     return {label: one for ax in axes for one, label in zip(*ax.get_legend_handles_labels(), strict=True)}
 
 
@@ -102,7 +102,7 @@ def note_below(figure: Figure, note: str) -> None:
 
 
 def is_logarithmic(values: Any) -> bool:
-    """Whether all values are positive and the largest is at least thirty times the smallest."""
+    """Return whether all values are positive and the largest is at least thirty times the smallest."""
     values = np.asarray(values, dtype=float)
     values = values[np.isfinite(values)]
     return bool(values.size and values.min() > 0 and values.max() >= _DECADES * values.min())
@@ -121,7 +121,7 @@ def log_axis(axis: Axis, values: Any) -> None:
 
 
 def value_axis(ax: Axes, *values: Any) -> None:
-    """Vertical axis of some values: logarithmic if they span decades, else linear and with zero."""
+    """Scale the vertical axis for some values: logarithmic if they span decades, else linear and with zero."""
     shown = np.concatenate([np.ravel(np.asarray(one, dtype=float)) for one in values])
     shown = shown[np.isfinite(shown)]
     if is_logarithmic(shown):
@@ -134,13 +134,13 @@ def value_axis(ax: Axes, *values: Any) -> None:
 
 
 def row_unit(rows: xr.DataArray) -> Unit:
-    """Unit of the times, speeds or distances of some rows: without prefix on a logarithmic axis."""
+    """Return the unit of the times, speeds or distances of some rows, without prefix on a logarithmic axis."""
     unit = VARIABLES[str(rows.name)].units if rows.name in VARIABLES else str(rows.attrs.get("units", ""))
     return Unit(1.0, unit) if _spreads(rows.values) else unit_for(rows.values, unit)
 
 
 def row_axis(ax: Axes, rows: xr.DataArray) -> None:
-    """Horizontal axis of times, speeds or distances; a logarithmic one has a place for zero."""
+    """Scale and label the horizontal axis of times, speeds or distances; a logarithmic axis can show zero."""
     unit, name = row_unit(rows), str(rows.name)
     places = np.asarray(rows.values, dtype=float)
     if _spreads(places):
@@ -157,11 +157,11 @@ def row_axis(ax: Axes, rows: xr.DataArray) -> None:
 
 
 def _spreads(places: np.ndarray) -> bool:
-    """Whether most of some places, which are not negative, lie in the first thirtieth of their axis."""
+    """Return whether most of some non-negative places lie in the first thirtieth of their axis."""
     known = places[np.isfinite(places)]
     return bool(known.size > 3 and known.min() >= 0 and 0 < np.median(known) < known.max() / _DECADES)
 
 
 def row_text(rows: xr.DataArray, number: int) -> str:
-    """Place of a row as a title, such as ``t = 50 ms``."""
+    """Return the time, speed or distance of a row as a title, such as ``t = 50 ms``."""
     return AXES[str(rows.name)].place(float(rows[number]), 3)

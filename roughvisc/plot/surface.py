@@ -1,4 +1,4 @@
-"""Look of a height grid: map, profile, distribution of heights, power spectrum."""
+"""Figure of a height grid: map, profile, distribution of heights, power spectrum."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roughvisc.variables import VARIABLES
 
 
 def robust_limits(values: np.ndarray) -> tuple[float, float]:
-    """Limits of the heights without spikes: at most five robust standard deviations from the median. [m]"""
+    """Return the limits of the heights without spikes: at most five robust standard deviations from the median. [m]"""
     lower, median, upper = np.nanpercentile(values, (25, 50, 75))
     reach = 5 * (upper - lower) / 1.349  # quartiles of the normal distribution are 1.349 deviations apart
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -32,9 +32,9 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
 
     Parameters
     ----------
-    height : xarray.DataArray, dims (x, y), or a Dataset that holds one as ``height``
-        Heights, peaks up; missing points are grey. Only the measured part of a mirrored surface is drawn. Colours
-        reach over at most five robust standard deviations, so that a spike does not flatten the rest. [m]
+    height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
+        Heights, peaks up; missing points are grey. Only the measured part of a mirrored surface is drawn. The colour
+        scale covers at most five robust standard deviations, so that a spike does not flatten the rest. [m]
 
     Returns
     -------
@@ -42,9 +42,9 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
 
     Notes
     -----
-    Map and profile show the heights as they are, distribution and spectrum those without their mean plane. The
-    distribution is shown with the normal one of the same Sq. The spectrum is that of :func:`roughvisc.psd` under a
-    Hann window; missing points are filled for it.
+    Map and profile show the given heights. Distribution and spectrum show the heights minus their mean plane. The
+    distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
+    a Hann window, after missing points are filled.
     """
     history = getattr(height, "attrs", {}).get("history")
     whole = checked(height, "surface", least=1).rename("height")
@@ -84,7 +84,7 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
 
 
 def _draw_heights(ax, known: np.ndarray) -> None:
-    """Histogram of the levelled heights, with the normal distribution of the same deviation."""
+    """Draw the histogram of the levelled heights, with the normal distribution of the same deviation."""
     low, high = robust_limits(known)
     unit, deviation = unit_for(max(abs(low), abs(high)), "m"), float(known.std())
     if deviation > 0:
@@ -105,7 +105,7 @@ def _draw_heights(ax, known: np.ndarray) -> None:
 
 
 def _draw_spectrum(ax, levelled: xr.DataArray) -> None:
-    """Radial power spectral density of the levelled heights, up to the shorter of both limits of the grid."""
+    """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
     symbol, scale = "µm", 1e-6
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
         gaps = bool(levelled.isnull().any())

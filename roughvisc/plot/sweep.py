@@ -1,4 +1,4 @@
-"""A quantity of all cases of a sweep, as small multiples over the swept keys."""
+"""Figure of a quantity of all cases of a sweep, as small multiples over the swept keys."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from roughvisc.study.sweep_table import DRAWN, ITSELF, REALISATION
 from roughvisc.units import Unit, in_si, unit_for
 from roughvisc.variables import CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
-#: Coordinates over the cases that are no swept keys.
+#: Coordinates over the cases that are not swept keys.
 _NO_KEYS = ("case", "case_key", ROWS, REALISATION)
-#: Most panels, and most values of a key in a legend.
+#: Largest number of panels, and of values of a key in a legend.
 _MOST_PANELS, _MOST_NAMED = 12, 8
-#: Viridis without its light end, which a white page hides.
+#: Viridis without its light end, which is hard to see on a white page.
 _SHADES = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.88, 256)))
 _ITSELF_LINE = {"ls": (0, (4, 1.5)), "lw": 1.1}
 
 
 class Key:
-    """A swept key of a table of cases: its name, its values in order, and how they are shown."""
+    """Swept key of a table of cases: its name, its values in order, and their unit."""
 
     def __init__(self, column: str, dotted: str, name: str, values: pd.Series, units: str) -> None:
         self.column, self.dotted, self.name = column, dotted, name
@@ -70,7 +70,7 @@ class Key:
 
 
 def swept_keys(results: xr.Dataset) -> list[Key]:
-    """Keys that vary between the cases, the one with most numbers first; without what follows from another one."""
+    """Return the keys that vary between the cases, longest list of numbers first; a dependent key is left out."""
     drawn = {identifier(key) for key in DRAWN} if REALISATION in results.dims else set()
     columns = [
         str(name)
@@ -96,13 +96,13 @@ def swept_keys(results: xr.Dataset) -> list[Key]:
 
 
 def case_label(keys: Sequence[Key], values: Sequence[Any]) -> str:
-    """Values of some keys in words, such as ``Load 2 mN, seed 1``."""
+    """Return the values of some keys in words, such as ``Load 2 mN, seed 1``."""
     text = ", ".join(key.text(value, named=True) for key, value in zip(keys, values, strict=True))
     return text if text.startswith("t =") else text[:1].upper() + text[1:]
 
 
 def default_quantity(results: xr.Dataset) -> str:
-    """Friction coefficient over the speed; else the contact area, as a fraction if the surfaces differ in size."""
+    """Return the friction coefficient over speeds, else the contact area (a fraction if surfaces differ in size)."""
     if axis_of(results.variables) == "speed":
         return "friction_coefficient"
     if {"nominal_pressure", "contact_fraction", "force"} <= set(results):
@@ -123,8 +123,8 @@ def sweep(
 ) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
-    The key with the next most numbers colours the lines, all others make panels, up to twelve. Of realisations the
-    mean is drawn with the 95 % prediction interval of a single one and, of a scan, the measured scan.
+    The key with the next most numbers colours the lines, all others make panels, up to twelve. Realisations are drawn
+    as their mean, with the 95 % prediction interval of a single one; for a scan, also the measured scan is drawn.
 
     Parameters
     ----------
@@ -132,14 +132,15 @@ def sweep(
         Result of :func:`roughvisc.sweep` or :func:`roughvisc.open_results`.
     quantity : str, optional
         A history of every case, such as ``"approach"``. Default: the contact area, or the contact fraction if the
-        surfaces differ in size; of friction, the friction coefficient.
-    along : str, or two of them, optional
+        surfaces differ in size; for friction, the friction coefficient.
+    along : str, or a pair, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
         ``"reduced_speed"`` for curves of all cases; or two keys for maps. Default: the key with most numbers, or the
         speed.
-    times : float or str, or list of them, optional
-        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last, or that at which
-        the cases differ most if they differ by less than half of it at the end; up to four if one key is swept. [s]
+    times : float or str, or a list, optional
+        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time, or the time
+        of the largest difference of the cases if the last difference is less than half as large; up to four times if
+        one key is swept. [s]
 
     Returns
     -------
@@ -148,7 +149,7 @@ def sweep(
     Raises
     ------
     InputError
-        If the results are no sweep, nothing varies in them, or a name is unknown.
+        If the results are not a sweep, nothing varies in them, or a name is unknown.
     """
     if not isinstance(results, xr.Dataset) or results.sizes.get("case", 1) * results.sizes.get(REALISATION, 1) < 2:
         raise InputError("expected the Dataset of rv.open_results or rv.sweep, with several cases")
@@ -180,19 +181,19 @@ def sweep(
 
 
 def _table(results: xr.Dataset, quantity: str) -> pd.DataFrame:
-    """Table with a line for each case and row that has a value of the quantity."""
+    """Return a table with a line for each case and row with a value of the quantity."""
     wanted = results.load()
     if "case_key" in wanted.coords and REALISATION in wanted.dims:
         wanted = wanted.where(wanted["case_key"] != "")
     table = wanted.to_dataframe().reset_index()
     table = table[np.isfinite(table[quantity])]
-    return table[table[quantity] > 0] if quantity == "leak_rate" else table  # zero has no place among decades
+    return table[table[quantity] > 0] if quantity == "leak_rate" else table  # a logarithmic axis has no zero
 
 
 def _at_times(
     results: xr.Dataset, quantity: str, times: Any, axis: str, row: str, *, one: bool
 ) -> tuple[pd.DataFrame, str]:
-    """Table of a quantity at some times, which the column ``at`` states, and a note on a single one."""
+    """Return a table of a quantity at some times (column ``at``), and a note that states a single time."""
     found = results[[quantity]].load()
     rows = found[axis]
     if times is None and row == axis:
@@ -250,7 +251,7 @@ def _draw(
     elif several:
         rest = [Key("at", "at", "", table["at"], ""), *rest]
     while rest and table.groupby([key.column for key in rest]).ngroups > _MOST_PANELS:
-        rest = rest[:-1]  # what is left out makes more lines of one colour
+        rest = rest[:-1]  # a key without panels makes more lines of one colour
     columns = [key.column for key in rest]
     panels = list(table.groupby(columns, sort=False)) if columns else [((), table)]
     if columns and columns != ["at"]:
@@ -289,13 +290,13 @@ def _draw(
 
 
 def _norm(values: Any) -> Normalize:
-    """Colour scale of some values: logarithmic if they span decades."""
+    """Return the colour scale of some values: logarithmic if they span decades."""
     low, high = float(np.min(values)), float(np.max(values))
     return LogNorm(low, high) if style.is_logarithmic(values) else Normalize(low, high if high > low else low + 1)
 
 
 def _colour(key: Key | None, level: Any) -> Any:
-    """Colour of a value of the key that colours the lines."""
+    """Return the colour of a value of the key that colours the lines."""
     if key is None:
         return style.BLUE
     if key.is_numeric:
@@ -314,7 +315,7 @@ def _draw_lines(
     second: Key | None,
     others: list[str],
 ) -> None:
-    """Lines of one panel: one for each value of the second key, and of keys that have no panels."""
+    """Draw the lines of one panel: one for each value of the second key, and of keys without panels."""
     grouping = ([second.column] if second else []) + others
     for found, line in (
         panel.groupby(grouping, sort=second is None or second.is_numeric) if grouping else [((None,), panel)]
@@ -331,7 +332,7 @@ def _draw_lines(
             at = line[across.column].map(across.levels.index)
             look |= {"marker": "o", "ls": "", "ms": 5}
         shown = pd.Series(unit(line[quantity]), line.index)
-        if numbers.notna().any():  # realisations, interpolated to common places
+        if numbers.notna().any():  # realisations, interpolated to common abscissae
             wide = pd.DataFrame({"at": at, "number": numbers, "value": shown}).pivot_table("value", "at", "number")
             wide = wide.interpolate("index", limit_area="inside").dropna()
             itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else pd.Series(dtype=float)
@@ -352,13 +353,13 @@ def _draw_lines(
 
 
 def _rows(table: pd.DataFrame, over: str) -> xr.DataArray:
-    """Different places on the axis of a table."""
+    """Return the distinct times, speeds or distances of a table."""
     units = VARIABLES[over].units if over in VARIABLES else ""
     return xr.DataArray(np.unique(table[over]), name=over, dims=over, attrs={"units": units})
 
 
 def _draw_cells(ax: Axes, panel: pd.DataFrame, quantity: str, across: Key, up: Key, norm: Normalize) -> None:
-    """One cell for each pair of values of two keys, coloured by the mean of a quantity."""
+    """Draw one cell for each pair of values of two keys, coloured by the mean of a quantity."""
     cells = panel.pivot_table(index=up.column, columns=across.column, values=quantity, aggfunc="mean")
     cells = cells.reindex(index=up.levels, columns=across.levels)
     ax.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap="viridis", interpolation="nearest")
@@ -373,7 +374,7 @@ def _draw_cells(ax: Axes, panel: pd.DataFrame, quantity: str, across: Key, up: K
 def _finish_axes(
     ax: Axes, values: Any, label: str, table: pd.DataFrame, across: Key | None, over: str | None, as_map: bool
 ) -> None:
-    """Scales, ticks and labels, which all panels share."""
+    """Set the scales, ticks and labels that all panels share."""
     if not as_map:
         style.value_axis(ax, values)
         ax.set_ylabel(label)
@@ -402,7 +403,7 @@ def _finish_axes(
 
 
 def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: Key | None) -> None:
-    """Legend or colour bar of the key that colours the lines, and what lines and bands of realisations are."""
+    """Draw the legend or colour bar of the key that colours the lines, and entries for lines and bands."""
     named: dict[str, Artist] = {}
     title = ""
     if second is not None and second.is_numeric and len(second.levels) > _MOST_NAMED:
@@ -425,9 +426,9 @@ def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: K
 
 
 def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
-    """Name, caption and figure of everything that the results of several cases allow, one at a time.
+    """Yield name, caption and figure of everything that the results of several cases allow.
 
-    A quantity that is the same in all cases, or that a swept key states already, is left out.
+    A quantity that is the same in all cases, or equal to a swept key, is left out.
     """
     area, axis = default_quantity(results), axis_of(results.variables)
     if axis == "speed":
@@ -451,7 +452,7 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
 
 
 def _is_known(results: xr.Dataset, name: str, keys: list[Key], axis: str) -> bool:
-    """Whether a quantity is the same in all cases, or equal to a swept key, at the time at which it is drawn."""
+    """Return whether a quantity is the same in all cases, or equal to a swept key, at its drawn time."""
     row = ROW if ROW in results.dims else axis
     table, _ = _at_times(results, name, None, axis, row, one=False)
     values = table[name].to_numpy()

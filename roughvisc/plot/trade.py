@@ -14,7 +14,7 @@ from roughvisc.plot import style
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: sign of the coarsening less one -> label, marker and colour of the points
+#: Sign of (coarsening - 1) -> label, marker and colour of the points.
 _GRIDS = {
     0: ("grid of the study", "o", style.BLUE),
     1: ("coarser grid", "v", style.VERMILION),
@@ -26,15 +26,15 @@ _GRIDS = {
 def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
-    Errors smaller than the uncertainty of the reference lie in a grey band, and are not part of the front. An error of
-    zero is drawn at the bottom.
+    Errors below the uncertainty of the reference lie in a grey band, and are not part of the front. An error of zero is
+    drawn at the bottom.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.trade`.
+        Result of :func:`roughvisc.trade`.
     quantity : str or sequence of str, optional
-        One panel for each. Default: the first two of the trade.
+        One panel for each quantity. Default: the first two of the trade.
 
     Returns
     -------
@@ -43,7 +43,7 @@ def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> F
     Raises
     ------
     InputError
-        If the Dataset is no trade, holds no such quantity, or no setting was measured.
+        If the Dataset is not a trade, does not hold the quantity, or holds no measured setting.
     """
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
@@ -103,14 +103,14 @@ def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
 
 @style.apply
 def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
-    """Draw the sources of error of a number as bars, and the number over its rows with its 95 % interval.
+    """Draw the sources of error of a result as bars, and the result over its rows with its 95 % interval.
 
     Errors are in percent, or as factors on a logarithmic axis if they exceed a factor of 1.6.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of :func:`roughvisc.budget`, of one quantity.
+        Result of :func:`roughvisc.budget`, for one quantity.
     row : int
         Number of the row whose sources are drawn.
 
@@ -121,7 +121,7 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     Raises
     ------
     InputError
-        If the Dataset is no budget, or of several quantities.
+        If the Dataset is not a budget, or holds several quantities.
     """
     if not isinstance(dataset, xr.Dataset) or "half_width" not in dataset or "source" not in dataset.dims:
         raise InputError("expected the Dataset of rv.budget")

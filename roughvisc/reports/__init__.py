@@ -1,1 +1,1 @@
-"""The report: one HTML page about results."""
+"""Report: one HTML page about results."""

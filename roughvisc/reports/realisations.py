@@ -11,7 +11,7 @@ from roughvisc.units import unit_for
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Quantities that follow from others of the table.
+#: Quantities that follow from other quantities of the table.
 _FOLLOW = ("contact_fraction", "friction_force", "friction_force_across", "transmissivity", "hydraulic_aperture")
 
 
@@ -21,7 +21,7 @@ def realisation_rows(table: pd.DataFrame) -> tuple[list[str], list[list[str]], l
     Parameters
     ----------
     table : pandas.DataFrame
-        Of :func:`roughvisc.study.storage.results_table.realisations_table`.
+        Result of :func:`roughvisc.study.storage.results_table.realisations_table`.
     """
     table = table if table.empty else table[~table["quantity"].isin(_FOLLOW)]
     if table.empty:

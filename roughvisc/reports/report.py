@@ -35,8 +35,8 @@ from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of
 
-#: Cases of which figures and the audit are shown, cases of which every figure is drawn, and cases whose studies are
-#: shown; of more, evenly spread ones.
+#: Largest numbers of cases with figures and audit, of cases for which every figure is drawn, and of cases with their
+#: studies. The shown cases are evenly spread.
 _PICTURED, _DRAWN, _STATED = 6, 3, 60
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
@@ -47,11 +47,11 @@ _SETTINGS = (
 )
 #: Surface parameters shown.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
-#: Heading -> variable whose value in the last row, or in that of the largest friction, stands in the table of cases.
+#: Heading -> variable that the table of cases shows at the last row, or at the row of the largest friction.
 _AT_END = {"Approach": "approach", "Area": "contact_area", "Contact fraction": "contact_fraction"}
-#: Heading -> variable whose largest value stands in the table of cases.
+#: Heading -> variable whose largest value the table of cases shows.
 _LARGEST = {"Force": "force", "Nominal pressure": "nominal_pressure"}
-#: Heading -> relative error whose largest value stands in the table of cases.
+#: Heading -> relative error whose largest value the table of cases shows.
 _ERRORS = {"Stated error": "stated_error", "Time steps": "time_error", "Contact solver": "residual"}
 
 
@@ -62,22 +62,22 @@ def report(
 
     Parameters
     ----------
-    results : path, xarray.Dataset, or sequence of them
-        A result file, a folder of them, one case's result, or several.
+    results : path, xarray.Dataset, or sequence of path or xarray.Dataset
+        A result file, a folder of result files, one case's result, or several results.
     out : path, optional
-        File to write. Default: ``report.html`` in the folder, or beside the file with its name and ``-report.html``.
+        File to write. Default: ``report.html`` in the folder of results, or ``STEM-report.html`` next to a result file.
     processes : int
-        Number of processes that draw the figures. More than one need a main module that may be imported again.
+        Number of processes that draw the figures. Several processes need a main module that may be imported again.
 
     Returns
     -------
     pathlib.Path
-        The file, which needs no other file. Its table has all cases. Figures are shown of up to 6 cases, evenly spread.
+        The self-contained file. Its table has all cases. Figures show up to 6 cases, evenly spread.
 
     Raises
     ------
     InputError
-        If there is no result, or no `out` for Datasets.
+        If there are zero results, or Datasets come without `out`.
     """
     page: dict[str, Any] = {"failures": [], "figures": [], "realisations": ([], [], [])}
     numbers: dict[str, int] = {}
@@ -128,12 +128,12 @@ def report(
 
 
 def _evenly(count: int, most: int) -> set[int]:
-    """Numbers of at most so many cases, evenly spread."""
+    """Return the numbers of at most `most` cases, evenly spread."""
     return set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist())
 
 
 def _failures(folder: Path) -> list[dict[str, str]]:
-    """Cases that failed, from their records."""
+    """Return the failed cases, from their records."""
     found = []
     for path in sorted(folder.glob("*.failed.json")):
         one = {"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"}
@@ -150,7 +150,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 
 @matplotlib.rc_context(style.STYLE)
 def _picture(caption: str, figure: Figure) -> dict[str, Any]:
-    """A figure as a PNG in an address, with its caption."""
+    """Return a figure as a PNG in a data URL, with its caption."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI)
     src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
@@ -158,7 +158,7 @@ def _picture(caption: str, figure: Figure) -> dict[str, Any]:
 
 
 def _surface_of(source: Path | xr.Dataset) -> str:
-    """Text that two results of the same surface have in common."""
+    """Return a text that is equal for two results of the same surface."""
     if isinstance(source, Path):
         with open_result(source) as dataset:
             return _surface_of(dataset)
@@ -167,7 +167,7 @@ def _surface_of(source: Path | xr.Dataset) -> str:
 
 
 def _case(job: tuple[Path | xr.Dataset, int, set[str], bool]) -> dict[str, Any]:
-    """One case of the page: its row in the table, its figures, assumptions, surface and study."""
+    """Return one case of the page: its row in the table, figures, assumptions, surface and study."""
     source, number, names, is_stated = job
     if isinstance(source, Path):
         with open_result(source) as dataset:
@@ -209,13 +209,13 @@ def _case(job: tuple[Path | xr.Dataset, int, set[str], bool]) -> dict[str, Any]:
     if "figures" in found:
         try:
             found["audit"] = list(audit(source))
-        except InputError:  # a Dataset that lacks what an audit starts from
+        except InputError:  # a Dataset that lacks the variables of an audit
             found["audit"] = []
     return found
 
 
 def _text(value: xr.DataArray) -> str:
-    """A number with a suitable unit; fractions in percent."""
+    """Return a number with a suitable unit; fractions in percent."""
     if str(value.name).endswith("fraction"):
         return f"{100 * float(value):.3g} %"
     unit = str(value.attrs.get("units", getattr(VARIABLES.get(str(value.name)), "units", "")))
@@ -223,7 +223,7 @@ def _text(value: xr.DataArray) -> str:
 
 
 def _cells(dataset: xr.Dataset) -> dict[str, str]:
-    """Heading -> cell of one case in the table of cases."""
+    """Return heading -> cell of one case in the table of cases."""
     axis = AXES[axis_of(dataset)]
     last = dataset.isel({axis.name: axis.telling_row(dataset)})
     cells = {
@@ -252,7 +252,7 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
 
 
 def _table(cases: list[dict[str, Any]]) -> tuple[str, list[str], list[list[Any]]]:
-    """Title of the page, headings of the table of cases, and its rows."""
+    """Return the title of the page, the headings of the table of cases, and its rows."""
     titles = dict.fromkeys(case["title"] for case in cases)
     keys = names_of(list(dict.fromkeys(key for case in cases for key in case["varied"])))
     headings = list(dict.fromkeys(heading for case in cases for heading in case["cells"]))

@@ -28,8 +28,8 @@ _HEADED: dict[str, Callable[[str], ScanFile]] = {
     "Wyko ASCII Data File": headed.read_wyko,
     "ncols": headed.read_esri,
 }
-#: A text without a header is a table, not a map, if its columns are fewer than the first number, and its lines more than
-#: the second number times the columns.
+#: A text without a header is a table, not a map, if it has fewer columns than the first number, and more lines than the
+#: second number times the columns.
 _COLUMNS, _TALL = 8, 20
 #: Largest deviation of index numbers from equal steps, in steps.
 _EQUAL = 1e-3
