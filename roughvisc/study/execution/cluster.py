@@ -136,7 +136,7 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
 def default_client() -> Client | None:
     """Return the user's default client; None within a Dask task, whose cases run in its own process."""
     distributed = sys.modules.get("distributed")
-    if distributed is None:  # not imported, so there is no client
+    if distributed is None:  # not imported, so no client exists
         return None
     with suppress(ValueError):
         distributed.get_worker()

@@ -1,7 +1,7 @@
 """The accessor ``ds.roughvisc``: steps of a result, observables, and figures.
 
 ``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
-Whatever opens or makes a result registers it. Each function is imported when it is asked for.
+Every module that opens or computes a result registers the accessor. Each function is imported at its first use.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import xarray as xr
 
 from roughvisc.labels import require_steps, steps_of, with_steps
 
-#: Before the name of a figure.
+#: Prefix of the methods that draw figures.
 _PLOT = "plot_"
 #: Module that opens a result.
 _NETCDF = "roughvisc.study.storage.netcdf"
-#: beginning of a method's name -> module whose public names follow
+#: Prefix of a method -> module of its function.
 _ROOMS = {"": "roughvisc.observables", _PLOT: "roughvisc.plot"}
 
 
 @xr.register_dataset_accessor("roughvisc")
 class ResultAccessor:
-    """Observables and figures of this result; each is the function of that name with the result given.
+    """Observables and figures of a result; each method calls the function of its name with this result.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class ResultAccessor:
         return require_steps(dataset)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):  # what notebooks and copies ask every object for
+        if name.startswith("_"):  # special methods that notebooks and copies look up
             raise AttributeError(name)
         start = _PLOT if name.startswith(_PLOT) else ""
         room = import_module(_ROOMS[start])

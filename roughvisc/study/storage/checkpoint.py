@@ -1,7 +1,8 @@
 """Checkpoints: the state of an unfinished run, from which it continues to the same last bit.
 
-``rows-0000.npz`` and so on hold rows and never change. ``state.npz`` names the number of their rows. Each file appears
-by a rename, and zip has a checksum for each array. A crash therefore leaves the last checkpoint whole.
+``rows-0000.npz`` and so on contain rows and never change. ``state.npz`` states the number of rows in each file. Files
+are written under another name and renamed, and zip has a checksum for each array. Therefore a crash does not damage the
+last checkpoint.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
 
 STATE = "state.npz"
-#: Rows wait in memory for the disk until they take more than this: a short run never writes them. [bytes]
+#: Size of the rows in memory above which they are written to the disk; a short run never writes rows. [byte]
 _WAITING = 8 << 20
-#: Writing checkpoints may take this part of the time.
+#: Largest part of the time for writing checkpoints.
 _SHARE = 0.05
 #: Member with the plain values of a file.
 _PLAIN = "plain"
-#: Errors of reading a file whose bytes are not those that were written.
+#: Errors that occur when a damaged file is read.
 _DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
 _KINDS = {kind.__name__: kind for kind in STATES}
 
@@ -52,14 +53,14 @@ class CheckpointWriter(Recorder):
     Parameters
     ----------
     folder : path
-        Of this run alone; made if need be.
+        Folder of this run alone; created if necessary.
     key : str
-        Of the case.
+        Key of the case.
     seconds, steps : float, int or None
-        A checkpoint is written after so long, but not so often that it would take a twentieth of the time; and after
-        so many accepted steps.
+        Time between checkpoints, which is extended until writing takes at most a twentieth; and number of accepted
+        steps after which a checkpoint is also written.
     stop : callable or None
-        Asked after every accepted step.
+        Called after every accepted step; the run stops if it returns true.
     """
 
     in_memory = False
@@ -73,26 +74,26 @@ class CheckpointWriter(Recorder):
         steps: int | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> None:
-        super().__init__()  # arrays in memory are those of rows that no file holds
+        super().__init__()  # keeps the rows that are not in a file yet
         folder.mkdir(exist_ok=True)
         self._folder = folder
         self._owner = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT}
         self._interval, self._steps, self._stop = seconds, steps, stop
         self._pending, self._last_save = 0, time.monotonic()
-        self._ends = [0]  # first row of each file, and of those in memory
-        self._waiting = 0  # arrays in memory [bytes]
-        self._files = ExitStack()  # the one that was read last: rows are read in their order
+        self._ends = [0]  # first row of each file, and first row in memory
+        self._waiting = 0  # size of the arrays in memory [byte]
+        self._files = ExitStack()  # only the last file read stays open: rows are read in their order
         self._reading: tuple[int, Any] = -1, None
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Record the values and the fields of a row; the arrays are not changed any more."""
+        """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
         super().append(plain, arrays)
         self._waiting += sum(array.nbytes for array in arrays.values())
         if self._waiting > _WAITING:
             self._write_rows()
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
-        """Return a field of some rows, an array (rows, x, y) that is read when it is needed."""
+        """Return a field of some rows as a lazy array (rows, x, y)."""
         return LazilyIndexedArray(_Frames(self, name, rows, shape))
 
     def array(self, row: int, name: str) -> Array:
@@ -107,7 +108,7 @@ class CheckpointWriter(Recorder):
         return self._reading[1][f"{row}/{name}"]
 
     def resume(self) -> None:
-        """Continue from the checkpoint, if it is whole and of this case; else from the start."""
+        """Continue from the checkpoint if it is undamaged and belongs to this case, otherwise from the start."""
         path = self._folder / STATE
         if path.exists():
             try:
@@ -128,12 +129,12 @@ class CheckpointWriter(Recorder):
         self.restart()
 
     def update(self, reached: Checkpoint) -> None:
-        """Take note of an accepted step; write a checkpoint if it is time to.
+        """Record an accepted step, and write a checkpoint if one is due.
 
         Raises
         ------
         KeyboardInterrupt
-            If the run is to stop; a checkpoint has then been written.
+            If `stop` returns true, after a checkpoint is written.
         """
         self.latest = reached
         self._pending += 1
@@ -145,12 +146,12 @@ class CheckpointWriter(Recorder):
             self.save()
 
     def restart(self) -> None:
-        """Forget all rows: the run begins again."""
+        """Delete all rows, because the run starts again."""
         super().restart()
         self._files.close()
         self._reading = -1, None
         self.latest, self._ends, self._waiting, self._pending = Checkpoint(), [0], 0, 0
-        (self._folder / STATE).unlink(missing_ok=True)  # before its rows
+        (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
         for path in self._folder.iterdir():
             path.unlink()
 
@@ -159,7 +160,7 @@ class CheckpointWriter(Recorder):
         if not self._pending:
             return
         began = time.monotonic()
-        self._write_rows()  # before the checkpoint, which counts on them
+        self._write_rows()  # before the state, which refers to the rows
         arrays: dict[str, Array] = {}
         parts = {one.name: _flatten(getattr(self.latest, one.name), arrays, {}) for one in fields(self.latest)}
         _write(self._folder / STATE, {"owner": self._owner, "ends": self._ends, "reached": parts}, arrays)
@@ -167,18 +168,18 @@ class CheckpointWriter(Recorder):
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 
     def remove(self) -> None:
-        """Remove all that was kept: the result is written, or cannot be had."""
+        """Remove the folder, after the result is written or the case has failed."""
         self._files.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def close(self) -> None:
-        """Close the files; without a checkpoint nothing in them is of use."""
+        """Close the files, and remove them if there is no checkpoint."""
         self._files.close()
         if not (self._folder / STATE).exists():
             self.remove()
 
     def _write_rows(self) -> None:
-        """Write the rows in memory to a file of their own."""
+        """Write the rows in memory to a new file."""
         first = self._ends[-1]
         if first == len(self.plain):
             return
@@ -192,7 +193,7 @@ class CheckpointWriter(Recorder):
 
 
 class _Frames(BackendArray):
-    """Field of some rows of a recorder, an array (rows, x, y) that xarray has not read yet."""
+    """Lazy array (rows, x, y) of a field of some rows of a recorder."""
 
     dtype = np.dtype(float)
 
@@ -214,7 +215,7 @@ class _Frames(BackendArray):
 
 
 def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:
-    """Write plain values, as JSON knows them, and arrays; floats are exact in both."""
+    """Write plain values as JSON, and arrays; floats are exact in both."""
     text = np.frombuffer(json.dumps(plain).encode(), np.uint8)
     with atomic_write(path) as temporary:
         np.savez(temporary, allow_pickle=False, **{_PLAIN: text}, **arrays)
@@ -223,7 +224,7 @@ def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:
 def _read(path: Path) -> tuple[Any, dict[str, Array]]:
     """Return the plain values and the arrays of a file."""
     with zipfile.ZipFile(path) as archive:
-        if damaged := archive.testzip():  # np.load would trust the shape that a damaged array states
+        if damaged := archive.testzip():  # np.load would allocate the shape of a damaged header
             raise ValueError(f"{path.name}, {damaged}")
     with np.load(path, allow_pickle=False) as found:
         arrays = dict(found)
@@ -231,7 +232,7 @@ def _read(path: Path) -> tuple[Any, dict[str, Array]]:
 
 
 def _flatten(value: Any, arrays: dict[str, Array], seen: dict[int, str]) -> Any:
-    """Return a value as JSON knows it; its arrays are put into ``arrays`` under names, the same array once."""
+    """Return a value in the types of JSON; move its arrays to ``arrays``, each array once, and refer to their names."""
     if isinstance(value, np.generic):
         return value.item()
     if hasattr(value, "dtype"):  # an array of NumPy or CuPy

@@ -15,7 +15,7 @@ from roughvisc.variables import OTHER_DIMS, VARIABLES, axis_of
 
 
 def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
-    """Write the histories of a result to a CSV file, one row per kept time; of friction, one row per speed.
+    """Write the histories of a result to a CSV file, with one row per kept time, or per speed of a friction curve.
 
     Parameters
     ----------

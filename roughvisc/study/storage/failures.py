@@ -1,4 +1,4 @@
-"""What went wrong in a folder: records of cases that failed, and the log of its sweeps."""
+"""Failures in a folder: records of failed cases, and the log of its sweeps."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ LOG = "sweep.log"
 
 
 def record_path(folder: Path, key: str) -> Path:
-    """File of the record of a case that failed."""
+    """Return the path of the record of a failed case."""
     return folder / f"{key}.failed.json"
 
 
 def record_failure(folder: Path, case: Case, message: str, error: str, trace: str) -> None:
-    """Write down that a case failed; its record is named by its key.
+    """Write the record of a failed case, which is named by the key of the case.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
+        Results folder.
     case : Case
         The case.
     message, error, trace : str
-        What went wrong: in words, the class of the exception, and its traceback if it was unexpected.
+        Message to the user, class name of the exception, and traceback of an unexpected exception.
     """
     record = {
         "case_key": case.key,
@@ -55,16 +55,16 @@ def record_failure(folder: Path, case: Case, message: str, error: str, trace: st
 
 
 def recorded_failure(folder: Path, key: str, *, by: str | None = None) -> dict[str, Any] | None:
-    """Record of a case that failed; None if there is none that can be read.
+    """Return the record of a failed case; None without a readable record.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
+        Results folder.
     key : str
-        Of the case.
+        Key of the case.
     by : str, optional
-        Version of the program that must have written it: a failure of another version proves nothing.
+        Version of the program; records of other versions are ignored, because this version may not fail.
     """
     try:
         record = json.loads(record_path(folder, key).read_text())
@@ -81,10 +81,10 @@ def forget_failure(folder: Path, key: str) -> None:
 
 
 class _LogFile(logging.FileHandler):
-    """A log file that stops nothing if it cannot be written."""
+    """Log file whose errors are ignored if it cannot be written."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        with suppress(OSError):  # it cannot be opened
+        with suppress(OSError):  # the file cannot be opened
             super().emit(record)
 
     def handleError(self, record: logging.LogRecord) -> None:
@@ -93,7 +93,7 @@ class _LogFile(logging.FileHandler):
 
 @contextmanager
 def log_file(folder: Path) -> Iterator[None]:
-    """Append everything that roughvisc logs to a file next to the results."""
+    """Append all log messages of roughvisc to a file next to the results, within the block."""
     handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
     handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
     level = log.level

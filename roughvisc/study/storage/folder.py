@@ -1,8 +1,8 @@
-"""Folder of results: names, locks, and files that are written whole or not at all.
+"""Folder of results: names, locks, and atomic writing of files.
 
-A case with the key ``K`` has the result ``K.nc``. While it is computed, ``.K.lock`` is locked and ``.K.unfinished``
-holds its checkpoint. A file that is being written has a hidden name that ends in ``.part`` and its suffix. A damaged
-result is renamed to ``K.nc.damaged``.
+A case with the key ``K`` has the result ``K.nc``. During its run ``.K.lock`` is locked and ``.K.unfinished`` contains
+its checkpoint. During writing, a file has a hidden name that ends in ``.part`` and its suffix. A damaged result is
+renamed to ``K.nc.damaged``.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ from roughvisc.errors import InputError
 
 log = logging.getLogger("roughvisc")
 
-#: Errors of :func:`read_json`, and of finding other values than were written.
+#: Errors of :func:`read_json`, and errors due to unexpected values in the file.
 DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error)
-#: The lock of a killed process is free when the system has removed the process. [s]
+#: Time to wait for a lock: the lock of a killed process is free when the system has removed the process. [s]
 _PATIENCE = 2.0
 
 
 def result_path(folder: Path, name: str) -> Path:
-    """File of a result in a folder; that of a case is named by its key."""
+    """Return the path of a result in a folder; the name of a case is its key."""
     return folder / f"{name}.nc"
 
 
 def lock_path(folder: Path, key: str) -> Path:
-    """Lock of a case in a folder."""
+    """Return the path of the lock of a case in a folder."""
     return folder / f".{key}.lock"
 
 
 def checkpoint_path(folder: Path, key: str) -> Path:
-    """Folder with the checkpoint of a case in a folder."""
+    """Return the path of the checkpoint of a case, a folder in the results folder."""
     return folder / f".{key}.unfinished"
 
 
 def result_files(folder: Path) -> list[Path]:
-    """Files of a folder that may be results, by name; none that is being written."""
+    """Return the files of a folder that may be results, sorted by name, without incomplete files."""
     return sorted(path for path in folder.glob("*.nc") if not path.name.startswith("."))
 
 
@@ -59,12 +59,12 @@ def no_results(folder: Path) -> InputError:
 
 
 def results_at(place: Path) -> list[Path]:
-    """Files that may be results: those of a folder, at least one; or the file itself, which need not exist.
+    """Return the files of a folder that may be results, or the file itself, which may be absent.
 
     Raises
     ------
     InputError
-        If the folder holds none.
+        If the folder contains none.
     """
     paths = result_files(place) if place.is_dir() else [place]
     if not paths:
@@ -73,22 +73,22 @@ def results_at(place: Path) -> list[Path]:
 
 
 def existing_part(folder: Path) -> Path:
-    """A folder, or the nearest one above it that exists."""
+    """Return the folder, or its nearest parent that exists."""
     return next(place for place in (folder, *folder.absolute().parents) if place.exists())
 
 
 def is_writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, which need not exist yet."""
+    """Return whether files can be created in a folder, which may be absent yet."""
     return os.access(existing_part(folder), os.W_OK)
 
 
 def require_writable(folder: Path, why: str = "") -> None:
-    """Refuse a folder in which no file can be made.
+    """Refuse a folder in which files cannot be created.
 
     Raises
     ------
     InputError
-        If neither the folder nor a file in it can be made; with the reason for which it is needed.
+        If neither the folder nor a file in it can be created; the message includes the purpose `why`.
     """
     if not is_writable(folder):
         needed = f", {why}" if why else ""
@@ -98,24 +98,24 @@ def require_writable(folder: Path, why: str = "") -> None:
 
 
 def require_folder(folder: Path) -> None:
-    """Refuse a folder that is absent, or a file.
+    """Refuse a path that is not a folder.
 
     Raises
     ------
     InputError
-        If it is.
+        If the folder is absent, or is a file.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
 
 
 def require_file(path: Path) -> None:
-    """Refuse everything but a regular file that can be read: opening a pipe would wait forever.
+    """Refuse a path that is not a readable regular file, because opening a pipe may never return.
 
     Raises
     ------
     InputError
-        If it is absent, a folder, a pipe or a device, or must not be read.
+        If the file is absent, a folder, a pipe or a device, or without read permission.
     """
     try:
         mode = path.stat().st_mode
@@ -140,7 +140,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     Parameters
     ----------
     path : path
-        The file to be. Its folder is made if need be.
+        Final path of the file. Its folder is created if necessary.
 
     Yields
     ------
@@ -150,7 +150,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder cannot be made or written to.
+        If the folder cannot be created or written to.
     """
     path = Path(path)
     try:
@@ -164,7 +164,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
         yield temporary
         _sync(temporary)
         os.replace(temporary, path)
-        with suppress(PermissionError):  # Windows opens no folder
+        with suppress(PermissionError):  # Windows cannot open a folder
             _sync(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
@@ -178,7 +178,7 @@ def write_text(path: Path, text: str) -> Path:
 
 
 def _sync(path: Path) -> None:
-    """Have the operating system put a file, or the names in a folder, on the disk."""
+    """Flush a file, or the directory entries of a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -187,42 +187,42 @@ def _sync(path: Path) -> None:
 
 
 def partial_files(path: Path) -> list[Path]:
-    """Return what interrupted writes of a result have left next to it."""
+    """Return the incomplete files of interrupted writes of a result."""
     return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write a compressed JSON file, which has a checksum; if that is impossible, the file is not changed."""
+    """Write a compressed JSON file with a checksum; if writing fails, an existing file is not changed."""
     with suppress(OSError, InputError), atomic_write(path) as temporary:
         temporary.write_bytes(gzip.compress(json.dumps(value).encode(), compresslevel=1, mtime=0))
 
 
 def read_json(path: Path) -> Any:
-    """Read the value of a compressed JSON file; one of :data:`DAMAGED` is raised if that is impossible."""
+    """Return the value of a compressed JSON file; raise one of :data:`DAMAGED` if it is damaged."""
     return json.loads(gzip.decompress(path.read_bytes()))
 
 
 @cache
 def warn_once(message: str) -> None:
-    """Log a warning, once in a process."""
+    """Log a warning once per process."""
     log.warning("%s", message)
 
 
 @contextmanager
 def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
-    """Hold the lock of a case; it ends with the process, however the process ends.
+    """Hold the lock of a case during the block; the system releases it if the process ends in any way.
 
     Parameters
     ----------
     path : path
-        File of the lock, in a folder that exists. Every machine that shares the folder sees it.
+        File of the lock, in an existing folder. The lock is valid on all machines that share the folder.
     patience : float
         Time to wait for another process. [s]
 
     Raises
     ------
     BlockingIOError
-        If another run holds it.
+        If another run holds the lock.
     """
     lock = FileLock(path)
     try:
@@ -237,6 +237,6 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):  # before the release: a waiting run that has opened this file opens a new one
+        with suppress(OSError):  # before the release, so that a run that waits for this file opens a new one
             path.unlink()
         lock.release()

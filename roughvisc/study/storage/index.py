@@ -1,6 +1,6 @@
-"""Cache of the histories of all results in a folder: one small file that saves opening each result.
+"""Cache of the histories of all results in a folder: one small file, so that results need not be opened.
 
-The results count, not the cache: it is read from the results again if it is absent, damaged or older than they are.
+The cache is made again from the results if it is absent, damaged or older than the results.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _KEY = re.compile(r"[0-9a-f]{16}")
 
 @dataclass(frozen=True)
 class Entry:
-    """Everything of one result but its fields.
+    """Content of one result without its fields.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Entry:
 
     @cached_property
     def case(self) -> dict[str, Any]:
-        """The case, as JSON has it."""
+        """The case as a dictionary, from its JSON."""
         return json.loads(self.attributes.get("case", "{}"))
 
 
@@ -94,7 +94,7 @@ def read_entry(path: Path) -> Entry:
     Raises
     ------
     InputError
-        If the file cannot be read, is no result, or is damaged.
+        If the file cannot be read, is not a result, or is damaged.
     """
     require_file(path)
     stamp = _stamp(path)
@@ -122,16 +122,16 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 
 def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
-    """Return the entry of every result in a folder by its key, and bring the cache up to date.
+    """Return the entry of every result in a folder by its key, and update the cache.
 
-    The log names files that are no result.
+    The log names files that are not results.
 
     Parameters
     ----------
     folder : Path
         Results folder.
     known : iterable of Entry
-        Entries that are known already.
+        Entries of results that need not be opened.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
     before = cached | {entry.file: entry for entry in known}
     entries = {}
     for path in result_files(folder):
-        if not _KEY.fullmatch(path.stem):  # made from a result, or by somebody else
+        if not _KEY.fullmatch(path.stem):  # not the file of a case
             continue
         try:
             entry = before.get(path.name)
@@ -155,7 +155,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
             entries[entry.key] = entry
         except InputError as error:
             warn_once(str(error))
-        except FileNotFoundError:  # gone meanwhile
+        except FileNotFoundError:  # removed in the meantime
             continue
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
         _write_index(folder, entries)
@@ -163,11 +163,11 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
 
 
 def _write_index(folder: Path, entries: Mapping[str, Entry]) -> None:
-    """Write the cache of a folder; if that is impossible, results are only slower to open."""
+    """Write the cache of a folder; if this fails, opening results is only slower."""
     grids: dict[str, int] = {}
     results = {}
     for entry in entries.values():
-        grid = json.dumps([_packed(entry.x), _packed(entry.y)])  # most results are on one
+        grid = json.dumps([_packed(entry.x), _packed(entry.y)])  # most results share one grid
         histories = {name: _packed(values) for name, values in entry.histories.items()}
         number = grids.setdefault(grid, len(grids))
         results[entry.file] = [*entry.stamp, entry.attributes, entry.fields, number, histories]
@@ -191,7 +191,7 @@ def _read_index(folder: Path) -> dict[str, Entry]:
 
 
 def _packed(values: NDArray[Any]) -> list[str]:
-    """Return an array with one axis as text: its type and its bytes."""
+    """Return a one-dimensional array as text: its type and its bytes."""
     return [values.dtype.str, b64encode(values.tobytes()).decode()]
 
 

@@ -1,7 +1,8 @@
-"""Results in NetCDF files: written whole or not at all, and read lazily in any thread; no file stays open.
+"""Results in NetCDF files: atomic writing, and lazy reading in any thread; no file stays open.
 
-CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them. xarray's own engine reads under netCDF's
-lock, but opens and closes files outside it, which netCDF-4 does not support. Here every call of the library is locked.
+Files follow CF-1.11 and netCDF-4, so that xarray, ncview, MATLAB and ParaView read them. xarray's own engine reads with
+netCDF's lock, but opens and closes files without the lock, which netCDF-4 does not support. Here every call of the
+library holds the lock.
 """
 
 from __future__ import annotations
@@ -29,27 +30,27 @@ from roughvisc.study.storage.folder import atomic_write, require_file
 from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
-#: Errors of reading a file that the library cannot read.
+#: Errors of the library for a file that it cannot read.
 ERRORS = (OSError, RuntimeError, LookupError, ValueError, AttributeError)
-#: Free space below which a failed write is put down to a full disk. [bytes]
+#: Free space below which a full disk counts as the cause of a failed write. [byte]
 _NEARLY_FULL = 1 << 20
-#: Fields that are not compressed unless they are rounded, because hardly two of their numbers are equal. On 512 x 512
+#: Fields that are compressed only if they are rounded, because hardly any of their numbers are equal. On 512 x 512
 #: cells compression takes 34 ms for an exact gap, to 0.66 of its size; 15 ms for a gap rounded to 1e-4, to 0.23; and
-#: 3.6, 6.2 and 9.7 ms for a pressure on 2, 9 and 18 % of the cells, to 0.03, 0.10 and 0.19. Shuffling the bytes of a
-#: pressure first takes longer and gives larger files.
+#: 3.6, 6.2 and 9.7 ms for a pressure on 2, 9 and 18 % of the cells, to 0.03, 0.10 and 0.19. With shuffled bytes a
+#: pressure takes longer and needs larger files.
 _DENSE = ("gap", "height")
-_TINY = 1 << 12  # not compressed [bytes]
-#: Chunk of a field over (time, x, y). At 512 x 512 x 50, compressed, one frame and one cell's history take, in ms:
-#: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60 to 145 and 4 to 7;
-#: (50, 32, 32) 170 and 1.5. A fifth of that or less where it is not compressed.
+_TINY = 1 << 12  # largest size without compression [byte]
+#: Chunk of a field over (time, x, y). Times to read one frame, and the history of one cell, at 512 x 512 x 50,
+#: compressed, in ms: (1, 512, 512) 9 and 370; (4, 128, 128) 18 and 22; (8, 64, 64) 35 to 65 and 4 to 7; (16, 64, 64) 60
+#: to 145 and 4 to 7; (50, 32, 32) 170 and 1.5. Fields without compression take a fifth of these times or less.
 _CHUNK = (8, 64, 64)
-#: The same of a grid of more cells than this: a frame is read without its neighbours in time, which no memory has room
-#: for. At 4096 x 4096 x 20, in ms, compressed: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51; (1, 256, 256) 331
-#: and 41; (1, 1024, 1024) 309 and 302.
+#: Number of cells above which a chunk contains one frame, because several frames may exceed the memory; and this chunk.
+#: At 4096 x 4096 x 20, compressed, both times are in ms: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51;
+#: (1, 256, 256) 331 and 41; (1, 1024, 1024) 309 and 302.
 _MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
-#: The longest side of a chunk of anything else: a map of 1024 x 1024 doubles is 8 MB.
+#: Longest side of a chunk of any other variable: a map of 1024 x 1024 doubles has 8 MB.
 _LONGEST_CHUNK = 1024
-#: End of the name of the borders of cells in a file. A Dataset has none, because its cells are equal.
+#: Suffix of the variables with the borders of cells. Only files have these variables, because the cells are equal.
 BOUNDS = "_bounds"
 #: Variables without missing values.
 _COORDINATES = (*AXES, *(f"{axis}{end}" for axis in ("x", "y") for end in ("", BOUNDS)))
@@ -60,10 +61,10 @@ class DamagedError(InputError):
 
 
 def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
-    """Return the error of a file that the library could not read: the system refused, or its content is broken."""
+    """Return the error of a file that the library could not read: a system error, or damaged content."""
     if not (isinstance(error, OSError) and (error.errno or 0) > 0):  # errors of the library have negative numbers
         try:
-            with path.open("rb") as stream:  # it reports a failing disk as wrong bytes
+            with path.open("rb") as stream:  # the library reports a failing disk as wrong bytes
                 while stream.read(1 << 24):
                     pass
         except OSError as refusal:
@@ -92,14 +93,14 @@ def open_result(path: str | Path) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the file is absent, must not be read, is of a later version, or holds something else than a result.
+        If the file is absent, cannot be read, has a later format, or is not a result.
     DamagedError
-        If its content is damaged.
+        If the content of the file is damaged.
 
     Notes
     -----
-    Every block of a variable has a checksum (fletcher32), which is verified when the block is read. Histories are read
-    here. :func:`roughvisc.study.storage.upkeep.verify` reads all.
+    Every block of a variable has a checksum (fletcher32), which is verified when the block is read. This function reads
+    only the histories. :func:`roughvisc.study.storage.upkeep.verify` reads all blocks.
     """
     path = Path(path)
     require_file(path)
@@ -116,7 +117,7 @@ def open_result(path: str | Path) -> xr.Dataset:
 
 
 def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[tuple[Any, ...], np.dtype[Any]]]) -> str:
-    """Return what shows that a file is no result of this format; empty if nothing.
+    """Return the reason if a file is not a result of this format; empty for a result.
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ class ResultBackend(BackendEntrypoint):
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """Open a file as the engine ``netcdf4`` does, with durations as plain numbers."""
-        path = os.path.abspath(os.fspath(filename_or_obj))  # for a process that works in another folder
+        path = os.path.abspath(os.fspath(filename_or_obj))  # other processes may work in another folder
         with NETCDF, netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
@@ -160,7 +161,7 @@ class ResultBackend(BackendEntrypoint):
 
 
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
-    """Return the variables of a file or of a group, without the borders of the cells."""
+    """Return the variables of a file or a group, without the borders of the cells."""
     variables = {}
     for name, stored in file.variables.items():
         lazily = stored.dimensions[-2:] == ("x", "y")
@@ -178,7 +179,7 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
 
 
 class _Field(BackendArray):
-    """A variable whose file is opened for each reading, so that threads and processes can share it."""
+    """Lazy array of a variable; each reading opens the file, so that threads and processes can share the array."""
 
     def __init__(self, path: str, stored: netCDF4.Variable) -> None:
         self.path, self.name = path, stored.name
@@ -192,14 +193,14 @@ class _Field(BackendArray):
 
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
-    """Part of a variable of a result, as it is stored.
+    """Return a part of a stored variable of a result.
 
     Raises
     ------
     InputError
-        If the file is gone or must not be read.
+        If the file was removed or cannot be read.
     DamagedError
-        If a block does not match its checksum, or the file holds no such variable.
+        If a block does not match its checksum, or the file lacks the variable.
     """
     require_file(Path(path))
     try:
@@ -216,14 +217,13 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Parameters
     ----------
     dataset : xarray.Dataset
-        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Fields that are read from elsewhere
-        when they are needed are read and written a chunk at a time. The history of accepted steps that the Dataset
-        carries becomes the group ``steps``.
+        Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Lazy fields are read and written in
+        layers of one chunk. The history of accepted steps that the Dataset carries becomes the group ``steps``.
     path : path
-        The file to write; one of that name is replaced.
+        The file to write; an existing file is replaced.
     precision : float, optional
-        Relative precision to which fields over (time, x, y) are rounded, in binary, so that they compress better;
-        their attributes say so. None: exact.
+        Relative precision of fields over (time, x, y), which are rounded in binary for better compression. Their
+        attributes state the precision. None: exact.
 
     Returns
     -------
@@ -241,8 +241,8 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 
     Notes
     -----
-    zlib level 1 is the one filter that every reader has. netCDF4 is called directly: on a Dask worker xarray would ask
-    the scheduler for a lock at every variable, though no other process knows the temporary file.
+    Every reader supports the filter zlib, which is used at level 1. netCDF4 is called directly: on a Dask worker xarray
+    would request a lock from the scheduler for every variable, although only this process uses the temporary file.
     """
     root = label(dataset).drop_vars([f"{axis}{BOUNDS}" for axis in ("x", "y")], errors="ignore")
     root = root.assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
@@ -256,7 +256,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             with NETCDF:
                 file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
             try:
-                # all are declared before any is written: each change of mode would write the file's metadata again
+                # all variables are declared before values are written: each change of mode writes the metadata again
                 with NETCDF:
                     declared = _declare(file, root, precision)
                     if steps is not None:
@@ -266,7 +266,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             finally:
                 with NETCDF:
                     file.close()
-        except (RuntimeError, PermissionError) as error:  # the library's error of any failed write
+        except (RuntimeError, PermissionError) as error:  # errors of the library for any failed write
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             if not full and isinstance(error, PermissionError):
                 raise
@@ -278,14 +278,14 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
 def _declare(
     place: netCDF4.Dataset, part: xr.Dataset, precision: float | None
 ) -> list[tuple[netCDF4.Variable, xr.Variable]]:
-    """Declare the variables of a file or of a group; return each with the values to write."""
+    """Declare the variables of a file or a group; return each with the values to write."""
     place.setncatts(plain_attributes(part.attrs))
     labels = {str(name): set(one.dims) for name, one in part.coords.items() if name not in part.dims}
     declared = []
     for name, variable in part.variables.items():
         attributes = plain_attributes(variable.attrs)
         if name in part.data_vars and (own := [one for one, dims in labels.items() if dims <= set(variable.dims)]):
-            attributes["coordinates"] = " ".join(own)  # by which CF tells a coordinate from a variable
+            attributes["coordinates"] = " ".join(own)  # marks coordinates in CF
         if variable.dtype.kind == "U":
             # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length
             # if a file is open twice and one is closed
@@ -298,7 +298,7 @@ def _declare(
         encoding = encoding_of(str(name), variable, precision)
         stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
         stored.set_auto_maskandscale(False)
-        if "chunksizes" in encoding:  # a chunk is written at once: the library would hold 64 MB of each variable
+        if "chunksizes" in encoding:  # chunks are written whole; by default the library caches 64 MB per variable
             stored.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
         if bits := encoding.get("significant_digits"):
             attributes["relative_precision"] = precision
@@ -309,7 +309,7 @@ def _declare(
 
 
 def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
-    """Return the arguments of netCDF4 for a variable; coordinates have no fill value."""
+    """Return the arguments of netCDF4 to create a variable; coordinates have no fill value."""
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
         encoding["fill_value"] = variable.dtype.type(np.nan)
@@ -317,7 +317,7 @@ def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> di
         return encoding
     encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
     rounded = precision is not None and is_field(variable)
-    if rounded:  # bits of the fraction of a double
+    if rounded:  # a double has 52 bits of fraction
         bits = min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
         encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
     if variable.nbytes > _TINY and (rounded or name not in _DENSE):
@@ -331,7 +331,7 @@ def is_field(variable: xr.Variable) -> bool:
 
 
 def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the sides of the chunks, as equal as possible: a chunk that sticks out takes its whole space."""
+    """Return the sides of nearly equal chunks, because a chunk across the border of a field is stored at full size."""
     many = len(shape) > 1 and shape[-2] * shape[-1] > _MANY_CELLS
     fields = _CHUNK_OF_MANY if many else _CHUNK
     longest = fields[-len(shape) :] if len(shape) == 3 or many else (_LONGEST_CHUNK,) * len(shape)
@@ -339,17 +339,17 @@ def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
-    """Write a variable; a field one layer of chunks at a time, so that no more of it is in memory."""
+    """Write a variable; a field in layers of one chunk, so that only one layer is in memory."""
     together = chunks(variable.shape)[0] if is_field(variable) else 0
     for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
-        values = variable[layer].values  # not under the lock, which the source may need
+        values = variable[layer].values  # without the lock, because reading the source may need it
         with NETCDF:
             stored[layer] = values
-        del values  # before the next layer is read
+        del values  # frees the memory before the next layer is read
 
 
 def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return attributes as NetCDF can hold them: no None, no booleans, no nested values."""
+    """Return attributes in the types of NetCDF, without None, booleans and nested values."""
     plain: dict[str, Any] = {}
     for name, value in attributes.items():
         if value is None:
@@ -363,7 +363,7 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
-    """Write a Dataset that is no result to one NetCDF file, whole or not at all."""
+    """Write a Dataset of another kind than a result to one NetCDF file; a failed write leaves no file."""
     kept = dataset.copy()
     kept.attrs = plain_attributes(dataset.attrs)
     numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]

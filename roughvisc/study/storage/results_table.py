@@ -1,4 +1,4 @@
-"""The table of a sweep: what was varied in each case, how it ended, and its numbers at the end or at its peak."""
+"""Table of a sweep: varied parameters of each case, its status, and its numbers at the end or at the largest value."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 CASES, REALISATIONS = "cases.csv", "realisations.csv"
-#: Values that differ by less than this, relative, are prescribed.
+#: Relative difference of the values of all realisations below which a quantity counts as prescribed.
 _ALIKE = 1e-9
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
-    """Table of the cases of the last sweep in a folder, one row per case, including failed ones.
+    """Return the table of the last sweep in a folder, with one row per case, including failed cases.
 
     Parameters
     ----------
     out : path
-        Results folder. If no sweep ran in it, all its results are included.
+        Results folder. If no sweep ran in it, the table contains all its results.
 
     Returns
     -------
     pandas.DataFrame
         The index is the number of the case, from 0 in the order of the study, as in :func:`open_results`; the
-        realisations of one case have its number. Columns: title; varied parameters under their dotted keys, in the
-        units of the study; at the last kept time force, approach, contact area with its bounds, contact fraction, mean
-        gap, friction if the profile slides, and observables; for a friction curve the same at the speed of largest
-        friction, and this speed; the largest stated error and its parts; status, message and file. Units are in
-        brackets.
+        realisations of one case share its number. Columns: title; varied parameters under their dotted keys, in the
+        units of the study; force, approach, contact area with its bounds, contact fraction, mean gap, friction if the
+        profile slides, and observables; the largest stated error and its parts; status, message and file. The values
+        are for the last kept time, or for a friction curve at the speed of largest friction, which is also a column.
+        Units are in brackets.
 
     Raises
     ------
@@ -70,28 +70,28 @@ def to_table(out: str | Path) -> pd.DataFrame:
 def write_table(
     folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase], held: Mapping[str, str] | None = None
 ) -> None:
-    """Write the table of a sweep as CSV; if that is impossible, the log says so and the sweep goes on.
+    """Write the table of a sweep as CSV; if writing fails, log a warning.
 
     Parameters
     ----------
     folder : Path
-        Of the results.
+        Results folder.
     index : mapping
         Key -> entry of each result in the folder.
     cases : sequence of SweepCase
         Cases of the sweep.
     held : mapping, optional
-        Key -> message, of the cases that another run computes.
+        Key -> message of each case that another run computes.
     """
     tables = {CASES: _table(folder, index, cases, held or {})}
-    (folder / REALISATIONS).unlink(missing_ok=True)  # of a sweep before
+    (folder / REALISATIONS).unlink(missing_ok=True)  # from an earlier sweep
     found = realisations_table(index, cases)
     if len(found):
         tables[REALISATIONS] = found.set_index("case")
     for name, table in tables.items():
         try:
             with atomic_write(folder / name) as temporary:
-                # spreadsheets go by the mark of UTF-8; seven digits are more than the errors leave
+                # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
                 table.map(_no_formula).to_csv(
                     temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n"
                 )
@@ -100,7 +100,7 @@ def write_table(
 
 
 def _no_formula(value: Any) -> Any:
-    """Put an apostrophe in front of text that a spreadsheet would take for a formula."""
+    """Put an apostrophe in front of text that a spreadsheet would read as a formula."""
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
@@ -136,14 +136,14 @@ def _table(
 
 
 def _telling(entry: Entry) -> dict[str, float]:
-    """Return the numbers of a case at its end; of a friction curve where friction is largest."""
+    """Return the numbers of a case at its end, or at the speed of largest friction of a friction curve."""
     row = AXES[entry.along].telling_row(entry.histories)
     names = [name for name in variables_in_table("last") if len(entry.histories.get(name, ()))]
     return {name: float(entry.histories[name][row]) for name in names}
 
 
 def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the values of what was varied, under its key and the unit that the study states first."""
+    """Return the values of varied parameters, under their keys with the first unit that the study states."""
     columns: dict[str, Any] = {}
     for key, values in parameters_of(stated).items():
         si = unit_of(key, stated[0]) if values.dtype.kind in "if" else ""
@@ -160,7 +160,7 @@ def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
-    """Mean, scatter and intervals over the realisations of each case of the last sweep, one row per quantity.
+    """Return mean, scatter and intervals over the realisations of each case, with one row per quantity.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -
     -------
     pandas.DataFrame
         Number of the case and varied parameters as in :func:`to_table`; the quantity, its unit and its row; then the
-        variables of :func:`roughvisc.over_realisations`. Prescribed quantities are left out.
+        variables of :func:`roughvisc.over_realisations`. The table omits prescribed quantities.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Cases of a sweep: what was varied in them, their numbers, and the list of those that ran last in a folder."""
+"""Cases of a sweep: their varied parameters, their numbers, and the list of the last sweep in a folder."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from roughvisc.study.sweep_table import DRAWN, REALISATION, SURROGATE
 
 #: File with the cases of the last sweep.
 SWEEP = ".cases.json.gz"
-#: Coordinate that holds the key of the case.
+#: Coordinate with the key of the case.
 CASE_KEY = "case_key"
-#: dimensions, values, attributes
+#: Dimensions, values and attributes of a coordinate.
 Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 
 _NOT_A_PARAMETER = ("title", "origin", "varied", "written")
@@ -31,14 +31,14 @@ _NOT_A_PARAMETER = ("title", "origin", "varied", "written")
 class SweepCase:
     """One case of a sweep.
 
-    Two of them have one key, and one result, if they differ in labels alone: scans with equal bytes.
+    Two cases share a key and a result if they differ only in labels, for example scans with equal bytes.
 
     Attributes
     ----------
     key : str
         Key of the case, the name of its result.
     case : dict
-        The case as JSON, with what the sweep varied.
+        The case as JSON, including its varied parameters.
     """
 
     key: str
@@ -46,7 +46,7 @@ class SweepCase:
 
 
 def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
-    """Keys and JSON of some cases, in their order; those with equal keys and equal labels once."""
+    """Return keys and JSON of some cases, in their order, without duplicates of key and labels."""
     distinct: dict[Any, Case] = {}
     for case in cases:
         distinct.setdefault((case.key, json.dumps(dict(case.varied))), case)
@@ -54,12 +54,12 @@ def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
 
 
 def write_sweep(folder: Path, cases: Sequence[SweepCase]) -> None:
-    """Write the cases of a sweep to its folder; if that is impossible, the folder has no list of cases."""
+    """Write the list of cases of a sweep to its folder; if writing fails, the folder has no list."""
     write_json(folder / SWEEP, [{"key": one.key, "case": one.case} for one in cases])
 
 
 def read_sweep(folder: Path) -> list[SweepCase]:
-    """Cases of the sweep that ran last in a folder; none if there was no sweep.
+    """Return the cases of the last sweep in a folder; an empty list without a sweep.
 
     Raises
     ------
@@ -80,25 +80,25 @@ def read_sweep(folder: Path) -> list[SweepCase]:
 
 
 def numbers_of(cases: Sequence[SweepCase]) -> list[int]:
-    """Number of each case, from 0 in their order; the realisations of one case share its number."""
+    """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
     parameters = parameters_of([one.case for one in cases])
     if REALISATION not in parameters:
         return list(range(len(cases)))
     drawn = parameters[REALISATION].tolist()
     stated = [values.tolist() for key, values in parameters.items() if key not in (REALISATION, *DRAWN)]
-    # as text, in which a missing number equals another
+    # compared as text, because NaN does not equal NaN
     settings = [repr([values[n] for values in stated] if drawn[n] == drawn[n] else n) for n in range(len(cases))]
     first = {one: number for number, one in enumerate(dict.fromkeys(settings))}
     return [first[one] for one in settings]
 
 
 def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
-    """Key -> number of the first case that has it."""
+    """Return key -> number of the first case with this key."""
     return dict(reversed([(one.key, number) for one, number in zip(cases, numbers_of(cases), strict=True)]))
 
 
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Varied parameters of cases in JSON: those that a sweep set, and any other in which the cases differ."""
+    """Return varied parameters of cases in JSON: parameters of the sweep, and others in which the cases differ."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
     leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
     known = (*keys, SURROGATE) if REALISATION in keys else tuple(keys)
@@ -133,7 +133,7 @@ def _column(values: Sequence[Any]) -> NDArray[Any]:
 def labels_of(
     parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
 ) -> dict[str, Label]:
-    """Coordinates that hold what was varied; ``long_name`` is the dotted key.
+    """Return varied parameters as coordinates; ``long_name`` is the dotted key.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def labels_of(
     case : mapping
         A case in JSON, which determines the units.
     dims : tuple of str
-        None: the values are of one case.
+        Dimensions of the values; empty for one case.
     """
     labels: dict[str, Label] = {}
     for key, values in parameters.items():
@@ -152,12 +152,12 @@ def labels_of(
 
 
 def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
-    """Scalar coordinates of one result in JSON: what was varied in it."""
+    """Return the varied parameters of one case in JSON as scalar coordinates."""
     return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
 
 
 def identifier(key: str) -> str:
-    """Name of a varied parameter that Python and pandas accept: its dotted key with underscores.
+    """Return a name of a varied parameter that Python and pandas accept: its dotted key with underscores.
 
     Examples
     --------

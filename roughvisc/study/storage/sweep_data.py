@@ -1,4 +1,4 @@
-"""All results of a sweep as one lazy Dataset over case, time or speed or row, x and y."""
+"""All results of a sweep as one lazy Dataset over case; time, speed or row; x and y."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
-#: A block that is read in one go: several frames of a small grid, one of a large. [bytes]
+#: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
 #: Attributes that the Dataset has if all results of a sweep share their value.
 _SHARED = (
@@ -57,29 +57,30 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
     out : path
         Folder of the results.
     cases : "last", "all", or sequence of Case
-        "last": the finished cases of the last sweep in this folder, or all results if there was no sweep. "all": all
+        "last": the finished cases of the last sweep in this folder, or all results if no sweep ran in it. "all": all
         results in the folder. A sequence: the results of these cases, in this order.
 
     Returns
     -------
     xarray.Dataset
-        Variables as in a single result, with ``case`` as first dimension; ``height`` has it only if heights differ.
-        ``case`` is the number of the case, from 0, as in :func:`to_table`; a case without a result is left out.
+        Variables as in a single result, with ``case`` as first dimension; ``height`` has this dimension only if heights
+        differ. ``case`` is the number of the case, from 0, as in :func:`to_table`; cases without a result are left out.
 
         - Cases with common times or speeds: variables over ``(case, time, x, y)`` or ``(case, speed, x, y)``.
-        - Others: variables over ``(case, row, x, y)``, with the coordinates ``time(case, row)`` or
-          ``speed(case, row)``, and ``rows(case)``, the number of rows of each case. Later rows are NaN. Whole numbers,
-          such as ``status``, become floats.
+        - Cases with different times or speeds: variables over ``(case, row, x, y)``, with the coordinates
+          ``time(case, row)`` or ``speed(case, row)``, and ``rows(case)``, the number of rows of each case. Later rows
+          are NaN. Whole numbers, such as ``status``, become floats.
         - Cases on different grids: histories only, without fields, and a warning in the log names the grids.
 
         Varied parameters are coordinates over ``case``, numbers in SI or strings. The name of each is its dotted key
         with underscores, ``program_0_load``. A sweep with ``realisations`` has ``realisation`` as second dimension, in
-        which 0 is a measured surface itself; a realisation without a result is missing there, with an empty key.
+        which 0 is the measured surface itself. Values of a realisation without a result are missing, and its key is
+        empty.
 
     Raises
     ------
     InputError
-        If there is nothing to open, or some results lie over time and others over speed.
+        If there are no results, or some results lie over time and others over speed.
 
     Examples
     --------
@@ -101,7 +102,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
     entries = [index[listed[place].key] for place in here]
     if len(axes := {entry.along: entry.file for entry in entries}) > 1:
         found = ", ".join(f"{file} over {along}" for along, file in axes.items())
-        raise InputError(f"{folder}: found {found}: expected results over one of them; give cases", key="cases")
+        raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
     parameters = {key: values[here] for key, values in parameters_of([one.case for one in listed]).items()}
     number = {"case": ("case", np.array(numbers_of(listed))[here], {"long_name": "number of the case"})}
     keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes)}
@@ -110,7 +111,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
 
 
 def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
-    """Return results one after another over ``case``."""
+    """Return results stacked over ``case``."""
     first = entries[0]
     along = first.along
     places = [entry.histories[along] for entry in entries]
@@ -175,7 +176,7 @@ def _field(folder: Path, entries: Sequence[Entry], name: str) -> xr.Variable:
 
 
 class _Frames(BackendArray):
-    """Field of several results, read from their files over (case, x, y) or (case, row, x, y); NaN after a last row."""
+    """Field of several results, read from their files over (case, x, y) or (case, row, x, y), and padded with NaN."""
 
     def __init__(self, folder: Path, entries: Sequence[Entry], name: str) -> None:
         self.name, self.paths = name, [str(folder / entry.file) for entry in entries]
@@ -205,7 +206,7 @@ class _Frames(BackendArray):
 
 
 def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
-    """Return cases over (case, realisation); unchanged if some are no realisation, or one is there twice."""
+    """Return cases over (case, realisation); unchanged if some cases are not realisations, or one occurs twice."""
     drawn = parameters.get(REALISATION)
     if drawn is None or drawn.dtype.kind != "i":
         return flat
@@ -233,8 +234,8 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
 
 
 def _spread(variable: xr.Variable, place: NDArray[np.intp]) -> xr.Variable:
-    """Return a variable over (case, realisation, ...) from one over (case, ...); missing where there is no case."""
-    data = np.stack([variable[np.maximum(row, 0)].data for row in place])  # of Dask arrays: a Dask array
+    """Return a variable over (case, realisation, ...) from a variable over (case, ...); absent cases are missing."""
+    data = np.stack([variable[np.maximum(row, 0)].data for row in place])  # a Dask array for Dask arrays
     if (place < 0).any():
         missing = "" if variable.dtype.kind == "U" else np.nan
         known = (place >= 0).reshape(*place.shape, *(1,) * (data.ndim - 2))

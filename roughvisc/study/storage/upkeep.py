@@ -1,4 +1,4 @@
-"""Upkeep of a folder of results: verify the files, and remove what killed runs have left."""
+"""Upkeep of a folder of results: verification of files, and removal of leftovers of killed runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from roughvisc.study.storage.netcdf import ERRORS, NETCDF, open_result
 
 _OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
 _PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
-#: A partial file of no case that was not changed for so long is not being written. [s]
+#: Age of an incomplete file that belongs to no case, above which the file counts as a leftover. [s]
 _ABANDONED = 3600.0
 
 
@@ -39,9 +39,9 @@ class Verdict:
     path : Path
         The file.
     flaw : str
-        What is wrong with it; empty if nothing.
+        Description of the damage; empty for an undamaged file.
     has_checksums : bool
-        Whether all of its arrays have checksums. Those of another program may have none.
+        Whether all arrays of the file have checksums. Files of other programs may lack checksums.
     """
 
     path: Path
@@ -55,7 +55,7 @@ def verify(place: str | Path) -> list[Verdict]:
     Parameters
     ----------
     place : path
-        A result, or a folder of them.
+        A result, or a folder of results.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def verify(place: str | Path) -> list[Verdict]:
     Raises
     ------
     InputError
-        If there is nothing to read.
+        If there are no results.
     """
     place = Path(place)
     if not place.exists():
@@ -74,7 +74,7 @@ def verify(place: str | Path) -> list[Verdict]:
 
 
 def _verdict(path: Path) -> Verdict:
-    """Open a result as any other program does, and read all variables."""
+    """Return the verdict on a result, after reading all its variables with the library alone."""
     try:
         require_file(path)
         checked = True
@@ -97,20 +97,20 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     Parameters
     ----------
     folder : path
-        Results folder. Cases that are being computed are left alone.
+        Results folder. Files of running cases are kept.
     everything : bool
-        Also remove the checkpoints of unfinished cases, which then begin again, damaged results that were renamed,
-        and records of failures.
+        Also remove renamed damaged results, records of failures, and the checkpoints of unfinished cases, which then
+        start again.
 
     Returns
     -------
     list of Path
-        What was removed.
+        Removed files and folders.
 
     Raises
     ------
     InputError
-        If there is no such folder.
+        If the folder does not exist.
     """
     folder = Path(folder)
     require_folder(folder)
@@ -120,7 +120,7 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
         if matched := _OF_A_CASE.fullmatch(path.name):
             of_cases.setdefault(matched[1], []).append(path)
         elif _PART.fullmatch(path.name):
-            with suppress(OSError):  # it is gone meanwhile
+            with suppress(OSError):  # removed in the meantime
                 unused += [path] if time.time() - path.lstat().st_mtime > _ABANDONED else []
     if everything:
         unused += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
