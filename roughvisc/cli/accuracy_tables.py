@@ -67,9 +67,9 @@ def budget_table(dataset: xr.Dataset) -> Group:
         parts.append(Text(f"{AXES[axis].place(float(place))}: {value}, {interval}"))
     parts += [Text(), table]
     spent = float(dataset["case_cost"])
-    notes = [f"The case itself took {spent:.2g} s. Errors are those of the {AXES[axis].rows}, least and largest."]
+    notes = [f"The case itself took {spent:.2g} s. Errors are the smallest and the largest of all {AXES[axis].rows}."]
     if dataset.attrs["open"]:
-        notes.append("What is open is not in the interval.")
+        notes.append("The interval does not include open sources.")
     title = f"{dataset.attrs['title'] or 'untitled'}: {name}"
     return titled(title, *parts, *(Text(note, style="italic") for note in notes))
 
@@ -113,7 +113,7 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     quantity : str
         Quantity whose error has to reach the target.
     target : float
-        Wanted relative error. [-]
+        Target relative error. [-]
     """
     shown = dataset["quantity"].values[:_COLUMNS].tolist()
     table = Table(box=None, pad_edge=False, collapse_padding=True)

@@ -225,7 +225,7 @@ def _problem(outcomes: Mapping[str, Outcome], number: Mapping[str, int], log: Pa
 @click.command()
 @click.argument("study", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the measurements. [default: trade in the results]")
-@quantity("--accuracy", "PART", "Wanted relative error.", default="1%", show_default=True)
+@quantity("--accuracy", "PART", "Target relative error.", default="1%", show_default=True)
 @click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction]")
 @quantity("--budget", "TIME", "Total wall time of all runs.", default="5 min", show_default=True)
 @QUIET

@@ -127,7 +127,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     if share:
         advice = (
             f"crop to the largest part without holes, {h.shape[0]} x {h.shape[1]} points (the findings below refer to "
-            'it); or keep the whole scan with missing = "absent" if there is no material in the holes'
+            'it); or keep the whole scan with missing = "absent" if the holes contain no material'
         )
         advice = advice if limits else "too small to crop; fill them with the other missing points"
         seen = f"{_percent(share)} of the scan lies in holes wider than a few points"
@@ -176,7 +176,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     seen, advice = f"a quadratic form accounts for {_percent(form)} of Sq squared", ""
     if curved:
         seen += f"; Sq is {_length(flat)} without it"
-        advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" to press the form as well'
+        advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
     found.append(Finding("Form", seen, advice, {"share": form, "rms_without": flat}))
 
     if steps["level"] == 1 and not doubtful:  # these steps are already done
@@ -224,8 +224,8 @@ def _of_the_heights(slope: float, kurtosis: float) -> Iterator[Finding]:
     low, high = _GAUSSIAN
     seen, advice = f"their kurtosis is {kurtosis:.2g} (3: Gaussian)", ""
     if kurtosis < low or kurtosis > high:
-        why = "plateaus, or few long waves" if kurtosis < low else "summits or pits that stand out"
-        seen += f": {why}; the spectrum alone may not give its contact"
+        why = "plateaus, or few long waves" if kurtosis < low else "outlying summits or pits"
+        seen += f": {why}; the spectrum alone may not determine its contact"
         advice = "realisations = 24 in [sweep] compares the scan with random surfaces of the same spectrum"
     yield Finding("Heights", seen, advice, {"kurtosis": kurtosis})
 

@@ -216,7 +216,7 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
             values = np.where(values == one, np.nan, values)
             complaints.append(
                 f"{count} points have the height {one:g} and all others lie within {rest.min():g} to {rest.max():g}: "
-                f"taken as missing; no_data = {one:g} states so, and any other number keeps them"
+                f"taken as missing; no_data = {one:g} confirms this, any other number keeps these heights"
             )
     return values
 

@@ -147,7 +147,7 @@ def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Scan
     given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
     own = {"card", "toml", *_OWN, *(suffix for theirs, _ in _OWN.values() for suffix in theirs)}
     if taken := own & {format, *given}:
-        raise InputError(f"format {format!r}: found {', '.join(sorted(taken))} of roughvisc itself: expected others")
+        raise InputError(f"format {format!r}: found {', '.join(sorted(taken))}, used by roughvisc: expected others")
     _ADDED[format] = given, read
 
 
@@ -223,7 +223,7 @@ def forget(error: BaseException | None) -> None:
 
 
 def affordable(path: Path, points: int, expansion: float = EXPANSION) -> None:
-    """Refuse a header that claims more points than the file can hold, before they are allocated."""
+    """Reject a header that claims more points than the file can hold, before they are allocated."""
     held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
