@@ -49,9 +49,9 @@ _QUESTIONS: dict[str, tuple[str, Any]] = {
 
 
 def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
-    """Open a scan; ask once for a unit and a spacing that the file lacks, if a person sits at the terminal.
+    """Open a scan; on a terminal, ask once for a unit and a spacing that the file lacks.
 
-    The answers are added to the options, whose spacing is converted to metres.
+    The answers are added to the options, with the spacing in metres.
     """
     from roughvisc.units import in_si
 
@@ -145,9 +145,9 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
 def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> None:
     """Write a first study for a scan, or for an example.
 
-    The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends
-    and presses the scan on a rubber, at a pressure that brings the part --contact of the area into contact. FILE is an
-    instrument file or a surface card. Without FILE, the command also writes an example scan, focus_variation.x3p.
+    The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends.
+    The scan is pressed on a rubber until the part --contact of its area touches. FILE is an instrument file or a
+    surface card. Without FILE, the command also writes an example scan, focus_variation.x3p.
 
     \b
     Example:

@@ -45,9 +45,9 @@ _SHOWN = 5
 def plan(study: Path, out: Path | None, workers: int | None) -> None:
     """Show the model and the cost of a study.
 
-    Writes nothing. Contact area and numbers of steps and FFTs are estimated by a run on at most 128 x 128 cells, and
-    the time by a convolution timed on this machine. The exit status is 2 if the study does not fit into memory or on
-    the disk.
+    Writes nothing. A run on at most 128 x 128 cells estimates the contact area and the numbers of steps and FFTs. A
+    convolution timed on this machine gives the wall time. The exit status is 2 if the study does not fit into memory or
+    on the disk.
 
     \b
     Example:

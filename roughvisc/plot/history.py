@@ -140,7 +140,7 @@ def _draw_history(ax: Axes, steps: xr.Dataset, kept: xr.Dataset, name: str, over
 @style.apply
 @quantities(contact_modulus="Pa")
 def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
-    r"""Contact area, corrected for the grid, against force at every time step, one line per case.
+    r"""Draw the contact area, corrected for the grid, against the force at every time step, one line per case.
 
     Parameters
     ----------

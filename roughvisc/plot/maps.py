@@ -190,8 +190,8 @@ def frame_title(dataset: xr.Dataset, frame: int) -> str:
 def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
     """Draw maps of fields at some times or speeds, with one colour scale for each field.
 
-    Cells without contact are light blue on a map of the pressure, cells in contact are orange on maps of the gap and
-    of the flux; on a map of the displacement the contact has an outline. Above 1024 cells a side, one drawn cell
+    Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
+    the flux. On a map of the displacement the contact has an outline. Above 1024 cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
     of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. Only
     the measured part of a mirrored surface is drawn. For friction, an arrow shows the direction of motion of the

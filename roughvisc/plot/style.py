@@ -109,7 +109,7 @@ def is_logarithmic(values: Any) -> bool:
 
 
 def log_axis(axis: Axis, values: Any) -> None:
-    """Make one axis logarithmic, with plain numbers at its ticks over less than three decades."""
+    """Make one axis logarithmic; its ticks have plain numbers if it covers less than three decades."""
     values = np.asarray(values, dtype=float)
     values = values[np.isfinite(values) & (values > 0)]
     (axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale)("log")

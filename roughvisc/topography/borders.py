@@ -75,8 +75,8 @@ def period_of(h: xr.DataArray) -> list[float]:
 def is_periodic(h: xr.DataArray) -> bool:
     """Return whether a surface was generated as periodic and its grid is still one period.
 
-    Attributes survive selection and arithmetic. Therefore the attribute ``period`` counts only if it equals the sides
-    of the grid and the step at the borders is at most four times the difference of neighbouring rows.
+    Attributes survive selection and arithmetic. Therefore the attribute ``period`` counts only under two conditions: it
+    equals the sides of the grid, and the step at the borders is at most four times the difference of neighbouring rows.
 
     Parameters
     ----------

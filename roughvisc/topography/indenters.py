@@ -22,7 +22,7 @@ from roughvisc.units import Quantity, quantities
 
 @quantities(radius="m", size="m")
 def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
-    r"""Spherical indenter, centred, apex at height zero.
+    r"""Return a spherical indenter, centred, with its apex at height zero.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
 
 @quantities(size="m")
 def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
-    """Conical indenter of height ``-slope * r``, centred, apex at height zero.
+    """Return a conical indenter of height ``-slope * r``, centred, with its apex at height zero.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
 
 @quantities(radius="m", size="m")
 def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
-    """Flat-ended cylindrical punch, centred: height zero inside the radius, absent (NaN) outside.
+    """Return a flat-ended cylindrical punch, centred: height zero inside the radius, absent (NaN) outside.
 
     Parameters
     ----------

@@ -63,8 +63,8 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
 def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
     """Return the mean height of the points in each square cell, and the number of cells without a point.
 
-    Cells without a point are missing. If there are fewer points than cells, the heights of all cells are interpolated
-    linearly over triangles of points instead, and cells outside the triangles are missing.
+    Cells without a point are missing. If there are fewer points than cells, all heights are instead interpolated
+    linearly over triangles of points. Cells outside the triangles are then missing.
 
     Parameters
     ----------

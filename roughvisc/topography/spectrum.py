@@ -76,7 +76,7 @@ def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
-    r"""Radially averaged power spectral density.
+    r"""Compute the radially averaged power spectral density.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from roughvisc.units import Quantity, quantities
 
 @quantities(amplitude="m", wavelength="m", size="m")
 def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves: Literal[1, 2] = 2) -> xr.DataArray:
-    r"""Regular waves, periodic over the domain, with a crest at the corner ``x = y = 0``.
+    r"""Return regular waves, periodic over the domain, with a crest at the corner ``x = y = 0``.
 
     Parameters
     ----------

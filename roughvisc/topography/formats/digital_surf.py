@@ -18,8 +18,8 @@ _HEADER, _SIZES = 512, 334
 def read_digital_surf(path: Path) -> ScanFile:
     """Read a Digital Surf file, compressed or not.
 
-    In a compressed file, the comment and the private zone are followed by the number of streams, the raw and the
-    compressed size of each stream, and the zlib streams.
+    A compressed file holds, after the comment and the private zone: the number of streams, the raw and the compressed
+    size of each stream, and the zlib streams.
     """
     with path.open("rb") as stream:
         if stream.read(len(_COMPRESSED)) != _COMPRESSED:

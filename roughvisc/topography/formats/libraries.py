@@ -68,7 +68,7 @@ def read_sdf(path: Path) -> ScanFile:
 
 
 def read_npy(path: Path) -> ScanFile:
-    """Read a NumPy array, whose rows run along x."""
+    """Read a NumPy array with rows along x."""
     heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
     kind = "height" if heights.ndim == 2 and heights.dtype.kind in "fiu" else "no areal height"
     return ScanFile(

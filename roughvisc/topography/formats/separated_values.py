@@ -124,7 +124,7 @@ def _values(line: str) -> tuple[str, list[str]]:
 
 
 def _is_row(line: str, separator: str, values: list[str]) -> bool:
-    """Return whether a line is a row of a matrix: at least two values, all numbers or missing, and one number."""
+    """Return whether a line is a row of a matrix: two or more values, each a number or missing, not all missing."""
     if len(values) < 2 or _ROW[separator].fullmatch(line):
         return len(values) > 1
     known = [value for value in values if value != "nan"]
