@@ -1,7 +1,7 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
-``import roughvisc as rv`` gives the public names that ``__init__.pyi`` lists. Each is imported from its module when it
-is first used, so that importing the package is quick.
+``__init__.pyi`` lists the public names of ``import roughvisc as rv``. Each name is imported from its module at its
+first use, so that importing the package is quick.
 """
 
 from __future__ import annotations

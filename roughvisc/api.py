@@ -18,7 +18,7 @@ from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import solve
-from roughvisc.study import storage as storage  # ds.roughvisc is there wherever results are
+from roughvisc.study import storage as storage  # registers ds.roughvisc
 from roughvisc.units import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -43,14 +43,14 @@ def simulate(
     threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
-    """Press a rigid profile on a linear viscoelastic body: a half-space, a sheet, or one of your own.
+    """Press a rigid profile on a linear viscoelastic body: a half-space, a sheet, or a body with the user's kernel.
 
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y)
-        Profile, peaks up, with cell-centre coordinates; or a Dataset that holds it as ``height``. A unit of length
-        that heights or coordinates state is converted; without one they are metres. The undeformed gap is
-        ``max(height) - height``; an indenter's counts from its apex, wherever that lies between the cells. [m]
+        Profile, peaks up, with cell-centre coordinates; or a Dataset with the profile as ``height``. A stated unit of
+        length of heights or coordinates is converted; without a unit they are metres. The undeformed gap is
+        ``max(height) - height``; for an indenter it is measured from the apex, which may lie between cells. [m]
     material : Material
         Material of a half-space, such as from :func:`roughvisc.zener` or :func:`roughvisc.creep`; or a body, such as
         from :func:`roughvisc.sheet`. With periodic boundaries and a Poisson ratio below 0.5, the approach on a sheet
@@ -68,8 +68,8 @@ def simulate(
         time steps, contact solver and exponential series, over the largest force and approach of the kept rows so far.
         If rows exceed it, a ``UserWarning`` and the attribute ``warnings`` count them. The grid error is not included.
     times : int or sequence of float or str, optional
-        Output times, reached exactly: a number of times (the corners of the program, and the others where the result
-        changes most); a list; or None for all corners and every accepted step that meets the tolerance. [s]
+        Output times, reached exactly: a number of times, which are the corners of the program and times at which the
+        result changes most; a list; or None for all corners and every accepted step that meets the tolerance. [s]
     fields : sequence of str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}
@@ -80,7 +80,7 @@ def simulate(
     grid_error : "auto" or bool
         Whether to estimate the grid error from one more run, on cells twice as long: ``grid_error``,
         ``grid_error_area`` and others at the output times. ``auto``: from 256 x 256 to 512 x 512
-        cells, if the pressure is kept; the run takes at most a third of the time there.
+        cells, if the pressure is kept; then this run takes at most a third of the time of the first.
     numerics : Numerics
         Settings that are rarely changed: length of the time steps, device.
     threads : int, optional

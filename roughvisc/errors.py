@@ -98,7 +98,7 @@ def short_repr(value: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text with control characters spelt out, so that it cannot steer a terminal.
+    """Return a text with escaped control characters, so that it cannot control a terminal.
 
     Examples
     --------

@@ -30,7 +30,7 @@ _CARRIED = "roughvisc_steps"
 
 
 def heading(name: str, unit: str) -> str:
-    """Heading of a column: the name and, in brackets, the unit if there is one.
+    """Return the heading of a column: the name, followed by any unit in brackets.
 
     Examples
     --------
@@ -60,7 +60,7 @@ def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) ->
 
     Notes
     -----
-    Values after the last row of a case are missing, if the cases have rows of their own.
+    If the cases have different rows, values after the last row of a case are missing.
     """
     if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())

@@ -1,4 +1,4 @@
-"""Packages whose public names are imported from their modules when they are first used, as their stubs list them."""
+"""Lazy packages: each public name, listed in the stub of the package, is imported at its first use."""
 
 from __future__ import annotations
 

@@ -17,13 +17,13 @@ from roughvisc.errors import InputError
 from roughvisc.units import in_si, number
 from roughvisc.variables import FIELDS
 
-#: ``auto`` becomes one of the others by :func:`known_boundary`
+#: :func:`known_boundary` resolves ``auto`` to one of the other values.
 Boundary = Literal["auto", "free", "periodic", "mirror"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
 Device = Literal["cpu", "gpu"]
 
-#: Settings whose values are words.
+#: Valid words of each setting.
 WORDS: dict[str, tuple[str, ...]] = {
     "boundary": get_args(Boundary),
     "missing": get_args(Missing),

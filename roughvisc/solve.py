@@ -92,7 +92,7 @@ class Recorder:
         self._arrays.append(arrays)
 
     def update(self, reached: Checkpoint) -> None:
-        """Record the progress, from which a stopped solve can continue. Rows in memory need no state."""
+        """Record the progress, from which a stopped solve can continue. A solve in memory keeps no state."""
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""

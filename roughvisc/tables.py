@@ -22,7 +22,7 @@ from roughvisc.units import quantity
 FREQUENCY_UNITS = ("rad/s", "Hz")
 _BLANKS = " '\u00a0\u202f"
 _REMOVE_BLANKS = str.maketrans("", "", _BLANKS)
-#: Decimal mark -> numbers with this mark, whose digits the other mark, a blank or an apostrophe may group by threes.
+#: Decimal mark -> pattern of numbers; the other mark, a blank or an apostrophe may separate groups of three digits.
 _NUMBER = {
     mark: re.compile(
         rf"[+-]?((\d+|[1-9]\d{{0,2}}(\{other}\d{{3}})+|[1-9]\d{{0,2}}([{_BLANKS}]\d{{3}})+)(\{mark}\d*)?|\{mark}\d+)"
@@ -30,11 +30,11 @@ _NUMBER = {
     )
     for mark, other in (".,", ",.")
 }
-#: A number in a file whose separator is a blank, so that only no-break blanks and apostrophes group digits.
+#: Pattern of numbers if the separator is a blank: only no-break blanks and apostrophes separate groups of digits.
 _BETWEEN_BLANKS = re.compile(r"[+-]?((\d+|[1-9]\d{0,2}(['\u00a0\u202f]\d{3})+)(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
 #: ``name [unit]`` or ``name (unit)``. A unit in square brackets may have parentheses, as in ``1/(Pa s)``.
 _HEADING = re.compile(r"(?P<name>.*?)\s*(\[\s*(?P<square>[^\[\]]*?)\s*\]|\(\s*(?P<round>[^()]*?)\s*\))")
-#: The same in a file whose separator is a blank.
+#: The same pattern if the separator is a blank.
 _HEADING_BETWEEN_BLANKS = re.compile(r"[^ \t\[(]+(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))?")
 #: Number of rows in which the heading is sought.
 _FIRST = 200
@@ -54,7 +54,7 @@ def read_text(path: Path) -> str:
     OSError
         If the file cannot be read.
     UnicodeError
-        If the file holds zero bytes, as binary files do and UTF-16 without a byte-order mark.
+        If the file contains zero bytes, such as a binary file or UTF-16 without a byte-order mark.
     """
     raw = path.read_bytes()
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -126,7 +126,7 @@ def plain_number(cell: str, mark: str) -> str | None:
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """Split the heading of a column into its name and its unit, which is empty if there is none.
+    """Split the heading of a column into its name and its unit; a missing unit is empty.
 
     Examples
     --------

@@ -311,7 +311,7 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
             float(_registry().Quantity(one, given).to(expected).magnitude) if same_kind else math.nan
             for one in (value, 0.0)
         )
-    # the last three of a unit called nan, of one to the power 0, of letters that no name in Python may have
+    # pint raises the last three for a unit called nan, a unit to the power 0, and letters that are invalid in names
     except (PintError, ValueError, KeyError, AssertionError) as error:
         raise ValueError(f"in an unknown unit {found!r}") from error
     angle = expected.dimensionless and any(name in _ANGLES for name in names)
@@ -371,7 +371,7 @@ class Unit:
         return f"{name} [{self.symbol}]" if self.symbol else name
 
     def text(self, value: float, digits: int = 3) -> str:
-        """One value [SI] with its unit, as read in running text."""
+        """Return one value [SI] with its unit as text, for sentences."""
         shown = float(value) / self.factor
         if 1e3 <= abs(shown) < 1e6:  # not 5e+03
             return f"{shown:.0f} {self.symbol}".rstrip()
@@ -384,7 +384,7 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
     Parameters
     ----------
     values : array_like
-        Values of one axis; missing and infinite ones are ignored. [SI]
+        Values of one axis; missing and infinite values are ignored. [SI]
     si : str
         Their unit as the vocabulary writes it: ``"m"``, ``"Pa"``, ``"Pa s"``, ``"m^2"``, ``"N/m"``,
         ``"s"``, ``"1"``, ``"1/Pa"``.

@@ -478,7 +478,7 @@ ERRORS = {
 
 
 def variables_in_table(which: Literal["last", "largest"]) -> list[str]:
-    """Return the variables whose value in the last row, or largest value, is a column in the table of a sweep."""
+    """Return the variables with a column for their last, or their largest, value in the table of a sweep."""
     return [name for name, one in VARIABLES.items() if one.in_table == which]
 
 

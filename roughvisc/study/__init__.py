@@ -1,1 +1,1 @@
-"""Cases, their execution and their results: one case gives one Dataset, many cases a folder of files."""
+"""Cases, their execution and their results: one Dataset for one case, a folder of files for many cases."""

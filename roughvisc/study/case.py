@@ -192,7 +192,7 @@ class Case:
             problem = error
         try:
             now = _checksums(self.surface)
-        except InputError:  # a file is gone
+        except InputError:  # a file was removed
             now = []
         if now != before:
             where = f"{self.origin}: surface" if self.origin else "surface"
@@ -329,7 +329,7 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
 def _changed(
     data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, drawn: Mapping[str, int] | None = None
 ) -> Case:
-    """Return the case of some tables with changed values, one of which is the number of its realisation."""
+    """Return the case of some tables after changes; `drawn` contains the number of a realisation."""
     for key, value in changes.items():
         data = place(data, key, value)
     case = _case_of(data, origin, origin.parent if origin else None)

@@ -50,8 +50,8 @@ _CHANGE = 1.1
 ORDER = 1.5
 GRID_FACTOR = 3 / (2**ORDER - 1)
 #: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
-#: Student's factor is 2.57. The factor is larger, because all have the spectrum of one patch, whose longest waves are
-#: a sample, too.
+#: Student's factor is 2.57. A larger factor is used, because all patches have the spectrum of one patch, whose longest
+#: waves vary from patch to patch.
 _PATCHES, _SAMPLE_FACTOR = 6, 3.3
 #: Largest ratio of the wavelength above which 99 % of the slope lie to the shortest wavelength of the spectrum.
 _SAME = 1.15

@@ -164,7 +164,7 @@ def plan(
         row: dict[str, Any] = {name: np.nan if unit else "" for name, (unit, _) in COLUMNS.items()}
         row |= {"boundary": case.settings.boundary, "marched": is_own} | dict.fromkeys(_CELLS, 0)
         rows.append(row)
-        # surfaces that differ by their seed alone cost the same
+        # surfaces that differ only in their seed have equal costs
         surface = json.dumps({**stated[number]["surface"], "seed": None}, sort_keys=True)
         try:
             if surface not in surfaces:
@@ -353,7 +353,7 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
 
 
 def with_coarse_slides(program: Program, sides: tuple[float, float]) -> Program:
-    """Return the program with slides of one to some coarse cells at unchanged speed."""
+    """Return the program with the length of slides limited to 1 to `_MOST_SLID` coarse cells, at unchanged speed."""
     segments = []
     for segment in program.segments:
         if segment.slide is not None:

@@ -59,7 +59,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     :math:`m + s^2/2 \pm t \sqrt{s^2/n + s^4/(2(n-1))}` [1]_. It contains the mean of log-normal values in 92 to 95 of
     100 samples of 4 or more values with :math:`s \le 1.2`. The interval of a patch is
     :math:`m \pm t s \sqrt{1 + 1/n}`. For values of both signs Student's intervals of the values themselves are
-    returned. There is no interval for fewer than two values, or for a quantity that is never negative and is zero in
+    returned. Intervals are missing for fewer than two values, and for a quantity that is never negative and is zero in
     some realisations, such as the leak rate of a closed gap.
 
     References

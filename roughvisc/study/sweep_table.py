@@ -68,7 +68,7 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
     ----------
     sweep : dict or list of dict
         ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
-        table. A single value of ``[[sweep]]`` holds for its whole table.
+        table. A single value in ``[[sweep]]`` applies to its whole table.
 
     Examples
     --------

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 #: First and smallest tolerance over the target; largest and smallest tolerance of all.
 _PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
-#: Level of the finest grid, whose cells are ``2**-2`` times as long as the study's; fewest cells a side of any grid.
+#: Level of the finest grid: its cells are ``2**-2`` times as long as in the study. Fewest cells a side of any grid.
 _FINEST, _FEWEST = -2, 12
 #: Accepted ratio of an error to the target, since messages round both.
 _ROUNDING = 1.005

@@ -39,7 +39,7 @@ class ResultAccessor:
 
     @property
     def steps(self) -> xr.Dataset:
-        """Histories of every accepted step, over ``step``; read from the file if xarray alone has opened it."""
+        """Histories of every accepted step, over ``step``; read from the file if xarray's own functions opened it."""
         dataset, source = self._dataset, Path(self._dataset.encoding.get("source", ""))
         if steps_of(dataset) is None and source.is_file():
             steps = steps_of(import_module(_NETCDF).open_result(source))

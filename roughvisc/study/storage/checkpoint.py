@@ -1,4 +1,4 @@
-"""Checkpoints: the state of an unfinished run, from which it continues to the same last bit.
+"""Checkpoints: the state of an unfinished run. A resumed run has the same bits as an uninterrupted run.
 
 ``rows-0000.npz`` and so on contain rows and never change. ``state.npz`` states the number of rows in each file. Files
 are written under another name and renamed, and zip has a checksum for each array. Therefore a crash does not damage the
@@ -173,7 +173,7 @@ class CheckpointWriter(Recorder):
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def close(self) -> None:
-        """Close the files, and remove them if there is no checkpoint."""
+        """Close the files, and remove them unless a checkpoint exists."""
         self._files.close()
         if not (self._folder / STATE).exists():
             self.remove()

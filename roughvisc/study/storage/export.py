@@ -49,7 +49,7 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
         if meanings := VARIABLES[name].meanings if name in VARIABLES else ():
             table[name] = [meanings[value] for value in table[name]]
     headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
-    settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # the same on every system
+    settings = {"index_label": headings[0], "lineterminator": "\r\n"}  # equal files on every system
     with atomic_write(path) as temporary:
         table.to_csv(temporary, header=headings[1:], compression=None, **settings)
     return Path(path)
