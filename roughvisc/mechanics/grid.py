@@ -2,12 +2,11 @@
 
 Three boundaries:
 
-- ``free``: nothing is loaded outside the grid. Zeros beyond the cells make the convolution linear.
+- ``free``: the surface outside the grid carries no pressure. Zero padding makes the convolution linear.
 - ``periodic``: the grid is one period of an endless surface.
 - ``mirror``: the surface and its mirror images repeat. Cosine transforms (type 2) need the cells of the surface only.
 
-Displacement is per unit contact compliance ``C = 1/E*``. Fields are arrays of NumPy, or of CuPy on a grid with ``xp``
-CuPy.
+Displacements are per unit contact compliance ``C = 1/E*``. Fields are arrays of NumPy, or of CuPy if ``xp`` is CuPy.
 """
 
 from __future__ import annotations
@@ -121,7 +120,7 @@ class Grid:
     symbol : array
         Transform of the kernel at non-negative wave numbers. [m]
     definite : bool
-        Whether a uniform pressure displaces the surface too.
+        Whether a uniform pressure displaces the surface.
     convolutions : int
         Number of convolutions so far, applications of the inverse included.
 
@@ -203,11 +202,11 @@ class Grid:
         return self._distinct(np.asarray(kernel.transfer(*waves), dtype=float))
 
     def _periodic_symbol(self) -> np.ndarray:
-        """Return the transform of the kernel on the cells themselves, checked to be positive. [m]"""
+        """Return the transform of the periodic kernel on the cells; it must be positive. [m]"""
         return self._distinct(periodic_symbol(self.kernel, self.period, self.spacing))
 
     def _distinct(self, symbol: np.ndarray) -> np.ndarray:
-        """Leave out the waves that change sign at every cell of a mirrored surface: their cosines vanish there."""
+        """Return a symbol without the shortest wave of a mirrored surface along each axis, which is zero at cells."""
         return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
@@ -215,8 +214,8 @@ class Grid:
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement under a pressure, per unit contact compliance: one convolution. [m]
 
-        In the precision of the pressure. Under periodic and mirror boundaries the mean displacement of a half-space is
-        zero.
+        The result has the precision of the pressure. Under periodic and mirror boundaries the mean displacement of a
+        half-space is zero.
         """
         self.convolutions += 1
         symbol = self._single_symbol if pressure.dtype == np.float32 else self.symbol
@@ -231,7 +230,7 @@ class Grid:
         Parameters
         ----------
         displacement : array of float32, shape (nx, ny)
-            Of ordinary size: single precision underflows. [m]
+            Displacement, scaled to about one, because single precision underflows. [m]
         """
         self.convolutions += 1
         return self._convolved(displacement, self._inverse_symbol, self.shape)

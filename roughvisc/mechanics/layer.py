@@ -66,7 +66,7 @@ _NEAR_CELLS, _GAUSS_POINTS = 12.0, 4
 _DISTANCES = 400
 # Ages at which compliances are compared, the first at which all are known and none is zero or infinite. [s]
 _AGES = (math.inf, 0.0, 1.0, 1e-3, 1e-6)
-# Compliances that differ by no more, relative, are in proportion.
+# Largest relative difference of compliances that are in proportion.
 _ROUNDING = 1e-12
 
 
@@ -76,7 +76,7 @@ _ROUNDING = 1e-12
 def effective_compliance(
     q: ArrayLike, thicknesses: Sequence[float], poissons: Sequence[float], shear_compliances: Sequence[ArrayLike]
 ) -> NDArray[Any]:
-    r"""Return the contact compliance of the half-space that responds to a wave of pressure as a layered body does.
+    r"""Return the contact compliance of a half-space with the same response to a wave of pressure as a layered body.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ def effective_compliance(
     poissons : sequence of float
         Poisson's ratios of the layers and of the half-space below them.
     shear_compliances : sequence of array_like
-        Shear compliances of the same, one more than there are layers: real, or complex if pressure oscillates. They
-        broadcast with the wave numbers. [1/Pa]
+        Shear compliances of the layers and of the half-space: real, or complex if pressure oscillates. They broadcast
+        with the wave numbers. [1/Pa]
 
     Returns
     -------
@@ -97,8 +97,8 @@ def effective_compliance(
 
     Notes
     -----
-    In a layer of shear modulus ``G`` the field of a wave is a sum of two that decay with the depth ``z`` and two that
-    grow. With ``s = q z`` and ``k = 3 - 4 nu`` they are
+    In a layer of shear modulus ``G`` the field of a wave is a sum of two terms that decay with the depth ``z`` and two
+    that grow. With ``s = q z`` and ``k = 3 - 4 nu`` the decaying terms are
 
     .. math::
         \begin{aligned}
@@ -106,9 +106,9 @@ def effective_compliance(
         \sigma_{zz} &= -2 G q (A + B (2 - 2\nu + s)) e^{-s}, & \sigma_{xz} &= -2 G q (A + B (1 - 2\nu + s)) e^{-s}
         \end{aligned}
 
-    and the same with the other sign of ``s``, of ``W`` and of the shear stress. The material below reflects the first
-    two into the others, which return to the top reduced by :math:`e^{-2 q h}`. Nothing grows in the computation: it is
-    stable for any thickness.
+    The growing terms are the same with the other sign of ``s``, of ``W`` and of the shear stress. The material below
+    reflects the decaying terms into the growing ones, which return to the top reduced by :math:`e^{-2 q h}`. The
+    computation contains decaying exponentials only and is stable for any thickness.
 
     References
     ----------
@@ -142,7 +142,7 @@ def effective_compliance(
 
 
 def _partial_waves(poisson: float) -> tuple[Array, Array, Array, Array]:
-    """Return displacement ``(U, W)`` and traction over ``2 q`` of unit waves that decay, and of those that grow."""
+    """Return displacement ``(U, W)`` and traction over ``2 q`` of unit waves: decaying ones, then growing ones."""
     k, b, c = 3 - 4 * poisson, 1 - 2 * poisson, 2 - 2 * poisson
     down, down_stress = np.array([[1, 0], [1, k]]), -np.array([[1, b], [1, c]])
     turned = np.array([[1, -1], [-1, 1]])
@@ -179,7 +179,7 @@ class Layers:
     def at_once(self, q: Array) -> Array:
         """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
         shear = [one.glassy for one in self.materials]
-        rigid = shear.index(0.0) if 0.0 in shear else len(shear) - 1  # nothing below a rigid layer matters
+        rigid = shear.index(0.0) if 0.0 in shear else len(shear) - 1  # layers below a rigid one have no influence
         if rigid == 0:
             return 0 * q
         thicknesses, poissons = self.thicknesses[:rigid], self.poissons[: rigid + 1]
@@ -262,7 +262,7 @@ class LayerKernel(Kernel):
     scale: tuple[float, ...]
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """Return ``2 C(|q|) / |q|``; zero at ``q = 0``, as of a half-space. [m]"""
+        """Return ``2 C(|q|) / |q|``; zero at ``q = 0``, as for a half-space. [m]"""
         q = np.asarray(np.hypot(qx, qy), dtype=float)
         acts = q > 0
         q = np.where(acts, q, 1.0)
@@ -332,7 +332,7 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
 
 @dataclass(frozen=True, eq=False)
 class LayerSeries:
-    """Effective contact compliance of the waves of a layered body, as exponentials with times that all waves share.
+    """Effective contact compliance of the waves of a layered body: exponentials with the same times for all waves.
 
     Attributes
     ----------
@@ -361,7 +361,7 @@ class LayerSeries:
     error: float
 
     def kernel(self, weights: ArrayLike = (), at_once: float = 1.0) -> LayerKernel:
-        """Return the kernel of ``C_0`` times a number plus the sum of the terms times weights (default: none)."""
+        """Return the kernel of ``C_0`` times a number plus the weighted sum of the terms. Default: without terms."""
         weights = np.asarray(weights, dtype=float)
         final = self.at_once + self.crept(self.duration) @ self.compliances
         if not weights.any():
@@ -388,7 +388,7 @@ class LayerSeries:
         return Prony(4.0 * float(at_once[wave]), fluidity, tuple(own[: len(self.times)].tolist()), self.times)
 
     def crept(self, t: float) -> Array:
-        """Return ``1 - exp(-t / tau_m)`` of the terms, and the time itself of a fluidity. [s]"""
+        """Return ``1 - exp(-t / tau_m)`` for each term, and the time itself for a fluidity. [s]"""
         retarded = -np.expm1(-t / np.array(self.times)) if self.times else np.zeros(0)
         return np.append(retarded, t) if self.flows else retarded
 
@@ -410,7 +410,7 @@ def layer_series(layers: Layers, shortest: float, duration: float, tolerance: fl
     shortest, duration : float
         Ages between which the compliance is needed, besides zero; without a duration the series has no terms. [s]
     tolerance : float
-        Relative error. The series states the error that it reached, which may be larger.
+        Relative error. The error of the series may be larger; it is an attribute of the series.
 
     Notes
     -----

@@ -1,6 +1,6 @@
 """Memory of a layered body, in which space and time do not separate.
 
-Each wave creeps in its own way, and all waves share the times of the exponentials:
+The creep depends on the wave, with the same times of the exponentials for all waves:
 
     C(q, t) = C_0(q) + fluidity(q) t + sum_m C_m(q) (1 - exp(-t/tau_m)).
 
@@ -60,7 +60,7 @@ class LayerMemory(Memory):
         return [self.grid.xp.asarray(self.grid.symbol_of(kernel)) for kernel in kernels]
 
     def remaining(self, time: float) -> float:
-        """Return one: each wave fades in its own way."""
+        """Return one: a common rate of decay does not exist."""
         return 1.0
 
     def kept(self, unit: Array, pressure: Array) -> Array:
@@ -88,7 +88,7 @@ class LayerMemory(Memory):
         return Prediction(float(symbol.any()), self.grid.field_of(carried), modes, new, step, answering)
 
     def unit(self, history: History) -> None:
-        """Return nothing: the steps have no common kernel."""
+        """Return None: the kernel differs between steps."""
         return
 
     def roll(self, history: History, cells: int, axis: int) -> History:
@@ -116,7 +116,7 @@ def check_convergence(body: LayeredBody, scene: Scene) -> None:
         If a contact does not converge.
     """
     program, memory = scene.program, scene.memory
-    parts = _TRIED if program.duration > 0 else _TRIED[:1]  # jumps pass no smaller loads
+    parts = _TRIED if program.duration > 0 else _TRIED[:1]  # a jump passes through no smaller loads
     kernels: list[tuple[Any, float]] = [(body.kernel, float(memory.series.contact_compliance(program.duration)))]
     if isinstance(memory, LayerMemory):
         kernels = [(memory.waves.kernel(), 1.0), (memory.waves.kernel(memory.waves.crept(program.duration)), 1.0)]

@@ -1,4 +1,4 @@
-"""The instantaneous contact state: an elastic contact problem under given load or given approach."""
+"""Solver of the elastic contact problem of one instant, under a given load or approach."""
 
 from roughvisc.mechanics.contact.solver import ContactState, solve_contact
 

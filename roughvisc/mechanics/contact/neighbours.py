@@ -72,7 +72,7 @@ def contact_area(
     contact, free : ndarray of bool, shape (nx, ny)
         Contact cells, and cells with material out of contact.
     cell_area : float
-        [m2]
+        Area of a cell. [m2]
     periodic, before, beyond
         See :func:`neighbours`.
     """

@@ -7,15 +7,15 @@ pressure is divided by the contact modulus, and the history of a viscoelastic ma
 The method is constrained conjugate gradients on an evolving contact area [1]_. It differs from the printed algorithm:
 
 1. The residual is preconditioned by the inverse of the periodic kernel, so that the number of iterations grows slowly
-   with the grid. The direction is conjugate to the step that was taken, also if that step was cut at zero pressure.
+   with the grid. The direction is conjugate to the last step taken, even if that step was cut at zero pressure.
 2. A step is cut at zero pressure first. One convolution then gives the minimum along it and the new displacement.
 3. The iteration stops at the estimated error of the pressure, not at the change of the pressure, which can stall.
 4. A step that does not descend is shortened, and finally replaced by a projected-gradient step, which always descends.
    A projected-gradient step is also taken if the duality gap has not halved in 30 iterations.
 5. Without a first guess, under a load and from 256 cells a side, the contact is solved on half the cells first.
-6. From 768 cells a side a second level of the preconditioner serves contact in many small spots.
+6. From 768 cells a side the preconditioner has a second level for contact in many small spots.
 7. Far from the solution, steps are convolved in single precision and added to the displacement in double. Before the
-   solution is accepted, its displacement is computed in double precision and judged again.
+   solution is accepted, its displacement is computed in double precision and its error estimated again.
 8. Under periodic boundaries a uniform pressure does not displace a half-space. A given approach therefore needs a
    separate check of the load near full contact.
 
@@ -37,7 +37,7 @@ from roughvisc.mechanics.grid import Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
 
-#: A step is at most this many times its trial: the periodic kernel does not resist a uniform pressure.
+#: Largest ratio of a step to its trial: the periodic kernel does not resist a uniform pressure.
 LONGEST_STEP = 30.0
 #: Change of the step length from one iteration to the next: smallest, largest, and largest after a cut step.
 SHRINK, GROW, GROW_AFTER_CUT = 0.3, 3.0, 1.3
@@ -58,11 +58,11 @@ CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
 SINGLE_FROM, FAR = 96**2, 30.0
 #: Rounding of a displacement, relative to its largest value.
 ROUNDING = 8 * float(np.finfo(float).eps)
-#: Distance to the approach of full contact, over the approach, below which no load is searched for.
+#: Distance to the approach of full contact, over the approach, below which the load is undetermined.
 NEAREST_TO_FULL = 1e-12
 #: Distance to the approach of full contact, over the approach, below which the mean gap needs separate weights.
 NEARLY_FULL = 1e-3
-#: Cells a side from which a cold start is solved on half as many first, and the tolerance there.
+#: Number of cells a side from which a problem without a first guess is solved on half as many first; tolerance there.
 COARSE_FROM, COARSE_TOLERANCE = 256, 0.03
 
 
@@ -83,7 +83,7 @@ class ContactState(NamedTuple):
         Estimated relative error of the pressure, ``sum |p - p*| / sum p*`` with the exact ``p*`` on this grid.
     bound : float
         Bound on the relative error of the pressure in the energy norm, ``sqrt(2 G / p.Kp)`` with the duality gap ``G``.
-        Under a given approach to first order only.
+        Under a given approach it holds to first order only.
     approach_error : float
         Duality gap over the load: error of the approach under a given load. [m]
     iterations, convolutions : int
@@ -131,7 +131,7 @@ def solve_contact(
     start_displacement : array, shape (nx, ny), optional
         Displacement under `start`, if known to 1e-6 or so; saves a convolution. [m]
     overwrite : bool
-        Whether `gap` and both of these may be overwritten, which saves the memory of three fields.
+        Whether `gap`, `start` and `start_displacement` may be overwritten, which saves the memory of three fields.
     present : array of bool, shape (nx, ny), optional
         Cells with material. Default: all.
     max_iterations : int
@@ -152,7 +152,7 @@ def solve_contact(
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
         start, start_displacement = coarse_guess(grid, gap, load), None
 
-    # All pressures and lengths over one pressure, lengths from the lowest point on: a load of one, or the approach.
+    # Divide pressures and lengths by one pressure, and measure lengths from the lowest point: the load is then one.
     lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
     overlap = 0.0 if approach is None else approach - lowest_gap
     unit = load if load is not None else (overlap / grid.stiffest if overlap > 0 else 1.0)
@@ -197,7 +197,7 @@ def solve_contact(
     requested_size, requested_duality = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
     length, error, best, stalled, is_single = 1.0, math.inf, math.inf, 0, False
     for iteration in range(max_iterations + 1):
-        # No gap is left under a given approach: the energy falls if all cells carry less.
+        # The gap is closed under a given approach: the energy decreases if all cells carry less.
         if is_blind and contact.size == gap.size:
             pressure -= pressure.min()
             contact, previous = xp.flatnonzero(pressure), None
@@ -222,12 +222,12 @@ def solve_contact(
             duality = abs(weighted - level * total) + total * (level - lowest)
         rounding = ROUNDING * total * (highest + grid.self_influence * largest(held))
 
-        if size == 0 and is_extrapolated:  # as with a single cell: no step would correct the given displacement
+        if size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
             separation = separation_under(pressure)
             is_extrapolated = False
             continue
 
-        # The last requested change of pressure estimates the error, reduced as the duality gap has fallen since.
+        # The error estimate is the last requested change of pressure, scaled by the decrease of the duality gap since.
         if size == 0:
             error = 0.0
         elif iteration:
@@ -240,7 +240,7 @@ def solve_contact(
             break
         if iteration == max_iterations:
             raise ConvergenceError(unsolved(iteration, error, tolerance))
-        if is_solved:  # to be judged again in double precision
+        if is_solved:  # the error is estimated again in double precision
             separation = separation_under(pressure)
             is_single, previous = False, None
             continue
@@ -298,7 +298,7 @@ def solve_contact(
             most = largest(abs(change))
             response = grid.displacement(on_grid((change / most).astype(np.float32), cells)).reshape(-1)
             response *= most
-        elif is_extrapolated:  # replaces the displacement of the first guess, so that its rounding does not pile up
+        elif is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
             response -= separation - given
         else:
@@ -306,7 +306,7 @@ def solve_contact(
         curvature = inner(change, response[cells])
         minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
         fraction, was_cut = admissible_fraction(held, trial, change, minimum)
-        if is_extrapolated and not is_single:  # taken whole: of no other pressure is the displacement known exactly
+        if is_extrapolated and not is_single:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
         if fraction != 1:
@@ -340,7 +340,7 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     """Return the pressure of the same problem on half as many cells a side, on the cells of the grid. [-]"""
     shape = (gap.shape[0] // 2, gap.shape[1] // 2)
     xp, coarse, sides = grid.xp, grid.on(shape), list(zip(gap.shape, shape, strict=True))
-    rows, columns = (-(-xp.arange(m) * n // m) for n, m in sides)  # of an odd number, one is left out
+    rows, columns = (-(-xp.arange(m) * n // m) for n, m in sides)  # an odd number of cells: one is left out
     few = xp.stack([gap[xp.ix_(rows + i, columns + j)] for i in (0, 1) for j in (0, 1)]).mean(axis=0)
     found = solve_contact(coarse, few, load=load * few.size / gap.size, tolerance=COARSE_TOLERANCE)
     grid.convolutions += found.convolutions
@@ -349,7 +349,7 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
 
 
 class Scatter:
-    """A field of zeros that takes the values of some cells, in their precision."""
+    """Field of zeros that receives the values of some cells, in their precision."""
 
     def __init__(self, zeros: Array) -> None:
         self.zeros, self.flat = zeros, zeros.reshape(-1)
@@ -367,7 +367,8 @@ class Scatter:
 def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
     """Return the fraction of a trial to take, and whether the limit of zero pressure cut it.
 
-    A trial that empties cells is taken whole if the energy falls that far, so that these cells leave the contact.
+    A trial that empties cells is taken whole if the energy decreases up to its end, so that these cells leave the
+    contact.
     """
     if bool(((held > 0) & (trial == 0)).any()):
         return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
@@ -380,7 +381,7 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
 
 
 def onto_simplex(values: Array, total: float) -> Array:
-    """Return the nearest non-negative vector of given sum."""
+    """Return the nearest non-negative vector with a given sum."""
     xp, shifted = namespace(values), values - values.max()  # otherwise a small sum is lost next to large values
     ordered = xp.sort(shifted)[::-1]
     excess = (xp.cumsum(ordered) - total) / xp.arange(1, ordered.size + 1)
@@ -411,9 +412,9 @@ def unsolved(iterations: int, error: float, tolerance: float) -> str:
 def opening_pressure(
     grid: Grid, separation: Array, contact: Array, level: float, present: Array | None
 ) -> tuple[Array, Array]:
-    """Return the gap outside the contact over its mean, and about the pressure that opens it.
+    """Return the gap outside the contact over its mean, and approximately the pressure that opens it.
 
-    Zero if no cell is open. Absent cells are as open as the widest gap.
+    Both are zero if no cell is open. Absent cells count as open as the widest gap.
     """
     opening = grid.xp.maximum(separation - level, 0)
     opening.reshape(-1)[contact] = 0
@@ -453,10 +454,10 @@ def level_under_load(
 ) -> float:
     """Return the approach under a load: the separation in the contact, weighted by the pressure.
 
-    Near full contact with periodic boundaries, the mean gap is what counts, and it is far smaller than the
-    displacements. The weight is then about the pressure ``q`` of a flat punch of this outline: an error ``e`` of the
-    pressure moves the level by ``q.Ke``, which vanishes because ``Kq`` is uniform. ``full`` is the approach of full
-    contact.
+    Near full contact with periodic boundaries the mean gap must be accurate, and it is far smaller than the
+    displacements. The weight is then about the pressure ``q`` of a flat punch of the same outline. An error ``e`` of
+    the pressure changes the approach by ``q.Ke``, which vanishes because ``Kq`` is uniform. ``full`` is the approach
+    of full contact.
     """
     weight = pressure[contact]
     if full - level < NEARLY_FULL * full:
@@ -472,22 +473,22 @@ def level_under_load(
 
 # -------------------------------------------------------------------------------- second level of the preconditioner
 
-#: Cells a side from which blocks may pay, and the largest part of free cells. Measured at 512 squared: 3 to 14 % more
-#: time for 10 to 15 % fewer iterations; at 768, 0 to 18 % less time; at 1024, 6 to 30 % less.
+#: Number of cells a side from which blocks may pay, and largest part of free cells for blocks. Measured at 512 squared:
+#: 3 to 14 % more time for 10 to 15 % fewer iterations; at 768, 0 to 18 % less time; at 1024, 6 to 30 % less.
 BLOCKS_FROM, SPARSE = 768, 0.6
 #: Blocks pay if the number of blocks along a side, times the part of the free cells that lies in partly free blocks, is
-#: at least this. Within a contact spot that is wider than a block, they do harm.
+#: at least this. Within a contact spot that is wider than a block, blocks slow the iteration.
 SPOTS = 45.0
 #: Part of the local compliance that is used. The number of iterations is least between 0.5 and 1.
 LOCAL_SHARE = 0.7
-#: Reduction of the residual of the equations of the blocks, and the most iterations.
+#: Reduction of the residual of the equations of the blocks, and largest number of iterations.
 BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 100
 
 
 class LongWaves(NamedTuple):
     """Blocks of about 8 by 8 cells, for the long waves of the residual.
 
-    The inverse of the kernel, restricted to the free cells, is far too large for waves longer than the distance of the
+    The inverse of the kernel, restricted to the free cells, is far too large for waves longer than the distance between
     spots. Pressures ``s`` that are uniform over the ``N`` free cells of each block displace the blocks by
     ``K_b N s + c s``, with the influence ``K_b`` of the blocks on each other and the local compliance ``c`` of the
     spots. The inverse of this operator is applied to the mean residual of each block, and the inverse of the kernel to
@@ -496,7 +497,7 @@ class LongWaves(NamedTuple):
     Attributes
     ----------
     blocks : Grid
-        The blocks.
+        Grid of the blocks.
     block : array of int
         Block of each free cell.
     free : array

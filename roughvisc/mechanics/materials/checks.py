@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
-#: How a modulus or a compliance was measured.
+#: Kind of test in which a modulus or a compliance was measured.
 Kind = Literal["shear", "tensile"]
 
 
@@ -45,7 +45,7 @@ def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = 
     names : tuple of str
         Names of the columns, for the messages; the first is the time or the frequency.
     columns : array_like
-        As many numbers in each.
+        Columns of equal length.
     ascending : bool
         Whether the first column must ascend.
 
@@ -57,7 +57,7 @@ def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = 
     ------
     InputError
         If the lengths differ, there are fewer than two rows, a number is negative or not finite, or the first
-        column does not ascend; the offending row is named, counted from 0.
+        column does not ascend; the message names the row, counted from 0.
     """
     arrays = tuple(np.asarray(column, dtype=float) for column in columns)
     sizes = [array.size for array in arrays]

@@ -1,7 +1,7 @@
-"""Materials by a creep function, such as a power law; two bodies, another temperature, another modulus.
+"""Materials given by a creep function, such as a power law. Pairs, temperature shifts and stiffening of materials.
 
-A creep function is not negative and increases; a passive material has a positive sum of exponentials. The solver uses
-the Prony series that :func:`roughvisc.mechanics.materials.series.series` fits for the times of the program.
+A creep function is not negative and does not decrease. For a passive material it is a sum of positive exponentials. The
+solver uses the Prony series that :func:`roughvisc.mechanics.materials.series.series` fits for the times of the program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _PANELS, _POINTS, _LIMIT = 80, 8, 40.0
 #: Largest relative decrease of a creep function that counts as rounding.
 _ROUNDING = 1e-9
-#: Shift factors above this, or below its inverse, come from a temperature in a wrong unit.
+#: Largest shift factor; larger ones, or below its inverse, come from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
 
 
@@ -46,9 +46,9 @@ class Creep:
     time_factor, modulus_factor : float
         Factors of all times and of all moduli. [-]
     note : str
-        How the material was found.
+        Origin of the material.
     warning : str
-        Doubts about the measurements, for the warnings of a result.
+        Warning about the measurements, for the result.
     misfit : float
         Largest relative deviation from the rows of a table, zero if it is within their noise.
     stands_for : str
@@ -186,7 +186,7 @@ def power_creep(t: Array, glassy: float, coefficient: float, exponent: float, ti
 
 
 def series_creep(t: Array, series: Prony) -> Array:
-    """Return the creep compliance of measured creep: of the series that was fitted to the rows. [1/Pa]"""
+    """Return the creep compliance of the series fitted to measured creep. [1/Pa]"""
     return series.creep_compliance(t)
 
 
@@ -206,7 +206,7 @@ def pair(a: Material, b: Material) -> Material:
     Returns
     -------
     Prony or Creep
-        A series if both are series. Its Poisson ratio is a half; each body keeps its own.
+        A series if both materials are series. Its Poisson ratio is a half; each body keeps its own ratio.
 
     Examples
     --------
@@ -278,14 +278,14 @@ def stiffened(material: Material, factor: float) -> Material:
     Parameters
     ----------
     material : Prony or Creep
-        Both bodies of a pair are stiffened.
+        Material; both bodies of a pair are stiffened.
     factor : float
-        Above one: stiffer. [-]
+        Factor; above one makes the material stiffer. [-]
 
     Returns
     -------
     Prony or Creep
-        Its ``note`` states the factor.
+        The stiffened material. Its ``note`` states the factor.
 
     Raises
     ------
@@ -313,7 +313,7 @@ def _scaled(material: Material, time_factor: float, modulus_factor: float, note:
 
 
 def check_material(material: Any) -> Material:
-    """Return the material if it is one.
+    """Return the argument if it is a material.
 
     Raises
     ------
@@ -328,13 +328,14 @@ def check_material(material: Any) -> Material:
 
 
 def check_creep(material: Creep, times: Array) -> Array:
-    """Return the creep compliance at some times, [1/Pa], if it is one: not negative and not decreasing.
+    """Return the creep compliance at some times [1/Pa], after a check that it is not negative and does not decrease.
 
     Parameters
     ----------
     material : Creep
+        Material to check.
     times : ndarray
-        Positive and ascending. [s]
+        Times, positive and ascending. [s]
 
     Raises
     ------

@@ -27,12 +27,12 @@ _BEYOND = 100.0
 
 
 def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
-    r"""Return displacement over pressure where both oscillate as ``exp(i w t)``.
+    r"""Return the complex contact compliance: displacement over pressure if both oscillate as ``exp(i w t)``.
 
     Parameters
     ----------
     material : Material
-        A series, a power law, and a pair of these have closed forms; any other material is replaced by a series, see
+        Series, power laws and pairs of these have closed forms. Any other material is replaced by a series, see
         :func:`over_frequencies`.
     frequency : array_like
         Angular frequencies ``w``, of either sign. [1/s]
@@ -40,13 +40,14 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     Returns
     -------
     ndarray of complex
-        ``C*(w)``: conjugate for frequencies of opposite sign, its imaginary part not positive for positive ones. At
-        zero the compliance after endless creep: real, or infinite if the material flows. [1/Pa]
+        ``C*(w)``, conjugate for frequencies of opposite sign, with a negative or zero imaginary part at positive
+        frequencies. At zero frequency the compliance after endless creep: real, or infinite if the material flows.
+        [1/Pa]
 
     Raises
     ------
     InputError
-        If the only frequency is zero for a material without closed form, or a table ends before the times that the
+        If all frequencies are zero for a material without closed form, or a table ends before the times that the
         frequencies need.
 
     Notes
@@ -90,13 +91,13 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
 
 
 def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
-    """Return a material with a closed form of the complex compliance that replaces another one at some frequencies.
+    """Return a material with a closed form of the complex compliance that replaces a material at some frequencies.
 
     Parameters
     ----------
     material : Material
-        A series, a power law and a pair of these are returned unchanged. Measured creep is replaced by the series
-        fitted to it, any other material by a certified series.
+        Series, power laws and pairs of these are returned unchanged. Measured creep is replaced by the series fitted
+        to it, any other material by a certified series.
     frequency : array_like
         Angular frequencies, of either sign. [1/s]
     tolerance : float
@@ -105,7 +106,7 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     Raises
     ------
     InputError
-        As :func:`complex_compliance`.
+        See :func:`complex_compliance`.
     """
     material = check_material(material)
     if isinstance(material, Prony) or material.function is power_creep:
@@ -119,6 +120,6 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
     if material.function is not series_creep:
         return series(material, shortest, longest, tolerance)[0]
-    material.creep_compliance(longest)  # refuses a table that ends before
+    material.creep_compliance(longest)  # refuses a table that ends earlier
     fitted: Prony = material.parameters[0]
     return fitted.scaled(material.time_factor, material.modulus_factor)

@@ -34,7 +34,7 @@ class Prony:
     poisson : float
         Poisson ratio, constant in time.
     note : str
-        How a fitted series was found: number of terms, misfit. Ignored in comparisons.
+        Origin of a fitted series: number of terms, misfit. Ignored in comparisons.
     stands_for : str
         Name of the bodies if the series is not one body with this Poisson ratio; otherwise empty.
 
@@ -70,25 +70,25 @@ class Prony:
             raise InputError(key="glassy", found=self.glassy, expected=expected)
 
     def creep_compliance(self, t: ArrayLike) -> Array:
-        """Shear creep compliance ``J(t)``. [1/Pa]"""
+        """Return the shear creep compliance ``J(t)``. [1/Pa]"""
         t = np.asarray(t, dtype=float)
         retarded = np.add.reduce(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
         flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
 
     def contact_compliance(self, t: ArrayLike) -> Array:
-        """Contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
+        """Return the contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
         return 0.5 * (1 - self.poisson) * self.creep_compliance(t)
 
     def contact_integral(self, t: ArrayLike) -> Array:
-        """First antiderivative ``int_0^t C``. [s/Pa]"""
+        """Return the integral ``int_0^t C``. [s/Pa]"""
         t = np.asarray(t, dtype=float)
         compliances, times = self._terms
         crept = np.add.reduce(compliances * one_less_mean_decay(t[..., None] / times), axis=-1) * t
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
 
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
-        """Return the series with all times and all moduli multiplied by a factor each."""
+        """Return the series with all times multiplied by one factor and all moduli by another."""
         return replace(
             self,
             glassy=self.glassy / modulus_factor,
@@ -104,7 +104,7 @@ class Prony:
         return np.array(self.compliances), np.array(self.times)
 
     def relaxation_spectrum(self) -> tuple[float, Array, Array]:
-        r"""Shear relaxation modulus as ``G(t) = G_e + sum G_k exp(-t / theta_k)``.
+        r"""Return the shear relaxation modulus as ``G(t) = G_e + sum G_k exp(-t / theta_k)``.
 
         Returns
         -------
@@ -133,7 +133,7 @@ class Prony:
         return equilibrium, moduli, np.array([1 / rate for rate, _ in roots])
 
     def poles(self) -> tuple[Array, Array]:
-        """Strengths and poles of the transformed compliance, ``J^(s) = J_0 + sum strengths / (poles + s)``. [1/s]"""
+        """Return strengths and poles of the transform ``J^(s) = J_0 + sum strengths / (poles + s)``. [1/s]"""
         weights, rates = merged(self.compliances, self.times)
         if self.fluidity:
             return np.append(self.fluidity, weights * rates), np.append(0.0, rates)

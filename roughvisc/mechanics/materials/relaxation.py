@@ -1,4 +1,4 @@
-"""Exact creep compliances of materials stated by moduli: relaxation in exponentials, or an elastic bulk modulus.
+"""Exact creep compliances of materials given by relaxation moduli, or with an elastic bulk modulus.
 
 With an elastic bulk modulus the Poisson ratio changes in time: viscoelastic in shear, elastic in volume.
 """
@@ -17,7 +17,7 @@ from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.secular import merged, secular_roots
 from roughvisc.units import Quantity, quantities
 
-#: Difference from one at which the sum of ratios counts as one: a fluid.
+#: A sum of ratios that differs from one by at most this counts as one: a fluid.
 _ONE = 1e-9
 #: Sum of the moduli over the equilibrium modulus below which moduli of at most one are dimensionless ratios.
 _RATIOS = 1e-3
@@ -37,7 +37,7 @@ def from_relaxation(
 ) -> Prony:
     r"""Generalised Maxwell solid, ``G(t) = G_e + sum G_i exp(-t / theta_i)``.
 
-    Papers and finite-element codes also state it as ``G(t) = G_0 [1 - sum g_i (1 - exp(-t / theta_i))]``, by the
+    Papers and finite-element codes also use ``G(t) = G_0 [1 - sum g_i (1 - exp(-t / theta_i))]``, with the
     instantaneous modulus and ratios.
 
     Parameters
@@ -60,7 +60,7 @@ def from_relaxation(
     Returns
     -------
     Prony
-        The same material by its creep compliance.
+        The same material, given by its creep compliance.
 
     Raises
     ------
@@ -140,14 +140,14 @@ def relaxation_series(equilibrium: float, moduli: Sequence[float], times: Sequen
 
 
 def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
-    r"""Series that makes contact as a material with this shear creep and an elastic bulk modulus does.
+    r"""Return the series with the contact compliance of a material with an elastic bulk modulus.
 
     Parameters
     ----------
     shear : Prony
-        Shear creep compliance ``J(t)``; its Poisson ratio does not count.
+        Shear creep compliance ``J(t)``; its Poisson ratio is not used.
     bulk_modulus : float
-        ``K``. [Pa]
+        Bulk modulus ``K``. [Pa]
 
     Returns
     -------

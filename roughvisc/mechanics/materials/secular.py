@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Array]:
-    """Positive weights and their rates ``1/time``, rates ascending, equal rates merged."""
+    """Return positive weights and rates ``1/time``, with ascending rates and equal rates merged."""
     sums: dict[float, float] = {}
     for weight, time in zip(weights, times, strict=True):
         if weight > 0:
@@ -23,13 +23,13 @@ def merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Arr
 
 
 def secular_roots(strengths: Array, poles: Array, constant: float) -> list[tuple[float, Array]]:
-    """Zeros of ``constant + sum strengths / (poles - mu)`` with the offsets ``poles - mu`` at each.
+    """Return the zeros of ``constant + sum strengths / (poles - mu)``, each with its offsets ``poles - mu``.
 
     One zero lies between each two poles, and one above the last pole if ``constant > 0``.
 
-    Each is sought as an offset from the nearer of its two poles, on a logarithmic scale, so that a zero that
-    hugs a pole keeps its relative distance: over many decades of rates the equivalent eigenproblem loses the
-    slow modes (24 decades: a negative eigenvalue).
+    Each zero is computed as an offset from the nearer of its two poles, on a logarithmic scale, so that the offset of a
+    zero close to a pole is accurate. The equivalent eigenproblem loses the slow modes over many decades of rates (24
+    decades: a negative eigenvalue).
     """
 
     def value(offset: float, origin: float) -> tuple[float, Array]:

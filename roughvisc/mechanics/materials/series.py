@@ -1,8 +1,8 @@
 """Certified exponential series: any creep function as a Prony series with a measured error.
 
 The terms are positive, so that the series is a passive material. It has the instantaneous compliance of the material,
-so that jumps are exact. Both compliances increase, so that before the shortest time they differ by less than the creep
-until then.
+so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less than the
+creep up to this time.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 
 Array = NDArray[np.float64]
 
-#: Instants per decade at which a series is fitted, and at which its error is measured.
+#: Number of times per decade at which a series is fitted, and at which its error is measured.
 _FITTED, _MEASURED = 30, 100
-#: Retardation times per decade that are offered to a fit, in turn, and their largest number.
+#: Numbers of retardation times per decade to try in turn, and largest number of retardation times.
 _OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
-#: The shortest retardation time offered is the shortest time divided by this factor: the larger factor is more accurate
-#: and takes more terms, for the creep before the shortest time. The longest one is three times the longest time.
+#: Shortest time over the shortest retardation time: the larger factor is more accurate before the shortest time, with
+#: more terms. Longest retardation time over the longest time.
 _FASTER, _SLOWER = (3.0, 10.0), 3.0
-#: How often the rows are weighted again to level the error.
+#: Number of times that the rows are reweighted to level the error.
 _LEVELLINGS = 6
-#: Numbers of retardation times in a row without a smaller error after which a fit ends.
+#: Number of successive trials without a smaller error after which the fit ends.
 _IDLE = 3
 
 
@@ -48,7 +48,7 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     Parameters
     ----------
     material : Material
-        Any material. A Prony series is its own series.
+        Any material. A Prony series is returned unchanged.
     shortest, longest : float
         Range of times. [s]
     tolerance : float
@@ -57,7 +57,7 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     Returns
     -------
     series : Prony
-        The series with the fewest terms within the tolerance, or the most accurate one if none is. It has the
+        The series with the fewest terms within the tolerance; otherwise the most accurate series. It has the
         instantaneous compliance of the material.
     error : float
         Largest ``|J~ - J| / J`` at a hundred instants per decade, more than the series was fitted to. It exceeds the
@@ -72,7 +72,7 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     Notes
     -----
     Non-negative least squares [1]_ on a lattice of retardation times, :math:`J_0 + \varphi t + \sum_i J_i (1 -
-    e^{-t/\tau_i})`. The rows are weighted again with the error to reduce its largest value (Lawson's iteration [1]_).
+    e^{-t/\tau_i})`. The rows are reweighted by the error to reduce its largest value (Lawson's iteration [1]_).
 
     References
     ----------

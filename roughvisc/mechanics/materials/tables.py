@@ -26,21 +26,21 @@ from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
 
-#: Terms per decade that are offered to a fit, in turn.
+#: Numbers of terms per decade to try in turn.
 _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
 #: A fit with fewer terms may have an rms misfit larger by this factor than the smallest one.
 _FEWER = 1.1
 #: Number of values per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the
 #: differences between neighbouring terms next to the misfit of the rows.
 _FEW, _SMOOTH, _STEPS = 2.5, 3, 0.01
-#: Terms are offered beyond the last time by this factor: a slower one is a plateau.
+#: Largest time of a term, over the last time: a slower term is a plateau.
 _SLOWER = 3.0
-#: Terms are offered before the first time by this factor, and an rms misfit below which nothing is gained. Moduli: the
-#: rows hardly determine a faster term, and no rheometer measures better. Creep: a fast term rises from the given
-#: instantaneous compliance, and the terms are chosen later, for a program.
+#: First time over the shortest time of a term, and rms misfit below which more terms are not tried. For moduli: the
+#: rows hardly determine a faster term, and rheometers are not more accurate. For creep: a fast term rises from the
+#: given instantaneous compliance, and the terms are chosen later, for a program.
 _MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
-#: Largest ratio of moduli measured at one frequency and one temperature, and the relative difference of frequencies up
-#: to which they are one.
+#: Largest ratio of moduli measured at one frequency and one temperature, and largest relative difference of frequencies
+#: that count as equal.
 _ONE_TEMPERATURE, _SAME_FREQUENCY = 2.0, 1e-6
 #: Largest ratio of the times of neighbouring rows without a warning.
 _DECADE = 10.0 * (1 + 1e-9)
@@ -65,8 +65,8 @@ def creep_table(
     kind : {"shear", "tensile"}
         Kind of the compliance.
     noise : float
-        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Deviations of the fit from
-        the rows by less than it are not warned of.
+        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Smaller deviations
+        of the fit from the rows cause no warning.
     poisson : float
         Poisson ratio, constant in time.
 
@@ -268,7 +268,7 @@ class _Rows:
         Notes
         -----
         The fit with the fewest terms among those with about the smallest misfit; see :data:`_MODULI` for the arguments.
-        Few rows can be met in many ways: then the spectrum with small differences between neighbouring terms is taken.
+        If the rows are too few to determine the spectrum, neighbouring terms are fitted to differ little.
         """
         order = np.argsort(self.at)
         at, course = self.at[order], self.course[order]
@@ -291,7 +291,7 @@ class _Rows:
 
 
 def _relaxing(table: _Rows, poisson: float, rows: int, span: str, kind: str) -> Prony:
-    """Return the material of a table of moduli; its note states the last three arguments."""
+    """Return the material of a table of moduli, with a note of the last three arguments."""
     weights, theta, misfit = table.fitted(*_MODULI)
     note = "; ".join(filter(None, (_note(theta.size + 1, rows, misfit, span), _gap(kind, np.unique(table.at)))))
     found = relaxation_series(float(weights[0]), weights[1:].tolist(), theta.tolist())
@@ -305,7 +305,7 @@ def _note(terms: int, rows: int, misfit: Array, span: str) -> str:
 
 
 def _gap(kind: str, times: Array) -> str:
-    """Warn of neighbouring rows more than a decade apart; empty if there are none.
+    """Return a warning of neighbouring rows more than a decade apart, else ''.
 
     Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones.
     """

@@ -1,4 +1,4 @@
-"""Factors of the time-temperature shift: by how much all times of a material are longer at another temperature."""
+"""Factors of the time-temperature shift, by which all times of a material are longer at another temperature."""
 
 from __future__ import annotations
 

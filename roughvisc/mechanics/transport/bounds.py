@@ -1,4 +1,4 @@
-"""Bounds on the conductance of a network: from above by any pressures, from below by any conserved flux."""
+"""Bounds on the conductance of a network: an upper bound from any pressures, a lower bound from any conserved flux."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def imbalance(network: Network, pressure: Array) -> Array:
 
 
 def bounds(network: Network, pressure: Array) -> tuple[float, float]:
-    r"""Bounds on the conductance between the two sides of a network.
+    r"""Return bounds on the conductance between the two sides of a network.
 
     Parameters
     ----------
@@ -31,16 +31,16 @@ def bounds(network: Network, pressure: Array) -> tuple[float, float]:
     Returns
     -------
     lower, upper : float
-        In the unit of the network's conductances. [-]
+        Bounds, in the unit of the conductances of the network. [-]
 
     Notes
     -----
-    Dirichlet's principle: with the conductances :math:`c` of the faces and the jumps :math:`\Delta P` of any pressures
-    that have the values given on the two sides, :math:`G \le \sum c \, \Delta P^2`. Thomson's: with any flux
-    :math:`q` that is conserved in every cell and amounts to :math:`Q`, :math:`G \ge Q^2 / \sum q^2 / c`. Here the flux
-    is :math:`c \, \Delta P` plus a correction: the imbalance of each cell flows to a side along the maximum spanning
-    tree of the conductances. Both bounds are exact for the solution of the discrete equations. For an approximate
-    solution they differ by the square of its error.
+    Dirichlet's principle: :math:`G \le \sum c \, \Delta P^2` with the conductances :math:`c` of the faces
+    and the jumps :math:`\Delta P` of any pressures with the given values on the two sides. Thomson's principle:
+    :math:`G \ge Q^2 / \sum q^2 / c` with any flux :math:`q` that is conserved in every cell and has the total
+    :math:`Q`. Here the flux is :math:`c \, \Delta P` plus a correction: the imbalance of each cell flows to a side
+    along the maximum spanning tree of the conductances. Both bounds are exact for the solution of the discrete
+    equations. For an approximate solution they differ by the square of its error.
 
     References
     ----------
@@ -67,7 +67,7 @@ def _lead_away(network: Network, left: Array, flux: Array, into: Array, out: Arr
     side = len(left)  # both sides together are the root of the tree
     at_sides = np.maximum(network.entrance, network.exit)
     touching = np.flatnonzero(at_sides)
-    one = np.concatenate([network.first, touching]).astype(np.int32)  # as older SciPy's trees want them
+    one = np.concatenate([network.first, touching]).astype(np.int32)  # for older SciPy versions
     other = np.concatenate([network.second, np.full(len(touching), side)]).astype(np.int32)
     width = np.log(np.concatenate([network.conductance, at_sides[touching]]))
     graph = sparse.coo_array((width.max() - width + 1.0, (one, other)), shape=(side + 1, side + 1)).tocsr()
@@ -91,11 +91,11 @@ def _lead_away(network: Network, left: Array, flux: Array, into: Array, out: Arr
 def _summed_upward(order: Numbers, above: Numbers, left: Array) -> Array:
     """Return the sum of the imbalances of each cell and of all cells below it in the tree.
 
-    The order is breadth-first from the root, so that the cells above have ascending places.
+    The order is breadth-first from the root, so that the positions of the parents ascend.
     """
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))
-    over = place[above[order[1:]]] + 1  # place of the cell above, from one on; the root has none
+    over = place[above[order[1:]]] + 1  # position of the parent cell, from one on; the root has none
     over = np.concatenate([[0], over])
     carried = np.append(left, 0.0)[order]
     starts = [0, 1]

@@ -13,10 +13,10 @@ from roughvisc.mechanics.transport.bounds import bounds, imbalance
 from roughvisc.mechanics.transport.network import Array, Network, equations, faces_of, factors, network_of
 from roughvisc.mechanics.transport.two_grids import pressures_on_two_grids
 
-#: Relative distance of the bounds at which the iteration ends.
+#: Relative difference of the bounds at which the iteration ends.
 _CLOSE = 1e-9
-#: Largest number of rounds on two grids, the number of cells from which these are used, and the largest number of
-#: rounds with direct factors after them.
+#: Largest number of rounds on two grids, number of cells from which two grids are used, and largest number of rounds
+#: with direct factors after them.
 _ON_TWO_GRIDS, _LARGE = 2, 2**12
 _BY_FACTORS = 8
 
@@ -47,12 +47,12 @@ class Flow:
 
 
 def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flow:
-    r"""Flow through a gap from one side of the map to the opposite one, along the first axis.
+    r"""Return the flow through a gap from one side of the map to the opposite side, along the first axis.
 
     Parameters
     ----------
     gap : ndarray, shape (nx, ny)
-        Finite everywhere; cells without a positive one are closed. [m]
+        Gap, finite everywhere; cells without a positive gap are closed. [m]
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     wrap : bool
@@ -76,10 +76,11 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     by cell-centred finite volumes: see :func:`roughvisc.mechanics.transport.network.faces_of` for the conductances.
     They are exact for a gap that depends on one coordinate and is constant in each cell, and of second order in the
     sides of the cells for a smooth gap. Small maps are solved with SciPy's direct factors in minimum-degree order,
-    large ones by conjugate gradients on two grids. If the conductances span too many decades for these, factors follow.
+    large ones by conjugate gradients on two grids. If the conductances span too many decades for two grids, direct
+    factors follow.
 
-    The conductance is the mean of its bounds. With factors the bounds differ by rounding, on two grids by at most 1e-9
-    and for most gaps by less than 1e-11.
+    The conductance is the mean of its bounds. With direct factors the bounds differ by rounding, on two grids by at
+    most 1e-9 and for most gaps by less than 1e-11.
 
     References
     ----------
@@ -98,7 +99,7 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
 
 
 def fluxes(gap: Array, spacing: tuple[float, float], pressure: Array, *, wrap: bool = False) -> tuple[Array, Array]:
-    """Return the flux in the cells, the mean over opposite faces.
+    """Return the flux in the cells: the mean over opposite faces.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def fluxes(gap: Array, spacing: tuple[float, float], pressure: Array, *, wrap: b
 def _solved(network: Network, width: int) -> tuple[Array, float, float]:
     """Return the pressures of the cells, and bounds on the conductance. [-]
 
-    For a wide basin behind narrow slits the factors lose digits; each round of refinement recovers some.
+    The factors lose digits for a wide basin behind narrow slits; each round of refinement recovers some.
     """
     pressure = np.zeros(len(network.cells))
     lower, upper = 0.0, np.inf
@@ -138,7 +139,7 @@ def _solved(network: Network, width: int) -> tuple[Array, float, float]:
         lower, upper = max(lower, below), min(upper, above)
         if upper - lower <= _CLOSE * upper:
             break
-    return pressure, min(lower, upper), upper  # rounding may exchange them
+    return pressure, min(lower, upper), upper  # rounding may exchange the bounds
 
 
 def _solvers(network: Network, width: int) -> Iterator[Callable[[Array], Array]]:

@@ -20,9 +20,10 @@ class Faces:
     Attributes
     ----------
     along : ndarray, shape (nx + 1, ny)
-        Of the faces across the flow; the first and the last row are the two sides. [-]
+        Conductances of the faces across the flow; the first and the last row are the two sides. [-]
     across : ndarray, shape (nx, ny)
-        Of the face of each cell to its neighbour at larger y; the last column joins the borders or is closed. [-]
+        Conductance of the face of each cell to its neighbour at larger y; the last column joins the borders or is zero.
+        [-]
     scale : float
         Mobility of the widest cell, its gap cubed over 12. [m^3]
     """
@@ -34,7 +35,7 @@ class Faces:
 
 @dataclass(frozen=True)
 class Network:
-    """The cells on some path from one side to the other.
+    """Network of the cells on a path from one side to the other.
 
     Attributes
     ----------
@@ -43,9 +44,9 @@ class Network:
     first, second : ndarray of int, shape (m,)
         Numbers of the cells that each face joins, the first below the second; sorted, each pair once.
     conductance : ndarray, shape (m,)
-        Of these faces. [-]
+        Conductances of these faces. [-]
     entrance, exit : ndarray, shape (n,)
-        Conductances to the sides where the fluid comes in and goes out; zero of cells inside. [-]
+        Conductances of the faces to the inlet and to the outlet; zero for interior cells. [-]
     """
 
     cells: Numbers
@@ -57,16 +58,16 @@ class Network:
 
 
 def faces_of(gap: Array, spacing: tuple[float, float], wrap: bool) -> Faces:
-    """Conductances of all faces of a map.
+    """Return the conductances of all faces of a map.
 
     Parameters
     ----------
     gap : ndarray, shape (nx, ny)
-        Not missing; cells without a positive one are closed. [m]
+        Gap, never missing; cells without a positive gap are closed. [m]
     spacing : tuple of float
         Cell sides ``(dx, dy)``. [m]
     wrap : bool
-        Whether the borders across the flow meet, or are walls.
+        Whether the borders across the flow are joined; otherwise they are walls.
 
     Returns
     -------
@@ -74,9 +75,10 @@ def faces_of(gap: Array, spacing: tuple[float, float], wrap: bool) -> Faces:
 
     Notes
     -----
-    The mobility of a cell is its gap cubed over 12. Between the centres of two cells the two halves are in series: the
-    conductance is the harmonic mean of their mobilities times the length of the face over the distance. A side is at
-    half the distance: its conductance is twice the mobility of the cell times the same ratio.
+    The mobility of a cell is its gap cubed over 12. The two half cells between the centres of neighbours
+    are in series. The conductance is the harmonic mean of the mobilities, times the length of the face over the
+    distance of the centres. A side lies at half this distance: its conductance is twice the mobility of the cell times
+    the same ratio.
     """
     widest = float(gap.max(initial=0.0))
     if not widest > 0:
@@ -98,7 +100,7 @@ def _in_series(one: Array, other: Array) -> Array:
 
 
 def network_of(faces: Faces) -> Network | None:
-    """Return the cells on any path from one side to the other, with dead ends; None if no path connects the sides.
+    """Return the network of the cells connected to both sides, including dead ends; None if no path connects them.
 
     Cells that share only a corner are not connected.
     """
@@ -118,14 +120,14 @@ def network_of(faces: Faces) -> Network | None:
     open_ = open_[kept[first[open_]]]
     one, other = new[first[open_]], new[second[open_]]
     ends = np.minimum(one, other), np.maximum(one, other)
-    # two periodic cells across the flow share two faces, which are added
+    # with two periodic cells across the flow, a pair shares two faces, whose conductances are added
     joined = sparse.coo_array((conductance[open_], ends), shape=(len(cells), len(cells))).tocsr()
     rows = np.repeat(np.arange(len(cells), dtype=joined.indices.dtype), np.diff(joined.indptr))
     return Network(cells, rows, joined.indices, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
 
 
 def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leaving: NDArray[np.bool_]) -> NDArray:
-    """Return which cells belong to connected parts that touch both sides."""
+    """Return a mask of the cells in connected parts that touch both sides."""
     count = len(entering)
     graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
     _, part = sparse.csgraph.connected_components(graph, directed=False)

@@ -1,19 +1,19 @@
-r"""Contact spots as one flat punch: the stiffness of a contact at constant area, which gives its conductance.
+r"""Stiffness of a contact at constant area, as one flat punch; it gives the conductance of the contact.
 
 A body of resistivity ``rho`` whose surface is at one potential ``V`` on the spots and insulated elsewhere carries the
-current ``I = 2 k V / rho``, where ``F = E* k delta`` presses a flat punch of these spots: the Green's function of both
-problems is ``1/(2 pi r)``, times ``rho`` for the potential and ``2 / E*`` for the displacement [1]_. Two bodies in
-series conduct ``2 k / (rho_1 + rho_2)``.
+current ``I = 2 k V / rho``, where ``k`` is the stiffness ``F = E* k delta`` of a flat punch with the outline of the
+spots. The Green's function of both problems is ``1/(2 pi r)``, times ``rho`` for the potential and ``2 / E*`` for the
+displacement [1]_. Two bodies in series conduct ``2 k / (rho_1 + rho_2)``.
 
-The grid error, as measured on discs, squares at any angle, strips and Hertz contacts:
+Grid error, measured on discs, squares at any angle, strips and Hertz contacts:
 
 1. At an edge where the gap opens, counting cells overestimates the spot, and a punch of cells is too soft. The two
    errors cancel: the punch has the stiffness of the spot with the corrected area, and it is the derivative of force by
    approach on the same grid. A correction is not needed.
-2. At an edge of the material the outline is known, and the punch is too soft to first order. It is solved again on
-   cells of half the side, and extrapolated: by twice the difference for an outline along the cells, and by 1.2 times
-   for an oblique one, whose cells form a staircase around the smooth outline. The share of faces that belong to steps
-   distinguishes the two.
+2. At an edge of the material the outline is known, and the punch is too soft to first order. The problem is solved
+   again on cells of half the side, and the stiffness is extrapolated: by twice the difference for an outline along the
+   cells, and by 1.2 times the difference for an oblique outline, whose cells form a staircase around it. The share of
+   faces that belong to steps distinguishes the two.
 
 .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
 """
@@ -40,8 +40,9 @@ Mask = NDArray[np.bool_]
 _ALONG, _OBLIQUE, _STEPS = 2.0, 1.2, 0.6
 # Error of the extrapolated value over the same difference.
 _OFF = 0.4
-# Error of an edge where the gap opens, in cells: common to all faces, and three standard deviations of one face, which
-# lies anywhere in its cell. Rough surfaces of 32 to 128 cells: within 0.6 of the estimate.
+# Error of the position of an edge where the gap opens, in cells: the error common to all faces, and three standard
+# deviations of one face, since the edge lies anywhere in its cell. Rough surfaces of 32 to 128 cells: within 0.6 of the
+# estimate.
 _SHARED, _SCATTER = 0.03, 1.0
 # Error of the pressure over the square root of the error of the stiffness, which is of second order.
 _OF_PRESSURE = 0.1
@@ -49,17 +50,17 @@ _OF_PRESSURE = 0.1
 
 @dataclass(frozen=True)
 class FrozenContact:
-    """A contact whose area does not change, as a punch.
+    """Contact whose area does not change, as a punch.
 
     Attributes
     ----------
     stiffness : float
-        Force over approach, over the contact modulus. A single disc has twice its radius; infinite where a uniform
-        pressure displaces nothing and all is in contact. [m]
+        Force over approach, over the contact modulus; for a disc twice the radius. Infinite in full contact if a
+        uniform pressure does not displace the surface. [m]
     error : float
-        Error of the stiffness by grid and solver. [m]
+        Error of the stiffness due to grid and solver. [m]
     iterations : int
-        Of the contact solver.
+        Iterations of the contact solver.
     """
 
     stiffness: float
@@ -76,7 +77,7 @@ def frozen_contact(
     kernel: Kernel = HALF_SPACE,
     tolerance: float = 1e-6,
 ) -> FrozenContact:
-    """Stiffness of a contact whose area is frozen.
+    """Return the stiffness of a contact at constant area.
 
     Parameters
     ----------
@@ -91,9 +92,9 @@ def frozen_contact(
         Cells with material; None: all. The outline of a spot is known exactly next to absent cells and at the border of
         free space.
     kernel : Kernel
-        Of the body.
+        Kernel of the body.
     tolerance : float
-        Approximate relative error of the stiffness by the solver.
+        Approximate relative error of the stiffness due to the solver.
 
     Returns
     -------
@@ -104,7 +105,7 @@ def frozen_contact(
     present = np.ones(contact.shape, dtype=bool) if present is None else present
     beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
     rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
-    if boundary == "free":  # nothing outside the spots matters
+    if boundary == "free":  # the surface outside the spots has no influence
         x, y = _bounds(contact)
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
@@ -128,7 +129,7 @@ def frozen_contact(
 def _extrapolated(
     coarse: FrozenContact, contact: Mask, body: Grid, tolerance: float, *, share: float, oblique: float
 ) -> FrozenContact:
-    """Return the stiffness with its error at edges of the material extrapolated from cells of half the side."""
+    """Return the stiffness, extrapolated from cells of half the side at edges of the material."""
     split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
     finer = body.on((split.shape[0], split.shape[1]))
     punch = _punch(finer, split, tolerance)
@@ -167,20 +168,20 @@ def _bounds(contact: Mask) -> tuple[slice, slice]:
 def _edge_energies(
     contact: Mask, rim: Mask, pressure: Array, spacing: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Return by how much the stiffness changes if the edge of the contact moves by one cell. [m]
+    """Return the change of the stiffness if the edge of the contact moves by one cell. [m]
 
-    The first number is for edges where the material ends, the second for edges where the gap opens. The third is for
-    faces of an opening gap that move independently: the root of the sum of squares.
+    The first number is for edges of the material, the second for edges where the gap opens. The third is for edges
+    where the gap opens whose faces move independently: the root of the sum of squares.
 
-    A punch gains ``K^2 ds / 2`` of stiffness for an edge that moves out by ``ds``, where ``K`` is the strength of the
-    singularity there; the edge cell's pressure squared times the cell's side is in proportion to ``K^2``. [m]
+    If an edge moves out by ``ds``, the stiffness grows by ``K^2 ds / 2`` with the strength ``K`` of the singularity.
+    The squared pressure of the edge cell times the cell side is in proportion to ``K^2``.
 
     Parameters
     ----------
     contact, rim : ndarray of bool, shape (nx + 2, ny + 2)
-        Cells in contact, and those with material, with one more on every side.
+        Contact cells, and cells with material, with a rim of one cell.
     pressure : ndarray, shape (nx, ny)
-        Of the punch. [-]
+        Pressure of the punch. [-]
     """
     ends = opens = squares = 0.0
     strips = [side * spacing[0] * spacing[1] for side in (spacing[0], spacing[0], spacing[1], spacing[1])]
@@ -196,7 +197,7 @@ def _edge_energies(
 
 
 def _staircase(contact: Mask) -> float:
-    """Return the share of the outline's faces in steps, two per inner corner, of a map with a rim of one cell."""
+    """Return the share of the faces of the outline in steps, two per inner corner; the map has a rim of one cell."""
     faces = sum(int(np.count_nonzero((contact & ~seen)[1:-1, 1:-1])) for seen in neighbours(contact, "free"))
     around = contact[1:, 1:].astype(int) + contact[:-1, 1:] + contact[1:, :-1] + contact[:-1, :-1]
     return 2 * int(np.count_nonzero(around == 3)) / max(faces, 1)

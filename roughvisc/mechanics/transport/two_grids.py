@@ -17,11 +17,11 @@ from scipy import sparse
 
 from roughvisc.mechanics.transport.network import Array, Network, equations, factors
 
-#: Cells along the side of a block: larger ones mean fewer coarse cells and more iterations.
+#: Number of cells along the side of a block: larger blocks mean fewer coarse cells and more iterations.
 _BLOCK = 4
-#: A face is strong if its conductance is at least so large a part of the geometric mean of what joins the two cells.
+#: A face is strong if its conductance is at least this part of the geometric mean of the diagonals of its two cells.
 _STRONG = 0.02
-#: Jacobi's relaxation, in the prolongation and in the iterations; eigenvalues of ``D^-1 A`` lie below two.
+#: Relaxation factor of the Jacobi steps in prolongation and iterations; eigenvalues of ``D^-1 A`` lie below two.
 _RELAXATION = 3 / 4
 #: Relative error of the energy at which the iteration ends, and the largest number of iterations.
 _ENOUGH, _MOST = 1e-17, 100
@@ -44,13 +44,13 @@ def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array
     Returns
     -------
     ndarray, shape (n,)
-        The last iterate if the iteration does not converge.
+        Pressures; the last iterate if the iteration does not converge.
     """
     matrix = equations(network)
     diagonal = matrix.diagonal()
     prolongation = _prolongation(network, width, matrix, diagonal)
     restriction = prolongation.T.tocsr()
-    # rounding hides how coarse cells are joined to others if that is very loose; the shift keeps the equations positive
+    # rounding hides very weak connections between coarse cells; the shift keeps the equations positive definite
     shift = np.maximum(_SHIFT * (prolongation.power(2).T @ diagonal), np.finfo(float).tiny)
     on_coarse = factors(restriction @ (matrix @ prolongation) + sparse.diags_array(shift))
     weight = _RELAXATION / diagonal
