@@ -109,8 +109,8 @@ def self_affine(
     amplitudes : {"fixed", "gaussian"}, default "fixed"
         "fixed": each mode has the amplitude of the spectrum, and only phases are random. The rms height and the rms
         slope are then the same for every seed, and quantities that depend on them scatter too little: the mean gap 3 to
-        10 times less than over samples of a random surface. "gaussian": amplitudes are random too, as in samples. Use
-        it if the scatter over realisations matters.
+        10 times less than over samples of a random surface. "gaussian": amplitudes are random too, as in samples of a
+        random surface. Use it if the scatter over realisations matters.
     seed : int or numpy.random.Generator
         Source of random phases and amplitudes.
 
