@@ -325,7 +325,7 @@ class LoadingRows(Rows):
 
 
 def on_device(value: Any, xp: Any) -> Any:
-    """Return a state of a march with its arrays in a namespace, NumPy or CuPy; a checkpoint has those of NumPy."""
+    """Return a state with its arrays in a namespace, NumPy or CuPy; a checkpoint has NumPy arrays."""
     if isinstance(value, np.ndarray):
         return xp.asarray(value)
     if isinstance(value, tuple):

@@ -1,7 +1,7 @@
-"""Closed forms of frictionless normal contact, to compare results with.
+"""Closed forms of frictionless normal contact, for comparison with results.
 
-Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``, viscoelastic ones a material with
-the contact compliance ``C(t)``, which is ``1 / E*`` of an elastic one.
+Elastic solutions take the contact modulus ``E* = 2 G / (1 - nu) = E / (1 - nu^2)``. Viscoelastic solutions take a
+material with the contact compliance ``C(t)``, which is ``1 / E*`` for an elastic material.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RoundContact:
 
 @quantities(sphere_radius="m", contact_modulus="Pa", force="N")
 def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
-    r"""Elastic contact of a paraboloid ``r^2 / (2 R)`` (Hertz).
+    r"""Return the elastic contact of a paraboloid ``r^2 / (2 R)`` (Hertz).
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
 
 @quantities(contact_modulus="Pa", force="N")
 def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundContact:
-    r"""Elastic contact of a cone ``m r`` (Sneddon).
+    r"""Return the elastic contact of a cone ``m r`` (Sneddon).
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     Returns
     -------
     RoundContact
-        As for :func:`hertz`; the pressure at the apex is infinite.
+        Contact as in :func:`hertz`; the pressure at the apex is infinite.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
 
 @quantities(radius="m", contact_modulus="Pa", force="N")
 def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
-    r"""Elastic contact of a rigid cylinder with a flat end (Boussinesq).
+    r"""Return the elastic contact of a rigid cylinder with a flat end (Boussinesq).
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     Returns
     -------
     RoundContact
-        As for :func:`hertz`; the pressure at the edge is infinite.
+        Contact as in :func:`hertz`; the pressure at the edge is infinite.
 
     Raises
     ------
@@ -248,7 +248,7 @@ class WavyContact:
 def westergaard(
     amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, mean_pressure: Quantity
 ) -> WavyContact:
-    r"""Elastic contact of the profile ``amplitude cos(2 pi x / wavelength)``, plane strain (Westergaard).
+    r"""Return the elastic contact of the profile ``amplitude cos(2 pi x / wavelength)``, plane strain (Westergaard).
 
     Parameters
     ----------
@@ -306,16 +306,17 @@ def westergaard(
 def full_contact_pressure(
     amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, waves: int = 2
 ) -> float:
-    """Mean pressure ``p*`` that closes the gap under a wavy surface.
+    """Return the mean pressure ``p*`` that closes the gap under a wavy surface.
 
     Parameters
     ----------
     amplitude, wavelength : float or str
-        Of ``a cos(kx)`` (``waves=1``) or ``a cos(kx) cos(ky)`` (``waves=2``), ``k = 2 pi / wavelength``. [m]
+        Amplitude ``a`` and wavelength of ``a cos(kx)`` (``waves=1``) or ``a cos(kx) cos(ky)`` (``waves=2``), with
+        ``k = 2 pi / wavelength``. [m]
     contact_modulus : float or str
         ``E*``. [Pa]
     waves : {1, 2}
-        How many directions are wavy.
+        Number of wavy directions.
 
     Returns
     -------
@@ -333,7 +334,7 @@ def full_contact_pressure(
 
 
 def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
-    r"""Limits of the contact fraction of ``a cos(kx) cos(ky)`` on an elastic half-space.
+    r"""Return a limit of the contact fraction of ``a cos(kx) cos(ky)`` on an elastic half-space.
 
     Parameters
     ----------
@@ -370,7 +371,7 @@ def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
 
 @dataclass(frozen=True)
 class GrowingContact:
-    """Contact of a sphere with a viscoelastic half-space under a load that never falls.
+    """Contact of a sphere with a viscoelastic half-space under a load that never decreases.
 
     Attributes
     ----------
@@ -387,7 +388,7 @@ class GrowingContact:
     program: Program
 
     def radius(self, t: ArrayLike) -> Array:
-        """Contact radius at times ``t``, after a jump. [s] -> [m]"""
+        """Return the contact radius at times ``t``, after a jump. [s] -> [m]"""
         since = np.asarray(t, dtype=float)
         crept, load = np.zeros(since.shape), 0.0  # int C dW, a sum over the corners of the program
         for segment, start in zip(self.program.segments, self.program.corners, strict=False):
@@ -403,13 +404,13 @@ class GrowingContact:
         return np.asarray(np.cbrt(0.75 * self.sphere_radius * crept))
 
     def approach(self, t: ArrayLike) -> Array:
-        """Approach at times ``t``, after a jump. [s] -> [m]"""
+        """Return the approach at times ``t``, after a jump. [s] -> [m]"""
         return self.radius(t) ** 2 / self.sphere_radius
 
 
 @quantities(sphere_radius="m", load="N")
 def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Program) -> GrowingContact:
-    r"""A sphere on a viscoelastic half-space under a load that never falls (Lee and Radok).
+    r"""Return the contact of a sphere with a viscoelastic half-space under a load that never decreases (Lee and Radok).
 
     Parameters
     ----------

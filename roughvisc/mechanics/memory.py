@@ -257,9 +257,9 @@ class Memory:
         Parameters
         ----------
         step, last : float
-            Length of the step and of the one before. [s]
+            Lengths of the step and of the step before. [s]
         rule : {"linear", "bdf2", "constant"}
-            How ``v`` runs within the step.
+            Rule for ``v`` within the step.
 
         Returns
         -------

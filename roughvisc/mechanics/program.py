@@ -261,7 +261,7 @@ class Program:
         value : float or str
             Load at the end. [N]
         over : float or str
-            How long it takes; zero is a jump. [s]
+            Duration of the ramp; zero is a jump. [s]
 
         Returns
         -------
@@ -289,7 +289,7 @@ class Program:
         value : float or str
             Nominal pressure at the end. [Pa]
         over : float or str
-            How long it takes; zero is a jump. [s]
+            Duration of the ramp; zero is a jump. [s]
 
         Returns
         -------
@@ -316,7 +316,7 @@ class Program:
         value : float or str
             Approach at the end; negative values lift the profile off. [m]
         over : float or str
-            How long it takes; zero is a jump. [s]
+            Duration of the ramp; zero is a jump. [s]
 
         Returns
         -------
@@ -335,7 +335,7 @@ class Program:
         Parameters
         ----------
         duration : float or str
-            How long. [s]
+            Duration of the hold. [s]
         control : {"load", "approach", "pressure"}, optional
             Quantity to hold. Default: the quantity of the previous segment. The other quantity follows from the
             contact: a load, then ``hold(..., control="approach")``, is stress relaxation. Holding the nominal pressure

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 _PANELS, _POINTS, _LIMIT = 80, 8, 40.0
 #: Largest relative decrease of a creep function that counts as rounding.
 _ROUNDING = 1e-9
-#: Largest shift factor; larger ones, or below its inverse, come from a temperature in a wrong unit.
+#: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
 
 
