@@ -65,7 +65,7 @@ def test_solution__lies_near_the_theories():
     ("attrs", "message"),
     [
         ({"boundary": "free"}, "surfaces without borders"),
-        ({"thickness": 1e-3, "base": "bonded"}, "of a half-space: found a result with the thickness 0.001"),
+        ({"thickness": 1e-3, "base": "bonded"}, "for a half-space: found a result with the thickness 0.001"),
     ],
 )
 def test_where_theories_do_not_hold__says_so(attrs, message):
