@@ -281,7 +281,7 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
     Parameters
     ----------
     pressure : ndarray, shape (nx, ny)
-        [Pa]
+        Pressure. [Pa]
     height : ndarray, shape (nx, ny)
         Heights of the profile; NaN at absent cells. [m]
     periodic : bool

@@ -348,7 +348,7 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
     Raises
     ------
     InputError
-        If they are not. The message names the segment or the setting, and the expected value.
+        If they are incompatible. The message names the segment or the setting, and the expected value.
     """
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")

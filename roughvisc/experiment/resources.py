@@ -159,7 +159,7 @@ def march_bytes(
     Returns
     -------
     float
-        [byte]
+        Memory. [byte]
 
     Notes
     -----
@@ -203,7 +203,7 @@ def require_loading(
     Raises
     ------
     TooLargeError
-        If it does not. The message gives the needed and the available memory, and cases that fit.
+        If it does not fit. The message gives the needed and the available memory, and cases that fit.
     """
     if math.prod(shape) < WORTH_ASKING:
         return
@@ -232,7 +232,7 @@ def require_memory(
     Raises
     ------
     TooLargeError
-        If it does not. The message gives the needed and the available memory, and cases that fit.
+        If it does not fit. The message gives the needed and the available memory, and cases that fit.
     """
     if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(device), in_file)):
         raise TooLargeError(why)

@@ -59,7 +59,7 @@ class Kernel(Protocol):
         Returns
         -------
         ndarray, shape (nx, ny)
-            [m]
+            Displacement at unit contact compliance. [m]
         """
 
     @abstractmethod

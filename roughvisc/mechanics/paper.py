@@ -72,11 +72,11 @@ def press(
     Yields
     ------
     time : float
-        [s]
+        Time of the step. [s]
     pressure : ndarray, shape (nx, ny)
-        [Pa]
+        Pressure. [Pa]
     approach : float
-        [m]
+        Level of the rigid profile. [m]
 
     Raises
     ------

@@ -89,7 +89,7 @@ class Sheet(Kernel):
     Parameters
     ----------
     thickness : float or str
-        [m]
+        Thickness. [m]
     poisson : float
         Poisson's ratio, from 0 to 1/2. On a slipping base the kernel does not depend on it.
     base : {"bonded", "slipping"}

@@ -49,7 +49,7 @@ def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: boo
 def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> int:
     """Return the number of faces between contact cells and free cells, see :func:`neighbours`.
 
-    The border of a mirrored surface has no such faces; count it as free space with nothing beyond the border.
+    With mirror boundaries the border has no such faces: use ``periodic=False`` and the default values beyond it.
     """
     count = 0
     for own, other in ((contact, free), (contact.T, free.T)):
