@@ -235,7 +235,7 @@ def _stated(numerics: Numerics) -> dict[str, Any]:
 
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
-    """Return a result after one Python warning each of missed tolerances, unsolved speeds and sparse tables."""
+    """Issue a Python warning for missed tolerances, unsolved speeds and sparse tables, and return the result."""
     for line in dataset.attrs.get("warnings", "").splitlines():
         subject, _, text = line.partition(": ")
         if subject in ("tolerance", "speeds", "material"):

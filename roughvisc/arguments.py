@@ -19,7 +19,7 @@ from roughvisc.errors import InputError, short_repr
 
 
 class DataNeeded(Exception):
-    """Raised if a function has checked its arguments and needs data that it was not given."""
+    """A function has checked its other arguments and needs the data, which are absent."""
 
 
 class NoData:
@@ -128,7 +128,7 @@ def units_of(function: Callable[..., Any]) -> dict[str, str]:
 
 
 def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Refuse a table with a key that is not known."""
+    """Refuse a table with an unknown key."""
     for key in table:
         if key not in known:
             name, expected = dotted(where, key), f"one of {', '.join(known)}"
@@ -136,7 +136,7 @@ def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -
 
 
 def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> str:
-    """Return a suggestion for a word that is not known; if no known word is similar, `otherwise` or the known ones."""
+    """Return a suggestion for an unknown word; if no known word is similar, `otherwise` or all known words."""
     known = list(known)
     if near := difflib.get_close_matches(str(word), known, n=1):
         return f"; did you mean {near[0]!r}?"
@@ -144,7 +144,7 @@ def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> st
 
 
 def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
-    """Return the only one of some keys that a table has, or refuse the table."""
+    """Return the only one of some keys in a table; refuse a table with none or several."""
     keys = list(keys)
     found = [key for key in keys if key in table]
     if len(found) != 1:
@@ -179,7 +179,7 @@ def split(table: Mapping[str, Any], *names: str) -> tuple[dict[str, Any], dict[s
 
 
 def located(error: InputError, where: str) -> InputError:
-    """Return an error about an argument as one about a key of a table."""
+    """Convert an error about an argument to an error about a key of a table."""
     key = re.sub(r"\[(\d+)\]", r".\1", dotted(where, error.key))
     text = str(error)
     message = f"{key}{text[len(error.key) :]}" if error.key and text.startswith(f"{error.key}: ") else f"{key}: {text}"

@@ -103,12 +103,12 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
 
 
 def warnings_text(warnings: Mapping[str, str]) -> str:
-    """Return the attribute that states some warnings, one per line; empty ones are left out."""
+    """Return the text of the attribute ``warnings``, with one line per warning; empty warnings are left out."""
     return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
 
 
 def own_rows(case: xr.Dataset) -> xr.Dataset:
-    """Return one case of a sweep over its own times or speeds, without rows after its last."""
+    """Return one case of a sweep over its own times or speeds, without the missing rows at the end."""
     if ROW not in case.dims:
         return case
     return case.isel({ROW: slice(int(case[ROWS]))}).swap_dims({ROW: axis_of(case.variables)})
@@ -137,7 +137,7 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
 
 
 def _same_unit(found: str, declared: str) -> bool:
-    """Whether two texts are one unit: ``m2``, as UDUNITS writes it, is ``m^2``."""
+    """Return whether two texts mean the same unit; UDUNITS writes ``m2`` for ``m^2``."""
     try:
         factor = quantity("1 " + re.sub(r"(?<=[a-zA-Z])(-?\d)", r"^\1", found), declared)
     except InputError:

@@ -27,7 +27,7 @@ def time_reached(now: float, end: float) -> str:
 
 
 class Bars(Progress):
-    """Progress bars by label, which close when the block ends.
+    """Progress bars by label; they close at the end of the block.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Bars(Progress):
             self.update(self._labels[label], completed=now, total=end or None, at=at or "starting")
 
     def only(self, label: str, now: float, end: float, at: str = "") -> None:
-        """Move the bar of one of several measurements in turn, and close the other bars."""
+        """Move the bar of a measurement, and close the bars of earlier measurements."""
         for other in [other for other in self._labels if other != label]:
             self.close(other)
         if label not in self._labels and self.disable:
@@ -75,7 +75,7 @@ class Bars(Progress):
                 self.remove_task(self._labels.pop(label))
 
     def line(self, label: str) -> None:
-        """Write a line on a computation if nothing is drawn and the last line is old."""
+        """Write a line on a computation, if bars are not drawn and some time has passed since the last line."""
         if self.disable and label in self._labels and time.monotonic() - self._line_at >= LINE_EVERY:
             self._line_at = time.monotonic()
             task = next(task for task in self.tasks if task.id == self._labels[label])
@@ -94,7 +94,7 @@ def reporting(
     console: Console | None = None,
     at: Callable[[float, float], str] = time_reached,
 ) -> Iterator[Callable[..., None]]:
-    """Yield ``report(now, end)``, which moves a progress bar; the bar closes with the block.
+    """Yield ``report(now, end)``, which moves a progress bar; the bar closes at the end of the block.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Numerics:
     time_step : "auto" or float or str
         Steps chosen by the tolerance, or a fixed step length. [s]
     device : {"cpu", "gpu"}
-        Where fields are computed. A GPU needs CuPy; results agree with those of a CPU within the tolerance.
+        Device that computes the fields. A GPU needs CuPy; its results agree with CPU results within the tolerance.
 
     Raises
     ------

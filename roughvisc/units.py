@@ -330,7 +330,7 @@ def _for_pint(unit: str) -> str:
 
 
 def _prefixed(number: str, found: str, unit: str) -> float | None:
-    """Return the value of a number whose unit is the expected one with SI prefixes, or None.
+    """Return the value of a number if its unit is the expected unit with SI prefixes, otherwise None.
 
     Most quantities of a study are of this form, and the registry of pint takes 0.2 s to build. A number of at most 15
     digits equals the one of pint rounded to 15 digits.
@@ -379,7 +379,7 @@ class Unit:
 
 
 def unit_for(values: ArrayLike, si: str) -> Unit:
-    """Unit with the engineering prefix that suits the largest of some values.
+    """Return the unit with the engineering prefix that suits the largest of some values.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
     covered = (times[0] <= begin + slack) & (end <= times[-1] + slack)
 
     def work_at(at: np.ndarray) -> np.ndarray:
-        """Return the work at some times: of the step at this time, after any jump, or else interpolated."""
+        """Return the work at some times, interpolated between steps; at a jump the work after the jump."""
         last = np.searchsorted(times, at + slack, side="right") - 1
         return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
 

@@ -42,12 +42,15 @@ def persson_fraction(strain: ArrayLike) -> Any:
 
 
 def asperity_fraction(strain: ArrayLike) -> Any:
-    r"""Return it by asperity theory at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`, 1.57 times Persson's value."""
+    r"""Return this fraction by asperity theory at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`.
+
+    The fraction is 1.57 times the fraction by Persson's theory.
+    """
     return math.sqrt(2 * math.pi) * np.asarray(strain, dtype=float)
 
 
 def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
-    r"""Return the contact area of a rough surface by Persson's theory and by asperity theory, for a rising load.
+    r"""Return the contact area of a rough surface by Persson's and by asperity theory, for a load that never falls.
 
     Parameters
     ----------

@@ -130,7 +130,7 @@ def budgets(
     workers: int | None = None,
     progress: bool = True,
 ) -> dict[str, xr.Dataset]:
-    """Return the budget of each of some quantities, from the same solves; see :func:`budget`."""
+    """Return the budgets of several quantities from the same solves; see :func:`budget`."""
     case, finished, folder = case_of(case, out)
     if not names:
         raise InputError(key="quantity", found=names, expected="at least one")

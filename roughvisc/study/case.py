@@ -172,7 +172,7 @@ class Case:
         return _digest([tables, surface, settings, self.precision, self._checksums, NUMERICS_REVISION])[:16]
 
     def height(self) -> xr.DataArray:
-        """Return the heights of the surface as conditioned, peaks up. [m]
+        """Return the conditioned heights of the surface, peaks up. [m]
 
         Raises
         ------
@@ -223,7 +223,7 @@ class Case:
 
     @classmethod
     def from_json(cls, text: str) -> Case:
-        """Make a case from :meth:`to_json`, as the attribute ``case`` of a result contains it."""
+        """Make a case from the JSON of :meth:`to_json`, which is also the attribute ``case`` of a result."""
         try:
             data = json.loads(text)
             if not isinstance(data, dict):
@@ -341,7 +341,7 @@ def _changed(
 
 
 def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) -> Case:
-    """Return the case of the tables of a study, checked; without a folder, paths are kept."""
+    """Return the checked case of the tables of a study; without a folder, paths are not resolved."""
     stated = with_files(data, folder)
     tables = in_si(stated, "", stated)
     try:

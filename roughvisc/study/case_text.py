@@ -76,7 +76,7 @@ def names_of(keys: Sequence[str]) -> dict[str, str]:
 
 
 def _last_word(key: str) -> str:
-    """Return the last part of a dotted key, with the part before if it is a number."""
+    """Return the last part of a dotted key; if this is a number, also the part before."""
     parts = key.split(".")
     return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
 

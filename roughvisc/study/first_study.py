@@ -73,8 +73,8 @@ def starter_study(
     study : path
         File of the study.
     options : mapping
-        ``format``, ``channel``, ``unit`` and ``spacing`` [m] for opening the file; None for options that it does not
-        need.
+        ``format``, ``channel``, ``unit`` and ``spacing`` [m] for opening the file; None for options that the file does
+        not need.
     found : Inspection
         Inspection of the scan.
     first : FirstPressure

@@ -85,7 +85,7 @@ def shortest_wave(height: xr.DataArray) -> float:
 
 
 def shape_on(case: Case, height: xr.DataArray, coarsening: float) -> tuple[int, int]:
-    """Return the numbers of cells if each is `coarsening` times as long."""
+    """Return the numbers of cells along x and y of a grid whose cells are `coarsening` times as long."""
     shape = height.sizes["x"], height.sizes["y"]
     return shape if coarsening == 1 else coarser_shape(shape, coarsening, not is_data(case))
 
@@ -294,7 +294,7 @@ def solve(
 
 
 def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
-    """Return the rows of a result nearest to some places of its axis; all rows if None."""
+    """Return the rows of a result nearest to some times or speeds; all rows without any."""
     if places is None:
         return result
     apart = np.abs(result[axis].values[:, None] - np.asarray(places, dtype=float))

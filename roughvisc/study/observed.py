@@ -73,7 +73,7 @@ def observe(
 
 
 def _add(case: Case, path: Path) -> bool:
-    """Add missing quantities to one file; return whether any was missing."""
+    """Add the missing quantities of one case to its file; return whether any was missing."""
     with open_result(path) as result:
         if not _lacking(case, result):
             return False

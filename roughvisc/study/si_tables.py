@@ -124,7 +124,7 @@ def _units() -> dict[str, dict[str, str]]:
 
 
 def default_of(key: str, case: Mapping[str, Any]) -> Any:
-    """Return the default of a key that a case does not state; None if there is none.
+    """Return the default of a key that a case does not state; None for a key without a default.
 
     Parameters
     ----------

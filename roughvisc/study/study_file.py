@@ -147,7 +147,7 @@ def existing_file(where: str, file: Any, folder: Path | None) -> str:
 
 @contextmanager
 def _in_file(key: str, file: Any) -> Iterator[None]:
-    """Attribute errors in a file to the key that names the file."""
+    """Assign errors in a file to the key that names the file."""
     try:
         yield
     except InputError as error:
@@ -204,7 +204,7 @@ def with_rows(where: str, stated: Any, folder: Path | None) -> Any:
 
 
 def speeds_of(where: str, stated: Any) -> list[float]:
-    """Return speeds in increasing order: one, a list, or a number of speeds between two ends. [m/s]"""
+    """Return speeds in increasing order, from one speed, a list, or ``from``, ``to`` and ``count``. [m/s]"""
     if not isinstance(stated, Mapping):
         listed = stated if isinstance(stated, list) else [stated]
         return sorted({quantity(one, "m/s", where) for one in listed})
@@ -227,7 +227,7 @@ def speeds_of(where: str, stated: Any) -> list[float]:
 
 
 def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parts of a case, by the names of its fields; check everything that can be checked without heights.
+    """Return the parts of a case by the names of its fields, after all checks that do not need the heights.
 
     Parameters
     ----------

@@ -195,7 +195,7 @@ def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
 
 
 def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], grids: set[float]) -> Case:
-    """Return the case with these fields and the pressure, and rows that all settings have in common."""
+    """Return the case with these fields, the pressure, and kept times that are possible in all settings."""
     changes: dict[str, Any] = {"solve.grid_error": False, "solve.boundary": case.settings.boundary}
     changes["keep.fields"] = list(dict.fromkeys([*case.settings.fields, *fields, "pressure"]))
     experiment = case.experiment

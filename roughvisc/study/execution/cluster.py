@@ -188,7 +188,7 @@ def processes_that_fit(sizes: Iterable[float], most: int, free: float) -> int:
 
 
 def side_by_side(cases: Sequence[Case], most: int) -> int:
-    """Return the number of processes for some cases on this machine: at most `most`, or as many as fit in memory."""
+    """Return the number of processes for some cases on this machine: `most`, or fewer if the memory is too small."""
     cells, sizes = dict[str, float](), []
     for case in cases if most > 1 else ():
         name = json.dumps(case.surface, sort_keys=True)

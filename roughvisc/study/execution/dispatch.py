@@ -145,7 +145,7 @@ def distribute(
 
 
 def _outcome(key: str, found: Any) -> Outcome:
-    """Return the outcome of a case from the value of its future: an outcome, or an exception or ``sys.exc_info()``."""
+    """Return the outcome of a case from its future, which holds an outcome, an exception or ``sys.exc_info()``."""
     if isinstance(found, Outcome):
         return found
     error = found[1] if isinstance(found, tuple) else found

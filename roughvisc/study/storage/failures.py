@@ -75,7 +75,7 @@ def recorded_failure(folder: Path, key: str, *, by: str | None = None) -> dict[s
 
 
 def forget_failure(folder: Path, key: str) -> None:
-    """Remove the record of a case, if there is one."""
+    """Remove the record of a failed case, if it exists."""
     with suppress(OSError):
         record_path(folder, key).unlink(missing_ok=True)
 

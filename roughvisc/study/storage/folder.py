@@ -171,7 +171,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text to a file, completely or not at all."""
+    """Write a text to a file atomically."""
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path

@@ -218,7 +218,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     ----------
     dataset : xarray.Dataset
         Declared variables, see :mod:`roughvisc.variables`, and scalar coordinates. Lazy fields are read and written in
-        layers of one chunk. The history of accepted steps that the Dataset carries becomes the group ``steps``.
+        layers of one chunk. The history of accepted steps in the Dataset becomes the group ``steps``.
     path : path
         The file to write; an existing file is replaced.
     precision : float, optional
@@ -363,7 +363,7 @@ def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
-    """Write a Dataset of another kind than a result to one NetCDF file; a failed write leaves no file."""
+    """Write a Dataset other than a result to one NetCDF file atomically."""
     kept = dataset.copy()
     kept.attrs = plain_attributes(dataset.attrs)
     numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
