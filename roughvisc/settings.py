@@ -60,7 +60,7 @@ class Numerics:
     Examples
     --------
     >>> Numerics(time_step="10 ms")
-    Numerics(time_step=0.01)
+    Numerics(time_step=0.01, device='cpu')
     """
 
     time_step: float | str = "auto"
