@@ -86,9 +86,9 @@ SLIDING_SHARE = 0.3
 #: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
 ENTERED = 0.3
 #: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
-#: creep in the pair over the instantaneous compliance. Measured on random contacts of 2 x 40 cells with eight per cent
-#: instantaneous compliance.
-SHARED = 0.1
+#: creep in the pair over the instantaneous compliance, and its largest value. Measured on random contacts of 2 x 40
+#: cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
+SHARED, SHARED_AT_MOST = 0.1, 1.0
 #: Largest error due to cells that have just entered, at a kept time inside a pair, as a part of the tolerance.
 UNCERTAIN = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
@@ -236,6 +236,9 @@ class Difference:
         Uncertain area in contact, and uncertain area out of contact. [m2]
     friction : float
         Error of the friction force of a slide. [N]
+    shared : float
+        Error of the pressure that both solutions share, in cells that have entered the contact; not part of
+        `pressure`. [N]
     """
 
     pressure: float = 0.0
@@ -244,6 +247,7 @@ class Difference:
     inside: float = 0.0
     outside: float = 0.0
     friction: float = 0.0
+    shared: float = 0.0
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
         """Return the larger error of each kind, of this difference and a part of the other."""
@@ -441,11 +445,13 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
         before = float((fine.pressure * memory.at_once(fine.history)).sum())
         after = float((new.pressure * memory.at_once(new.history)).sum())
         work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
-    apart, reached, coarse = difference(scene, new, other), new, other
+    shared = state.difference.shared * memory.remaining(time - fine.time)
+    apart, reached, coarse = replace(difference(scene, new, other), shared=shared), new, other
     if fine.is_open and new.force == 0:
         reached = without_past(new)
         coarse = reached if other is new else without_past(other)
-    return Step(new, apart, number, after_steps(scene, state, [reached], coarse, apart, work, spent))
+    after_step = after_steps(scene, state, [reached], coarse, apart, work, spent)
+    return Step(new, replace(apart, pressure=apart.pressure + shared), number, after_step)
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
@@ -487,12 +493,14 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
         apart = error_at(scene, fine, second, once, whole, other)
         left = 1.0 if is_soft else memory.remaining(middle - fine.time)
-        unsure, shared = entering(scene, fine, half), 0.0
+        unsure = entering(scene, fine, half)
+        carried = state.difference.shared
+        shared = carried * memory.remaining(taken)
         if scene.time_step is not None:
             break
         if lands and not is_soft:
             creep = memory.compliance(taken) / memory.compliance(0.0) - 1
-            shared = SHARED * creep**2 * entered_force(scene, fine, second)
+            shared += min(SHARED * creep**2, SHARED_AT_MOST) * entered_force(scene, fine, second)
         # Errors are relative to the largest values, but an approach counts as at least its rounding error: a flat
         # surface with periodic boundaries has no larger approach.
         force = max(state.largest_force, first.force, second.force, 1e-300)
@@ -534,8 +542,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         slide = scene.motions[number]
         apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
-    after = after_steps(scene, state, [first, second], once, apart, works[1], spent, length)
+    kept = replace(apart, shared=shared)
+    after = after_steps(scene, state, [first, second], once, kept, works[1], spent, length)
     inside = replace(state, work=state.work + works[0])
+    unsure += carried * memory.remaining(middle - fine.time)
     return [
         Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
         Step(whole, replace(apart, pressure=apart.pressure + shared), number, after),
