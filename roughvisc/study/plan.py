@@ -154,7 +154,7 @@ def plan(
         cases = read_cases(cases)
     if not cases:
         raise InputError(key="cases", found=cases, expected="at least one case")
-    folder, there = result_folder(cases[0], out), memory_available()
+    folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     surfaces, runs, rows = dict[str, tuple[xr.DataArray, float]](), dict[int, CoarseRun](), list[dict[str, Any]]()

@@ -48,7 +48,7 @@ def limited(monkeypatch):
 
     def limit(size, words="free in this machine"):
         for module in (resources, side_module):
-            monkeypatch.setattr(module, "memory_available", lambda: Available(size, words))
+            monkeypatch.setattr(module, "memory_available", lambda device="cpu": Available(size, words))
 
     return limit
 
