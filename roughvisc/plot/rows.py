@@ -18,7 +18,7 @@ MOST = 24
 
 
 def expect_result(dataset: Any, *names: str) -> None:
-    """Reject a Dataset that is not the result of one case, has no rows, or lacks variables."""
+    """Refuse a Dataset that is not the result of one case, has no rows, or lacks variables."""
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
     axis = axis_of(dataset.variables)

@@ -279,13 +279,13 @@ def like(h: xr.DataArray, values: np.ndarray) -> xr.DataArray:
 
 
 def require_heights(h: xr.DataArray, step: str) -> None:
-    """Reject a grid if all its points are missing."""
+    """Refuse a grid if all its points are missing."""
     if not np.isfinite(h.values).any():
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
 
 
 def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)") -> None:
-    """Reject a grid with missing points."""
+    """Refuse a grid with missing points."""
     if missing := int(h.size - np.isfinite(h.values).sum()):
         raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
 

@@ -372,7 +372,7 @@ def _plausible(h: xr.DataArray, path: Path) -> None:
 
 
 def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
-    """Reject heights that are all missing or implausibly far from zero.
+    """Refuse heights that are all missing or implausibly far from zero.
 
     Heights of metres are accepted in a file of a dozen points, which is an example.
     """

@@ -65,7 +65,7 @@ def _save_netcdf(h: xr.DataArray, path: Path) -> None:
 
 
 def known_suffix(path: Path) -> None:
-    """Reject a file name that :func:`save_scan` cannot write to."""
+    """Refuse a file name that :func:`save_scan` cannot write to."""
     if path.suffix.lower() not in WRITABLE:
         raise InputError(f"{path}: found the suffix {path.suffix!r}: expected one of {', '.join(WRITABLE)}")
 

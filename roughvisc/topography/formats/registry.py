@@ -223,7 +223,7 @@ def forget(error: BaseException | None) -> None:
 
 
 def affordable(path: Path, points: int, expansion: float = EXPANSION) -> None:
-    """Reject a header that claims more points than the file can hold, before they are allocated."""
+    """Refuse a header that claims more points than the file can hold, before they are allocated."""
     held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
     if points > max(held * expansion, 1024):
         raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
