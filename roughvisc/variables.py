@@ -83,23 +83,18 @@ class Variable:
 
 
 #: Comments of several variables.
-_COARSER = (
-    "bound in practice, over the largest value of all rows, at a speed over the value there: from the same on cells "
-    "twice as long, in steady sliding also four times (grid convergence index); of a scan it includes the roughness "
-    "that coarser cells lose"
-)
-_SPOTS = (
-    "of the contact spots; constriction on both sides, each body a half-space, without the gap and without films; "
-    "infinite in full contact; with periodic boundaries of one period, without the bulk"
-)
-_FLUX = "of the fluid, over the height of the gap: mean of the two faces of the cell; zero in contact and without flow"
+_COARSER = "bound in practice, from a coarser grid; relative to the largest row over time, to the same row over speed"
+_SPOTS = "of the contact spots between half-spaces; infinite in full contact; the gap does not conduct"
+_FLUX = "of the fluid, over the height of the gap; zero in contact and without flow"
+_SOLVER = "of the solution on this grid alone: without the errors of the grid and of the gap"
 _GRID_AND_SOLVER = "of the grid and of the solver"
 _PERSSON = "by Persson's theory of the same waves"
+_ASPERITIES = "at the rms slope of the surface; missing once the load has fallen"
 
 VARIABLES: dict[str, Variable] = {
     # coordinates; no standard_name "time", which in CF is a date
     "time": Variable(
-        _STEPS, "s", "time", "since the start of the program; at a jump the right-hand state is kept", in_table="last"
+        _STEPS, "s", "time", "since the start of the program; at a jump the state after it", in_table="last"
     ),
     "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding", in_table="last"),
     "x": Variable(("x",), "m", "x", "of the cell centre"),
@@ -109,250 +104,118 @@ VARIABLES: dict[str, Variable] = {
     "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
     # surface
     "height": Variable(
-        _GRID,
-        "m",
-        "height",
-        "of the rigid profile, peaks up; as conditioned; missing where absent; attribute `highest`: its highest point "
-        "[m], between cells or in one",
+        _GRID, "m", "height", "of the rigid profile, peaks up; missing where absent; attribute `highest`: its apex [m]"
     ),
-    "filled": Variable(
-        _GRID, "", "filled points", "missing heights that were filled in", dtype="int8", meanings=("measured", "filled")
-    ),
+    "filled": Variable(_GRID, "", "filled points", dtype="int8", meanings=("measured", "filled")),
     # fields
-    "pressure": Variable(
-        _FRAME,
-        "Pa",
-        "pressure",
-        "of the contact, mean over the cell; zero outside the contact and where the profile is absent",
-    ),
-    "gap": Variable(
-        _FRAME,
-        "m",
-        "gap",
-        "between the surfaces, at the cell centre; zero inside the contact; missing where the profile is absent",
-    ),
+    "pressure": Variable(_FRAME, "Pa", "pressure", "of the contact, mean over the cell"),
+    "gap": Variable(_FRAME, "m", "gap", "between the surfaces at the cell centre; missing where the profile is absent"),
     "displacement": Variable(
-        _FRAME,
-        "m",
-        "displacement",
-        "of the half-space's surface at the cell centre; positive into the half-space; its mean is zero unless space "
-        "is free",
+        _FRAME, "m", "displacement", "of the body's surface, positive into the body; of zero mean unless space is free"
     ),
     # histories
-    "force": Variable(
-        _STEPS,
-        "N",
-        "force",
-        "normal force; prescribed under load control, found under approach control",
-        in_table="last",
-    ),
+    "force": Variable(_STEPS, "N", "force", "normal force", in_table="last"),
     "approach": Variable(
         _STEPS,
         "m",
         "approach",
-        "of the rigid body from first touch; "
-        "free space: against the undeformed plane; periodic and mirror: against the mean plane of the half-space's "
-        "surface, which is the mean undeformed gap minus the mean gap, plus the mean displacement of the present cells "
-        "if any are absent; while the contact is open: the value at which it would just close; first touch is at the "
-        "highest cell, or at the apex of an indenter: on a rough surface it does not converge with the grid, while "
-        "mean_gap (periodic and mirror) does",
+        "of the rigid profile since first touch of its highest point; in free space against the undeformed plane, "
+        "otherwise against the mean plane of the body; of an open contact the value at which it would just close",
         in_table="last",
     ),
     "nominal_pressure": Variable(
-        _SERIES,
-        "Pa",
-        "nominal pressure",
-        "force over the nominal area, the area of the surface as given, absent cells included",
-        in_table="last",
+        _SERIES, "Pa", "nominal pressure", "force over the area of the grid, absent cells included", in_table="last"
     ),
     "work": Variable(
         _STEPS,
         "J",
         "work",
-        "of the force on the approach since the start; "
-        "over every accepted step, kept or not, as the work of the pressure on the displacement, stored and "
-        "dissipated, with the work of the friction force in a slide; a jump is quasi-static; with periodic boundaries "
-        "without the uniform displacement",
+        "of the force on the approach since the start, and of the friction force in a slide; over all steps; with "
+        "periodic boundaries without the uniform displacement",
     ),
     "contact_area": Variable(
-        _STEPS,
-        "m^2",
-        "contact area",
-        "real, corrected for the grid: "
-        "counted area less 0.088 times the staircase perimeter times the cell side; the perimeter is between cells in "
-        "contact and present cells out of contact: where the material ends the count is exact",
-        in_table="last",
+        _STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge", in_table="last"
     ),
-    "contact_area_counted": Variable(
-        _STEPS,
-        "m^2",
-        "contact area, counted",
-        "cells that carry pressure; larger than contact_area, since cells at the edge count as a whole",
-    ),
+    "contact_area_counted": Variable(_STEPS, "m^2", "contact area, counted", "cells that carry pressure"),
     "contact_fraction": Variable(
         _STEPS,
         "1",
         "contact fraction",
-        "contact_area over the area of the whole grid, absent cells included",
+        "contact_area over the area of the grid, absent cells included",
         in_table="last",
     ),
-    "mean_gap": Variable(
-        _STEPS,
-        "m",
-        "mean gap",
-        "over the present cells; with periodic boundaries and no cells absent: the separation of the mean planes of "
-        "both surfaces",
-        in_table="last",
-    ),
+    "mean_gap": Variable(_STEPS, "m", "mean gap", "over the present cells", in_table="last"),
     # sliding
     "sliding_distance": Variable(
-        _STEPS,
-        "m",
-        "sliding distance",
-        "since the start, along the path, whatever its direction; in whole cells of the grid",
-        in_table="last",
+        _STEPS, "m", "sliding distance", "since the start, along the path; in whole cells of the grid", in_table="last"
     ),
-    "reduced_speed": Variable(
-        _SERIES,
-        "m/s",
-        "reduced speed a_T V",
-        "speed times the shift factor of the material: curves of several temperatures fall on one over it",
-    ),
+    "reduced_speed": Variable(_SERIES, "m/s", "reduced speed a_T V", "speed times the shift factor of the material"),
     "friction_coefficient": Variable(
-        _STEPS,
-        "1",
-        "friction coefficient",
-        "friction_force over force: without shear at the interface; missing while the surfaces are apart",
-        in_table="last",
+        _STEPS, "1", "friction coefficient", "friction_force over force; missing while apart", in_table="last"
     ),
     "friction_force": Variable(
         _STEPS,
         "N",
         "friction force",
-        "against the motion, of pressure on inclined faces alone; in a slide by the slope of the body's surface, in "
-        "steady sliding the power that the material dissipates over the speed; in a hold against the last slide, "
-        "before the first slide against the first",
+        "against the motion, of pressure on inclined faces, without shear; in a hold against the last slide",
         in_table="last",
     ),
     "friction_force_across": Variable(
         _STEPS,
         "N",
         "force across the motion",
-        "keeps the profile on its path; positive to the left of the motion, 90 degrees counter-clockwise from it with "
-        "x to the right and y upwards: towards y for a motion along x, -x for y, -y for -x, x for -y; friction_force "
-        "is its component forwards; in a hold by the same slide as friction_force",
+        "to the left of the motion; keeps the profile on its path",
         in_table="last",
     ),
     "friction_force_error": Variable(
-        _SERIES,
-        "N",
-        "stated error of the friction force",
-        "of steps of one cell, by a coarse solution in steps of two; the rest of the grid error is not included",
+        _SERIES, "N", "stated error of the friction force", "of steps of one cell, without the rest of the grid error"
     ),
     # accuracy and cost
     "stated_error": Variable(
         _SERIES,
         "1",
         "numerical error",
-        "relative; the largest of pressure (L1), force and approach: sum of the errors of time steps, contact solver "
-        "and series, over the largest force and approach of the kept rows so far; in steady sliding the larger one of "
-        "pressure (L1) and friction, left by the iteration; comparable to the tolerance; without the grid error",
+        "the largest of pressure (L1), force and approach, of time steps, contact solver and series, over the largest "
+        "of the kept rows so far; in steady sliding of pressure (L1) and friction, by the iteration; without the grid",
         in_table="largest",
     ),
-    "time_error": Variable(
-        _STEPS,
-        "1",
-        "error of the time steps",
-        "part of stated_error, from the difference to a coarse solution, which takes one step for every two; over the "
-        "largest values of the kept rows so far",
-        in_table="largest",
-    ),
-    "residual": Variable(
-        _SERIES,
-        "1",
-        "error of the contact solver",
-        "part of stated_error: estimated error of the pressure (L1), over its sum",
-        in_table="largest",
-    ),
+    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", in_table="largest"),
+    "residual": Variable(_SERIES, "1", "error of the contact solver", "part of stated_error", in_table="largest"),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
     "contact_area_error": Variable(
         _SERIES,
         "m^2",
         "stated error of the contact area",
-        "area of the cells whose contact is uncertain by time steps and contact solver, in contact or out of it, "
-        "whichever is larger; the grid error is not included",
+        "area of the cells whose contact is uncertain; without the grid",
     ),
     "grid_error": Variable(
         _SERIES,
         "1",
         "grid error",
-        f"the largest of pressure (L1), force and approach, like stated_error; {_COARSER}; of the pressure also from "
-        "the force on cells at the edge of the contact; zero of a prescribed quantity",
+        f"the largest of pressure (L1), force and approach; {_COARSER}; also from the force at the edge of the contact",
         in_table="largest",
     ),
-    "grid_error_approach": Variable(
-        _SERIES,
-        "1",
-        "grid error of the approach",
-        f"{_COARSER}; zero if the approach is prescribed; it counts from the highest point",
-        in_table="largest",
-    ),
-    "grid_error_gap": Variable(
-        _SERIES,
-        "1",
-        "grid error of the gap",
-        f"mean gap; {_COARSER}; and from an opening that full contact may hide",
-        in_table="largest",
-    ),
+    "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER, in_table="largest"),
+    "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}", in_table="largest"),
     "grid_error_area": Variable(
-        _SERIES,
-        "1",
-        "grid error of the area",
-        f"contact area; {_COARSER}; and from the number of faces at the edge of the contact, or an opening that full "
-        "contact may hide",
-        in_table="largest",
+        _SERIES, "1", "grid error of the area", f"{_COARSER}; also from the edge of the contact", in_table="largest"
     ),
-    "grid_error_friction": Variable(
-        _SERIES,
-        "1",
-        "grid error of friction",
-        f"{_COARSER}; in steady sliding at least the difference from pressure times slope, if at most 10 %",
-        in_table="largest",
-    ),
+    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", _COARSER, in_table="largest"),
     "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
-    "convolutions": Variable(
-        _SERIES,
-        "1",
-        "convolutions",
-        "since the previous kept time: displacements and preconditioner applications, each one forward and one inverse "
-        "transform",
-        dtype="int32",
-    ),
+    "convolutions": Variable(_SERIES, "1", "convolutions", "since the previous kept time", dtype="int32"),
     "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run"),
     # observables: contact and gap
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
     "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
-    "cluster_area": Variable(
-        (ROW, "cluster"),
-        "m^2",
-        "area of a contact cluster",
-        "its cells, counted: all clusters together are contact_area_counted; largest first; missing beyond the number "
-        "of clusters",
-    ),
+    "cluster_area": Variable((ROW, "cluster"), "m^2", "area of a contact cluster", "its cells, counted; largest first"),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
     "pressure_density": Variable(
-        (ROW, "pressure_bin"),
-        "1/Pa",
-        "probability density of the pressure",
-        "over the cells in contact: its integral is 1",
+        (ROW, "pressure_bin"), "1/Pa", "probability density of the pressure", "over the cells in contact"
     ),
     "gap_density": Variable(
-        (ROW, "gap_bin"),
-        "1/m",
-        "probability density of the gap",
-        "over the present cells out of contact: its integral is 1",
+        (ROW, "gap_bin"), "1/m", "probability density of the gap", "over the present cells out of contact"
     ),
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
     "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
@@ -362,68 +225,37 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "m^3/s",
         "leak rate",
-        "volume of fluid that flows through the gap in unit time, with the pressure drop over the length of the map "
-        "along the flow; zero where leak_status is closed",
+        "volume of fluid through the gap in unit time, by the pressure drop",
         in_table="last",
     ),
-    "leak_rate_solver_lower": Variable(
-        _SERIES,
-        "m^3/s",
-        "lower bound on this grid's leak rate",
-        "of the solution of these equations alone (Thomson): without the errors of the grid and of the gap",
-    ),
-    "leak_rate_solver_upper": Variable(
-        _SERIES,
-        "m^3/s",
-        "upper bound on this grid's leak rate",
-        "of the solution of these equations alone (Dirichlet): without the errors of the grid and of the gap",
-    ),
+    "leak_rate_solver_lower": Variable(_SERIES, "m^3/s", "lower bound on this grid's leak rate", _SOLVER),
+    "leak_rate_solver_upper": Variable(_SERIES, "m^3/s", "upper bound on this grid's leak rate", _SOLVER),
     "leak_status": Variable(
         _SERIES,
         "",
         "whether fluid flows",
-        "closed: no path through the gap connects the two sides; cells that share only a corner are apart. "
-        "not_certified: the bounds are more than 1e-6 of the leak rate apart",
+        "closed: no path of cells with common sides; not_certified: bounds more than 1e-6 of the leak rate apart",
         dtype="int8",
         meanings=LEAK_MEANINGS,
     ),
     "transmissivity": Variable(
-        _SERIES,
-        "m^3",
-        "transmissivity",
-        "hydraulic, of the gap: leak rate times viscosity over the pressure gradient and the width across the flow: "
-        "the cube of a parallel gap over 12; independent of the fluid",
-        in_table="last",
+        _SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12", in_table="last"
     ),
     "hydraulic_aperture": Variable(
-        _SERIES,
-        "m",
-        "hydraulic aperture",
-        "the parallel gap that leaks as much: the cube root of 12 times the transmissivity; independent of the fluid",
-        in_table="last",
+        _SERIES, "m", "hydraulic aperture", "the parallel gap that leaks as much", in_table="last"
     ),
-    "flux": Variable(
-        _FRAME, "m^2/s", "flux", "volume flux, its size, of the fluid, over the height of the gap; missing in contact"
-    ),
+    "flux": Variable(_FRAME, "m^2/s", "flux", "volume flux, its size, over the height of the gap; missing in contact"),
     "flux_x": Variable(_FRAME, "m^2/s", "flux along x", f"volume flux {_FLUX}"),
     "flux_y": Variable(_FRAME, "m^2/s", "flux along y", f"volume flux {_FLUX}"),
     # observables: contact spots
     "incremental_stiffness": Variable(
-        _SERIES,
-        "N/m",
-        "incremental stiffness",
-        "against a fast increment, the contact frozen: frozen_stiffness times the instantaneous contact modulus, "
-        "unless another is given; missing if the material has none",
+        _SERIES, "N/m", "incremental stiffness", "against a fast increment, the contact frozen"
     ),
     "incremental_stiffness_error": Variable(
         _SERIES, "N/m", "stated error of the incremental stiffness", _GRID_AND_SOLVER
     ),
     "frozen_stiffness": Variable(
-        _SERIES,
-        "m",
-        "frozen stiffness",
-        "of the frozen contact, over the contact modulus: of a disc, twice its radius; infinite in full contact where "
-        "uniform pressure displaces nothing",
+        _SERIES, "m", "frozen stiffness", "over the contact modulus: of a disc, twice its radius"
     ),
     "frozen_stiffness_error": Variable(_SERIES, "m", "stated error of the frozen stiffness", _GRID_AND_SOLVER),
     "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS, in_table="last"),
@@ -433,22 +265,12 @@ VARIABLES: dict[str, Variable] = {
         _SERIES, "S", "stated error of the electrical conductance", _GRID_AND_SOLVER
     ),
     # theories
-    "persson_contact_area": Variable(
-        _SERIES,
-        "m^2",
-        "contact area, Persson",
-        "by Persson's theory, at the rms slope of the surface; missing once the load has fallen",
-    ),
+    "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES),
     "asperity_contact_area": Variable(
-        _SERIES,
-        "m^2",
-        "contact area, Bush, Gibson and Thomas",
-        "at low loads, at the rms slope of the surface; missing once the load has fallen",
+        _SERIES, "m^2", "contact area, Bush, Gibson and Thomas", f"at low loads, {_ASPERITIES}"
     ),
     "persson_friction_coefficient": Variable(_SERIES, "1", "friction coefficient, Persson", _PERSSON),
-    "persson_contact_fraction": Variable(
-        _SERIES, "1", "contact fraction, Persson", f"contact area over nominal area, {_PERSSON}"
-    ),
+    "persson_contact_fraction": Variable(_SERIES, "1", "contact fraction, Persson", _PERSSON),
 }
 
 #: Fields that the user may request in ``fields``; the solver computes them.
