@@ -28,7 +28,6 @@ from roughvisc.study.storage.folder import (
     is_writable,
     lock_case,
     lock_path,
-    partial_files,
     require_writable,
     result_path,
 )
@@ -169,7 +168,7 @@ def run_case(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with lock_case(lock_path(folder, case.key)):
-            for torn in partial_files(path):
+            for torn in folder.glob(f".{case.key}.*.part.nc"):
                 torn.unlink()
             keeper = CheckpointWriter(
                 checkpoint_path(folder, case.key),

@@ -27,7 +27,7 @@ from roughvisc.study.execution.cluster import (
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attempt, outcome_of
 from roughvisc.study.execution.run import is_result_of, result_folder
-from roughvisc.study.storage.failures import forget_failure, log_file, record_failure, recorded_failure
+from roughvisc.study.storage.failures import log_file, record_failure, record_path, recorded_failure
 from roughvisc.study.storage.folder import is_writable, lock_case, lock_path, require_writable, result_path
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.results_table import write_table
@@ -166,7 +166,7 @@ def run_cases(
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
-            elif (failed := recorded_failure(folder, key, by=program())) and not retry_failed:
+            elif (failed := recorded_failure(folder, key)).get("source") == program() and not retry_failed:
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         processes = 0
@@ -290,7 +290,8 @@ class Record:
         index = index_of(self.folder, self._entries())
         for key, outcome in self._outcomes.items():
             if key in index:
-                forget_failure(self.folder, key)
+                with suppress(OSError):  # the case failed before
+                    record_path(self.folder, key).unlink(missing_ok=True)
                 if outcome.entry is None:
                     self._outcomes[key] = outcome_of(index[key], reused=True)
         held = {key: outcome.message for key, outcome in self._outcomes.items() if outcome.kind == "held"}

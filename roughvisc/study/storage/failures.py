@@ -13,7 +13,7 @@ from typing import Any
 
 from roughvisc.errors import InputError
 from roughvisc.study.case import Case, program
-from roughvisc.study.storage.folder import atomic_write
+from roughvisc.study.storage.folder import write_text
 
 log = logging.getLogger("roughvisc")
 
@@ -48,36 +48,17 @@ def record_failure(folder: Path, case: Case, message: str, error: str, trace: st
     }
     path = record_path(folder, case.key)
     try:
-        with atomic_write(path) as temporary:
-            temporary.write_text(json.dumps(record, indent=1))
+        write_text(path, json.dumps(record, indent=1))
     except (OSError, InputError) as problem:
         log.warning("%s cannot be written: %s", path, problem)
 
 
-def recorded_failure(folder: Path, key: str, *, by: str | None = None) -> dict[str, Any] | None:
-    """Return the record of a failed case; None without a readable record.
-
-    Parameters
-    ----------
-    folder : Path
-        Results folder.
-    key : str
-        Key of the case.
-    by : str, optional
-        Version of the program; records of other versions are ignored, because this version may not fail.
-    """
+def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
+    """Return the record of a failed case; empty without a readable record."""
     try:
-        record = json.loads(record_path(folder, key).read_text())
-    except (OSError, ValueError):
-        return None
-    whole = isinstance(record, dict) and isinstance(record.get("case"), dict)
-    return record if whole and by in (None, record.get("source")) else None
-
-
-def forget_failure(folder: Path, key: str) -> None:
-    """Remove the record of a failed case, if it exists."""
-    with suppress(OSError):
-        record_path(folder, key).unlink(missing_ok=True)
+        return dict(json.loads(record_path(folder, key).read_text()))
+    except (OSError, ValueError, TypeError):
+        return {}
 
 
 class _LogFile(logging.FileHandler):

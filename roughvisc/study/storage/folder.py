@@ -186,11 +186,6 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def partial_files(path: Path) -> list[Path]:
-    """Return the incomplete files of interrupted writes of a result."""
-    return list(path.parent.glob(f".{path.stem}.*.part{path.suffix}"))
-
-
 def write_json(path: Path, value: Any) -> None:
     """Write a compressed JSON file with a checksum; if writing fails, an existing file is not changed."""
     with suppress(OSError, InputError), atomic_write(path) as temporary:

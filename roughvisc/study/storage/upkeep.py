@@ -6,7 +6,6 @@ import re
 import shutil
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import netCDF4
@@ -24,32 +23,13 @@ from roughvisc.study.storage.folder import (
 )
 from roughvisc.study.storage.netcdf import ERRORS, NETCDF, open_result
 
-_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.(lock|unfinished|(failed\.)?[0-9a-f]{8}\.part(\.\w+)?)")
-_PART = re.compile(r"\..+\.[0-9a-f]{8}\.part(\.\w+)?")
+#: Hidden files of a case: its lock, its checkpoint, and incomplete files.
+_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.")
 #: Age of an incomplete file that belongs to no case, above which the file counts as a leftover. [s]
 _ABANDONED = 3600.0
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Integrity of one file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    flaw : str
-        Description of the damage; empty for an undamaged file.
-    has_checksums : bool
-        Whether all arrays of the file have checksums. Files of other programs may lack checksums.
-    """
-
-    path: Path
-    flaw: str
-    has_checksums: bool
-
-
-def verify(place: str | Path) -> list[Verdict]:
+def verify(place: str | Path) -> dict[Path, str]:
     """Read results to their last byte and compare every block with its checksum.
 
     Parameters
@@ -59,36 +39,31 @@ def verify(place: str | Path) -> list[Verdict]:
 
     Returns
     -------
-    list of Verdict
-        One per file, sorted by name.
+    dict
+        File -> description of its damage, which is empty for an undamaged file; sorted by name.
 
     Raises
     ------
     InputError
         If there are no results.
     """
-    place = Path(place)
+    place, flaws = Path(place), {}
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
-    return [_verdict(path) for path in results_at(place)]
-
-
-def _verdict(path: Path) -> Verdict:
-    """Return the verdict on a result, after reading all its variables with the library alone."""
-    try:
-        require_file(path)
-        checked = True
-        with NETCDF, netCDF4.Dataset(path) as file:
-            for group in (file, *file.groups.values()):
-                for variable in group.variables.values():
-                    checked &= not variable.ndim or bool((variable.filters() or {}).get("fletcher32"))
-                    for first in range(0, len(variable), 16) if variable.ndim else ():
-                        variable[first : first + 16]
-    except InputError as error:
-        return Verdict(path, str(error), False)
-    except ERRORS as error:
-        return Verdict(path, f"{path}: is damaged: {error}", False)
-    return Verdict(path, "", checked)
+    for path in results_at(place):
+        flaws[path] = ""
+        try:
+            require_file(path)
+            with NETCDF, netCDF4.Dataset(path) as file:
+                for group in (file, *file.groups.values()):
+                    for variable in group.variables.values():
+                        for first in range(0, len(variable), 16) if variable.ndim else ():
+                            variable[first : first + 16]
+        except InputError as error:
+            flaws[path] = str(error)
+        except ERRORS as error:
+            flaws[path] = f"{path}: is damaged: {error}"
+    return flaws
 
 
 def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
@@ -115,35 +90,34 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     folder = Path(folder)
     require_folder(folder)
     of_cases: dict[str, list[Path]] = {}
-    unused = []
-    for path in sorted(folder.glob(".*")):
-        if matched := _OF_A_CASE.fullmatch(path.name):
+    removed: list[Path] = []
+
+    def remove(path: Path) -> None:
+        with suppress(OSError):  # removed in the meantime, or the folder is not writable
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+            removed.append(path)
+
+    for path in sorted(folder.iterdir()):
+        if matched := _OF_A_CASE.match(path.name):
             of_cases.setdefault(matched[1], []).append(path)
-        elif _PART.fullmatch(path.name):
-            with suppress(OSError):  # removed in the meantime
-                unused += [path] if time.time() - path.lstat().st_mtime > _ABANDONED else []
-    if everything:
-        unused += [*sorted(folder.glob("*.nc.damaged")), *sorted(folder.glob("*.failed.json"))]
-    removed = [path for path in unused if _remove(path)]
+        elif path.match(".*.part*"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                    remove(path)
+        elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
+            remove(path)
     for key, paths in of_cases.items():
         checkpoint, lock = checkpoint_path(folder, key), lock_path(folder, key)
         if (checkpoint / STATE).exists() and not everything:
             try:
                 open_result(result_path(folder, key)).close()
             except InputError:  # the case is not finished
-                paths = [path for path in paths if path != checkpoint]
+                paths.remove(checkpoint)
         if paths:
             with suppress(OSError), lock_case(lock, patience=0.0):
-                removed += [path for path in paths if path == lock or _remove(path)]
+                for path in paths:
+                    remove(path) if path != lock else removed.append(lock)
     return removed
-
-
-def _remove(path: Path) -> bool:
-    """Remove a file or folder; return whether that was possible."""
-    with suppress(OSError):
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink()
-        return True
-    return False

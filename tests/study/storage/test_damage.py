@@ -246,23 +246,16 @@ def test_sweep__refuses_it_before_anything_is_computed(copied, change, invoke):
 
 def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invoke):
     _, _, path = copied
-    for name in "abc":
+    for name in "ab":
         shutil.copy(path, path.with_name(f"{name}.nc"))
     path.unlink()
     out = path.parent
     with_flipped_bit(out / "b.nc", "pressure")
-    rv.open_result(out / "a.nc").load().to_netcdf(out / "c.nc.tmp")
-    os.replace(out / "c.nc.tmp", out / "c.nc")
-    found = verify(out)
-    assert [(one.path.name, bool(one.flaw), one.has_checksums) for one in found] == [
-        ("a.nc", False, True),
-        ("b.nc", True, False),
-        ("c.nc", False, False),
-    ]
+    assert {one.name: bool(flaw) for one, flaw in verify(out).items()} == {"a.nc": False, "b.nc": True}
     content = (out / "b.nc").read_bytes()
     status, said, err = invoke("verify", out)
     assert status == 1
-    assert said.startswith("2 of 3 files intact")
+    assert said == "1 of 2 files intact\n"
     assert str(out / "b.nc") in err
     assert (out / "b.nc").read_bytes() == content
     (out / "b.nc").unlink()
