@@ -20,7 +20,7 @@ from roughvisc.topography.grid import (
     with_coordinates,
     with_filled_points,
 )
-from roughvisc.topography.missing_points import harmonic
+from roughvisc.topography.missing_points import membrane
 from roughvisc.topography.resampling import resample
 from roughvisc.units import Quantity, quantities
 
@@ -251,10 +251,8 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> 
         degrees = [min(order, n - 1) for n in values.shape]
         return RectBivariateSpline(*map(np.arange, values.shape), values, kx=degrees[0], ky=degrees[1])(*at)
 
-    values, missing, filled = h2.values.copy(), np.isnan(h2.values), filled_points(h2)
-    if missing.any():
-        values[missing] = harmonic(h2.values, missing)
-    heights = laid(values, 3)
+    missing, filled = np.isnan(h2.values), filled_points(h2)
+    heights = laid(membrane(h2.values), 3)
     heights[laid(missing.astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
     marked = None if filled is None else laid(filled.astype(float), 1) > _ON_BORDER
     x, y = (first[axis].values for axis in ("x", "y"))

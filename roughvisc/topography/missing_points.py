@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -26,8 +25,8 @@ from roughvisc.topography.grid import (
 _MAD = 1.4826
 #: Side of the window that distinguishes large holes from small ones, in points.
 _HOLE = 9
-#: Largest count of numbers sorted in one block.
-_AT_ONCE = 2_000_000
+#: Memory of the windows that are sorted together. [byte]
+_MEMORY = 1 << 24
 
 
 def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> xr.DataArray:
@@ -63,14 +62,10 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     threshold = number("threshold", threshold, "-")
     h = checked(h, "mask_outliers")
     require_heights(h, "mask_outliers")
-    off = np.empty_like(h.values)
-    for rows, median in _local_median(h.values, window):
-        off[rows] = np.abs(h.values[rows] - median)
-    typical, faintest = np.nanmedian(off), 1e-12 * np.nanmax(np.abs(h.values))
-    outlier = np.empty(h.shape, dtype=bool)
-    for rows, median in _local_median(off, window):
-        scale = np.fmax(median, typical) * _MAD
-        outlier[rows] = off[rows] > np.maximum(threshold * scale, faintest)
+    off = np.abs(h.values - _local_median(h.values, window))
+    faintest = 1e-12 * np.nanmax(np.abs(h.values))
+    scale = np.fmax(_local_median(off, window), np.nanmedian(off)) * _MAD
+    outlier = off > np.maximum(threshold * scale, faintest)
     count = int(outlier.sum())
     line = f"outliers masked: {count} points beyond {threshold:g} deviations from the median of {window} x {window}"
     return noted(like(h, np.where(outlier, np.nan, h.values)), line, outliers=count + h.attrs.get("outliers", 0))
@@ -104,10 +99,11 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
         raise InputError("fill: the missing cells are absent (without material): expected a scan with missing points")
     require_heights(h, "fill")
     missing = np.isnan(h.values)
-    heights = h.values.copy()
-    if missing.any():
-        spanned = harmonic(h.values, missing) if method == "harmonic" else _nearest(h.values, missing, spacing(h))
-        heights[missing] = spanned
+    if method == "harmonic":
+        heights = membrane(h.values)
+    else:
+        nearest = scipy.ndimage.distance_transform_edt(missing, spacing(h), return_distances=False, return_indices=True)
+        heights = h.values[tuple(nearest)]
     before = filled_points(h)
     marked = with_filled_points(like(h, heights), missing if before is None else missing | before)
     return noted(marked, f"filled: {int(missing.sum())} missing points, {method}", fill_method=method)
@@ -124,55 +120,34 @@ def in_large_holes(missing: np.ndarray) -> np.ndarray:
     return scipy.ndimage.uniform_filter(missing.astype(float), _HOLE, mode="nearest") > 0.5
 
 
-def _local_median(values: np.ndarray, window: int) -> Iterator[tuple[slice, np.ndarray]]:
-    """Yield blocks of rows, and the median of the finite values in a square window about each of their points.
+def _local_median(values: np.ndarray, window: int) -> np.ndarray:
+    """Return the median of the finite values in a square window about each point; smaller windows at the border."""
+    return scipy.ndimage.vectorized_filter(
+        values, _median, size=window, mode="constant", cval=np.nan, batch_memory=_MEMORY
+    )
 
-    The median is NaN if a window has no finite value. Windows are smaller at the border. Blocks limit the memory, which
-    holds one copy of the rows for each point of a window.
+
+def _median(windows: np.ndarray, axis: tuple[int, ...]) -> np.ndarray:
+    """Return the median of the finite values of each window, over the last two axes; NaN if a window has none."""
+    ordered = np.sort(windows.reshape(*windows.shape[:-2], -1), axis=-1)  # NaN last
+    count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.clip(at, 0, ordered.shape[-1] - 1), axis=-1)
+        for at in ((count - 1) // 2, count // 2)
+    )
+    return np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
+
+
+def membrane(heights: np.ndarray) -> np.ndarray:
+    r"""Return heights with a membrane over each hole: Laplace's equation, no flux through the border. [m]
+
+    :math:`\sum_n (h_n - h_p) = 0` over the neighbours of every missing point: four, or fewer at the border of the scan.
     """
-    reach = window // 2
-    rows = max(1, _AT_ONCE // (window**2 * values.shape[1]))
-    for start in range(0, len(values), rows):
-        stop = min(start + rows, len(values))
-        first, last = max(start - reach, 0), min(stop + reach, len(values))
-        beyond = (first - (start - reach), stop + reach - last)
-        block = np.pad(values[first:last], [beyond, (reach, reach)], constant_values=np.nan)
-        stacked = np.lib.stride_tricks.sliding_window_view(block, (window, window)).reshape(
-            *(-1, values.shape[1]), window**2
-        )
-        ordered = np.sort(stacked, axis=-1)  # NaN last
-        count = np.isfinite(ordered).sum(axis=-1)[..., None]
-        low = np.take_along_axis(ordered, np.maximum((count - 1) // 2, 0), axis=-1)
-        high = np.take_along_axis(ordered, np.minimum(count // 2, window**2 - 1), axis=-1)
-        yield slice(start, stop), np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
+    missing = np.isnan(heights)
+    if not missing.any():
+        return heights.copy()
+    from SurfaceTopography import Topography  # slow to import
 
-
-def harmonic(heights: np.ndarray, missing: np.ndarray) -> np.ndarray:
-    r"""Return the heights of a membrane over each hole, row by row. [m]
-
-    :math:`\sum_n (h_n - h_p) = 0` over the neighbours of every missing point: four, or fewer at the border of the scan,
-    which has zero flux.
-    """
-    from scipy.sparse.linalg import spsolve  # slow to import
-
-    number = np.cumsum(missing).reshape(missing.shape) - 1  # of the missing points
-    count, mean = int(number[-1, -1]) + 1, np.nanmean(heights)
-    diagonal, right = np.zeros(count), np.zeros(count)
-    rows, columns = [np.arange(count)], [np.arange(count)]
-    low, high, every = slice(None, -1), slice(1, None), slice(None)
-    for here, there in (((low, every), (high, every)), ((every, low), (every, high))):
-        for one, other in ((here, there), (there, here)):
-            diagonal[number[one][missing[one]]] += 1.0
-            both, rim = missing[one] & missing[other], missing[one] & ~missing[other]
-            rows.append(number[one][both])
-            columns.append(number[other][both])
-            right[number[one][rim]] += heights[other][rim] - mean
-    entries = np.concatenate([diagonal, np.full(sum(map(len, rows)) - count, -1.0)])
-    laplace = scipy.sparse.csc_array((entries, (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
-    return np.asarray(mean + spsolve(laplace, right, permc_spec="MMD_AT_PLUS_A"))
-
-
-def _nearest(heights: np.ndarray, missing: np.ndarray, sides: tuple[float, float]) -> np.ndarray:
-    """Return the nearest present height for each missing point. [m]"""
-    nearest = scipy.ndimage.distance_transform_edt(missing, sides, return_distances=False, return_indices=True)
-    return heights[nearest[0][missing], nearest[1][missing]]
+    mean = np.nanmean(heights)
+    spanned = Topography(np.ma.array(heights - mean, mask=missing), heights.shape).interpolate_undefined_data()
+    return np.where(missing, mean + spanned.heights(), heights)

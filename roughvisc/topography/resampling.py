@@ -24,7 +24,7 @@ from roughvisc.topography.grid import (
     spacing,
     with_coordinates,
 )
-from roughvisc.topography.missing_points import harmonic
+from roughvisc.topography.missing_points import membrane
 from roughvisc.units import Quantity, quantities
 
 #: Largest reduction of an overlap by rounding, relative to a cell.
@@ -73,9 +73,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     shape = counts("shape", shape)
     h = checked(h, "resample")
     missing, filled = np.isnan(h.values), filled_points(h)
-    values = h.values.copy()
-    if missing.any():
-        values[missing] = harmonic(h.values, missing)
+    values = membrane(h.values)
     if _repeats("resample", h, periodic):
         heights, way = resample_periodic(values, shape), "by Fourier interpolation"
     else:
