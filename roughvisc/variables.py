@@ -29,7 +29,7 @@ ROW, ROWS = "row", "rows"
 #: Dimension of all accepted steps.
 STEP = "step"
 #: Dimensions that a result of one case may have in addition to the dimension of its rows.
-OTHER_DIMS = ("x", "y", "bnds")
+OTHER_DIMS = ("x", "y")
 
 _GRID = ("x", "y")
 _FRAME = (ROW, "x", "y")
@@ -99,8 +99,6 @@ VARIABLES: dict[str, Variable] = {
     "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding", in_table="last"),
     "x": Variable(("x",), "m", "x", "of the cell centre"),
     "y": Variable(("y",), "m", "y", "of the cell centre"),
-    "x_bounds": Variable(("x", "bnds"), "", "borders of the cells along x", "in files alone"),
-    "y_bounds": Variable(("y", "bnds"), "", "borders of the cells along y", "in files alone"),
     "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
     # surface
     "height": Variable(

@@ -103,7 +103,7 @@ def read_entry(path: Path) -> Entry:
             file.set_auto_maskandscale(False)
             stored = file.variables
             stated = {name: one.item() if isinstance(one, np.generic) else one for name, one in file.__dict__.items()}
-            found = foreign(stated, {name: (one.dimensions, one.dtype) for name, one in stored.items()})
+            found = foreign(stated, {name: one.dimensions for name, one in stored.items()})
             histories = {name: stored[name][...] for name in _HISTORIES if name in stored}
             fields = {name: one.dtype.str for name, one in stored.items() if one.dimensions[-2:] == ("x", "y")}
             grid = {name: np.asarray(stored[name][...], float) for name in ("x", "y") if name in stored}

@@ -24,10 +24,9 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
-from roughvisc.errors import InputError, short_repr
+from roughvisc.errors import InputError
 from roughvisc.labels import STEPS, label, steps_of, with_steps
 from roughvisc.study.storage.folder import atomic_write, require_file
-from roughvisc.topography.grid import cell_edges
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 #: Errors of the library for a file that it cannot read.
@@ -50,10 +49,8 @@ _CHUNK = (8, 64, 64)
 _MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
 #: Longest side of a chunk of any other variable: a map of 1024 x 1024 doubles has 8 MB.
 _LONGEST_CHUNK = 1024
-#: Suffix of the variables with the borders of cells. Only files have these variables, because the cells are equal.
-BOUNDS = "_bounds"
 #: Variables without missing values.
-_COORDINATES = (*AXES, *(f"{axis}{end}" for axis in ("x", "y") for end in ("", BOUNDS)))
+_COORDINATES = (*AXES, "x", "y")
 
 
 class DamagedError(InputError):
@@ -62,14 +59,7 @@ class DamagedError(InputError):
 
 def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     """Return the error of a file that the library could not read: a system error, or damaged content."""
-    if not (isinstance(error, OSError) and (error.errno or 0) > 0):  # errors of the library have negative numbers
-        try:
-            with path.open("rb") as stream:  # the library reports a failing disk as wrong bytes
-                while stream.read(1 << 24):
-                    pass
-        except OSError as refusal:
-            error = refusal
-    if isinstance(error, OSError) and (error.errno or 0) > 0:
+    if isinstance(error, OSError) and (error.errno or 0) > 0:  # errors of the library have negative numbers
         text = f"{path}: cannot be read: {error.strerror or error}: expected a result of roughvisc (.nc)"
         return InputError(text, key=str(path), found=error.strerror, transient=True)
     reason = f"{what}{error}"
@@ -108,7 +98,7 @@ def open_result(path: str | Path) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except ERRORS as error:
         raise unreadable(path, error) from error
-    if found := foreign(dataset.attrs, {str(name): (one.dims, one.dtype) for name, one in dataset.variables.items()}):
+    if found := foreign(dataset.attrs, {str(name): one.dims for name, one in dataset.variables.items()}):
         expected = f"a result of roughvisc of format {RESULT_FORMAT}"
         raise InputError(
             f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
@@ -116,7 +106,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     return dataset
 
 
-def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[tuple[Any, ...], np.dtype[Any]]]) -> str:
+def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[Any, ...]]) -> str:
     """Return the reason if a file is not a result of this format; empty for a result.
 
     Parameters
@@ -124,7 +114,7 @@ def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[tuple[A
     attributes : mapping
         Attributes of the file.
     variables : mapping
-        Name -> dimensions and dtype of its variables.
+        Name -> dimensions of its variables.
     """
     rows = axis_of(variables)
     if (stated := attributes.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
@@ -132,13 +122,8 @@ def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[tuple[A
     for name in AXES[rows].needed:
         if name not in variables:
             return f"holds no {name}"
-        if (dims := variables[name][0]) != (rows,):
+        if (dims := variables[name]) != (rows,):
             return f"holds {name} over {', '.join(map(str, dims)) or 'nothing'}"
-    for name, (_, dtype) in variables.items():
-        if name in VARIABLES and dtype.kind not in ("U" if VARIABLES[name].dtype == "str" else "fiub"):
-            return f"holds {name} as {dtype}"
-    if not isinstance(attributes.get("tolerance", 1.0), float | np.floating):
-        return f"has the tolerance {short_repr(attributes['tolerance'])}"
     try:
         case = json.loads(attributes.get("case", "{}"))
     except (TypeError, ValueError, RecursionError):
@@ -161,7 +146,7 @@ class ResultBackend(BackendEntrypoint):
 
 
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
-    """Return the variables of a file or a group, without the borders of the cells."""
+    """Return the variables of a file or a group."""
     variables = {}
     for name, stored in file.variables.items():
         lazily = stored.dimensions[-2:] == ("x", "y")
@@ -170,9 +155,6 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
         encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
         encoding |= {"contiguous": True} if chunking == "contiguous" else {"chunksizes": tuple(chunking or ())}
         variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__, encoding)
-    for axis in ("x", "y"):
-        if axis in variables and variables[axis].attrs.get("bounds") == f"{axis}{BOUNDS}":
-            variables.pop(variables[axis].attrs.pop("bounds"), None)
     decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
     texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
     return decoded.assign_coords(texts)
@@ -244,12 +226,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     Every reader supports the filter zlib, which is used at level 1. netCDF4 is called directly: on a Dask worker xarray
     would request a lock from the scheduler for every variable, although only this process uses the temporary file.
     """
-    root = label(dataset).drop_vars([f"{axis}{BOUNDS}" for axis in ("x", "y")], errors="ignore")
-    root = root.assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
-    for axis in [axis for axis in ("x", "y") if axis in root.dims]:
-        edges = cell_edges(root[axis].values)
-        root = root.assign({f"{axis}{BOUNDS}": ((axis, "bnds"), np.stack([edges[:-1], edges[1:]], axis=1))})
-        root[axis].attrs = root[axis].attrs | {"bounds": f"{axis}{BOUNDS}"}
+    root = label(dataset).assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
     steps = steps_of(dataset)
     with atomic_write(path) as temporary:
         try:

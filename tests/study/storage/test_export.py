@@ -133,9 +133,6 @@ def test_cf__every_variable_says_what_it_is_in_known_units(file):
         assert found.title
         for name, variable in found.variables.items():
             assert re.fullmatch(r"[A-Za-z]\w*", name)
-            if name in ("x_bounds", "y_bounds"):  # what is said of the centres holds of these
-                assert not variable.ncattrs()
-                continue
             assert variable.long_name
             if "flag_values" in variable.ncattrs() or name == "filled":
                 continue
@@ -155,19 +152,7 @@ def test_cf__coordinates_ascend_and_are_complete(file):
         assert all(
             v.dimensions in (("time",), ("x",), ("y",), ("x", "y"), ("time", "x", "y"))
             for v in found.variables.values()
-            if not v.name.endswith("_bounds")
         )
-
-
-def test_cf__cells_have_borders_that_meet(file):
-    with netCDF4.Dataset(file) as found:
-        for axis in ("x", "y"):
-            borders = found[found[axis].bounds]
-            assert borders.dimensions == (axis, "bnds")
-            lower, upper = borders[:].T
-            np.testing.assert_array_equal(lower[1:], upper[:-1])
-            np.testing.assert_allclose((lower + upper) / 2, found[axis][:], rtol=1e-12)
-            assert upper[0] > lower[0]
 
 
 def test_cf__flags_have_values_and_meanings(file):
