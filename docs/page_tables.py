@@ -1,6 +1,6 @@
 """Tables of pages that come from the package: a mark on a page is replaced by its table when the pages are built."""
 
-from roughvisc.study.audit.limits import LIMITS
+from roughvisc.study.audit.checks import LIMITS
 from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
 
 
@@ -26,7 +26,7 @@ def limits():
     ]
     for name, one in LIMITS.items():
         lines.append(
-            f"| `{name}`: {one.assumption} | {one.number} | {one.doubtful:g}, {one.broken:g} | {one.source} |"
+            f"| `{name}` | {one.number} | {one.doubtful:g}, {one.broken:g} | {one.source} |"
         )
     return "\n".join(lines)
 

@@ -11,7 +11,6 @@ from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.settings import Settings
-from roughvisc.study.audit.limits import AuditInputs
 from roughvisc.study.study_file import COLUMNS, GEOMETRY, PROGRAMS, SEGMENTS, TABLES, TEMPERATURE
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.synthesis import RECIPES
@@ -68,7 +67,7 @@ EXPECTED = {
     ("solve", "keep"): keys_of(Settings) - {"missing"} | {"precision"},
     ("observe.leakage",): keys_of(rv.observables.leakage, 1),
     ("observe.conductance",): keys_of(rv.observables.conductance, 1),
-    ("audit",): keys_of(AuditInputs),
+    ("audit",): keys_of(rv.audit, 1),
 }
 
 

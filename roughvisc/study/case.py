@@ -80,8 +80,6 @@ class Case:
         Listed times after the end of the program, which are not kept. [s]
     precision : float or None
         Relative precision of the fields in the file; None if they are exact.
-    audit_inputs : mapping
-        Quantities that the study states for an audit, in SI.
     """
 
     tables: Mapping[str, Any]
@@ -94,7 +92,6 @@ class Case:
     settings: Settings = field(compare=False)
     late_times: tuple[float, ...] = field(compare=False)
     precision: float | None = field(compare=False)
-    audit_inputs: Mapping[str, Any] = field(compare=False)
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -143,6 +140,11 @@ class Case:
     def observed(self) -> Mapping[str, dict[str, Any]]:
         """Arguments of each observable that the study requests, in SI."""
         return self.tables.get("observe", {})
+
+    @property
+    def audit_inputs(self) -> Mapping[str, Any]:
+        """Properties that the study states for an audit, in SI."""
+        return self.tables.get("audit", {})
 
     @property
     def surface_sha256(self) -> str:

@@ -18,7 +18,7 @@ from roughvisc.mechanics.program import UNITS
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import Settings
-from roughvisc.study.audit.limits import PROPERTIES
+from roughvisc.study.audit.audit import audit
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.scans import open_scan
@@ -119,7 +119,7 @@ def _units() -> dict[str, dict[str, str]]:
         "solve": units(Settings) | {"time_step": "s"},
         "keep": {"times": "s", "precision": "1"},
         "observe": units(*OBSERVABLES.values()),
-        "audit": {name: unit for name, (unit, _) in PROPERTIES.items()},
+        "audit": units(audit),
     }
 
 

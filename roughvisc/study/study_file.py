@@ -27,7 +27,7 @@ from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.study.audit.limits import AuditInputs
+from roughvisc.study.audit.audit import audit
 from roughvisc.study.machine_history import read_history
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.scans import check_surface, surface_boundary
@@ -244,9 +244,7 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
     if precision is not None:
         precision = number(precision, "1", "keep.precision", above=0, below=1)
     check_observed(a_table("observe", tables.get("observe", {})), settings)
-    audit = call(AuditInputs, "audit", a_table("audit", tables.get("audit", {})))
-    if audit.base is not None and audit.thickness is None:
-        raise InputError(key="audit.base", found=audit.base, expected="a thickness, too")
+    check(audit, "audit", a_table("audit", tables.get("audit", {})))
     return {
         "title": title,
         "body": body,
@@ -254,7 +252,6 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
         "settings": settings,
         "late_times": late_times,
         "precision": precision,
-        "audit_inputs": audit.stated(),
     }
 
 

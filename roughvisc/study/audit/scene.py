@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables.histories import history
-from roughvisc.study.audit.limits import AuditInputs
-from roughvisc.study.case import Case
-from roughvisc.study.quantities import creep_time
 from roughvisc.topography.borders import is_analytic
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.variables import axis_of
+
+if TYPE_CHECKING:
+    from roughvisc.study.case import Case
 
 Array = NDArray[np.float64]
 
@@ -47,19 +47,19 @@ class Scene:
         Result of one case.
     case : Case or None
         Case of the result, if the result belongs to a study.
-    given : AuditInputs
-        Stated properties.
+    given : mapping
+        Stated properties, in SI.
     """
 
     dataset: xr.Dataset
     case: Case | None
-    given: AuditInputs
+    given: Mapping[str, Any]
 
     def need(self, *names: str) -> list[float]:
         """Return stated properties by name. [SI]"""
-        if missing := [name for name in names if getattr(self.given, name) is None]:
+        if missing := [name for name in names if name not in self.given]:
             raise NotKnown(f"Give {' and '.join(missing)}.")
-        return [getattr(self.given, name) for name in names]
+        return [self.given[name] for name in names]
 
     @property
     def boundary(self) -> str:
@@ -179,10 +179,17 @@ class Scene:
         return self.pressure_in(self.fullest)
 
     @property
-    def extent(self) -> float:
-        """Half the longer side of the contact. [m]"""
-        extents = (np.ptp(at) + 1 for at in np.nonzero(self.pressure))
-        return max(count * side for count, side in zip(extents, self.cells, strict=True)) / 2
+    def half_width(self) -> float:
+        """Half the longer side of the contact in free space, otherwise half the longer side of the surface. [m]"""
+        if self.boundary != "free":
+            return max(self.sides) / 2
+        if not self.fullest["contact_area"] > 0:
+            raise NotKnown("The result has no contact.")
+        try:
+            spans = [np.ptp(at) + 1 for at in np.nonzero(self.pressure)]
+        except NotKnown:  # no field of the pressure
+            return math.sqrt(float(self.fullest["contact_area"]) / math.pi)
+        return max(count * side for count, side in zip(spans, self.cells, strict=True)) / 2
 
     @property
     def curvature(self) -> float:
@@ -216,8 +223,10 @@ class Scene:
     def creep_time(self) -> float:
         """Time during which the material of a stored result creeps. [s]"""
         assert self.case is not None
+        if isinstance(self.case.experiment, Loading):
+            return self.case.experiment.program.duration
         longest = max(float(np.ptp(self.height[axis].values)) for axis in ("x", "y"))
-        return creep_time(self.case.experiment, longest)
+        return longest / min(self.case.experiment.speeds)
 
     @cached_property
     def facts(self) -> Mapping[str, Any]:

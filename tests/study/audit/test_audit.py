@@ -11,7 +11,7 @@ import roughvisc as rv
 from roughvisc import closed_forms as cf
 from roughvisc.study.audit import effects
 from roughvisc.study.audit.audit import VERDICTS, Finding
-from roughvisc.study.audit.limits import LIMITS, STATED
+from roughvisc.study.audit.checks import LIMITS
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result
@@ -344,7 +344,7 @@ def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
 
 
 def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
-    usual = [name for name in LIMITS if name not in ("heating", STATED)]
+    usual = [name for name in LIMITS if name not in ("heating", "resolution (stated)")]
     assert [one.name for one in rv.audit(rough)] == usual
     assert [one.name for one in rv.audit(ball)] == [name for name in usual if name not in ("stickiness", "border")]
 
@@ -385,7 +385,7 @@ def test_audit__takes_units_and_shows_a_table(ball):
     two = rv.audit(ball, work_of_adhesion=0.05, yield_strength=4e7, thickness=1e-3, density=1100)
     assert repr(one) == repr(two)
     lines = repr(one).splitlines()
-    assert len(one) == 8
+    assert len(one.findings) == 8
     assert [line.split()[0] for line in lines if line[:1].strip()][-8:] == [finding.name.split()[0] for finding in one]
     assert one.to_dataset().verdict.sel(assumption="adhesion") == one["adhesion"].verdict
 

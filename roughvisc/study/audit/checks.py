@@ -1,0 +1,289 @@
+"""Checks of the assumptions of the model, each with its limits and their source."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from roughvisc.mechanics.sheet import BASE, Sheet
+from roughvisc.study.audit import effects
+from roughvisc.study.audit.scene import NotKnown, Scene
+from roughvisc.topography.borders import border_mismatch, is_analytic
+from roughvisc.topography.framing import with_images
+from roughvisc.topography.parameters import parameters
+from roughvisc.units import format_quantity
+
+#: Contact fraction above which the contact spots have merged.
+_MERGED = 0.5
+#: Radius of curvature over width of the contact, above which a profile counts as flat.
+_FLAT = 1e4
+#: Tabor parameter up to which attraction does not change the shape of the spots.
+_STIFF = 1.0
+#: Largest exponent of the force, as a power of the approach, of a contact that counts as flat. The exponent is 1 for a
+#: flat contact, 3/2 for a sphere and 2 for a cone.
+_PROPORTIONAL = 1.25
+#: Poisson's ratio with the smallest shear modulus for a contact modulus.
+_SOFTEST = 0.5
+#: Number of the resolution check for a surface without roughness: 1 - sqrt(0.99).
+_ONLY_FORM = 0.005
+#: Margin for the rounding of a number exactly at a limit, so that 8 cells per wavelength are still accepted.
+_JUST = 1 + 1e-9
+
+#: Number and sentence of a finding; None if the assumption does not apply.
+Found = tuple[float, str] | None
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Limits of one assumption.
+
+    Attributes
+    ----------
+    check : callable
+        Returns the number of a scene, and its meaning for the scene as a sentence. A larger number is worse.
+    doubtful, broken : float
+        Numbers from which the assumption is doubtful, and broken.
+    source : str
+        Meaning of both limits, and their source.
+    """
+
+    check: Callable[[Scene], Found]
+    doubtful: float
+    broken: float
+    source: str
+
+    @property
+    def number(self) -> str:
+        """Meaning of the number: the summary of its check."""
+        return (self.check.__doc__ or "").partition(".\n")[0].rstrip(".")
+
+
+#: Name -> limits, in the order of an audit. Unless a threshold has a physical meaning, an effect of some 10 % makes an
+#: assumption doubtful, and an effect of the size of the computed quantity breaks the assumption.
+LIMITS: dict[str, Limit] = {}
+
+
+def limits(name: str, doubtful: float, broken: float, source: str) -> Callable[[Callable[[Scene], Found]], Callable]:
+    """Enter the decorated check in the table of limits."""
+
+    def entered(check: Callable[[Scene], Found]) -> Callable[[Scene], Found]:
+        LIMITS[name] = Limit(check, doubtful, broken, source)
+        return check
+
+    return entered
+
+
+@limits("adhesion", 0.005, 0.3, "contact area 10 % larger; twice as large: Johnson, Kendall, Roberts (1971)")
+def adhesion(scene: Scene) -> Found:
+    """Pull-off force of the spots over the largest load."""
+    force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
+    is_flat = not curvature * _FLAT * scene.half_width > 1
+    if scene.boundary != "free" and (is_flat or fraction > _MERGED):
+        raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots: see stickiness.")
+    [w] = scene.need("work_of_adhesion")
+    if is_flat:
+        early = float(scene.facts["compliance_at_once"])
+        if not early > 0:
+            raise NotKnown("The contact is flat, and the material has no instantaneous modulus.")
+        pull = effects.punch_pull_off(math.sqrt(float(scene.fullest["contact_area"]) / math.pi), 1 / early, w)
+        return pull / force, f"A flat contact would hold {as_text(pull, 'N')} when pulled off fast (Kendall)."
+    spots, tabor = _spots(scene.pressure), effects.tabor_parameter(1 / curvature, 1 / scene.late, w)
+    pull = spots * effects.pull_off_force(1 / curvature, w, tabor)
+    grown = 1 + pull / force if tabor <= _STIFF else effects.adhesive_load(1.0, pull / force)
+    held = f"{_counted(spots)} of mean radius {as_text(1 / curvature, 'm')} would hold {as_text(pull, 'N')} when"
+    larger = f"pulled off, and make the contact area {as_text(grown ** (2 / 3), '1', 3)} times as large"
+    return pull / force, f"{held} {larger} (Tabor parameter {as_text(tabor, '1')})."
+
+
+@limits(
+    "stickiness",
+    0.1,
+    1,
+    "contact area 10 % larger; sticks without a load: Pastewka, Robbins (2014); Persson, Tosatti (2001)",
+)
+def stickiness(scene: Scene) -> Found:
+    """Stiff spots: attraction over repulsion; soft ones: work of adhesion over elastic energy of full contact."""
+    is_free = scene.boundary == "free"
+    if is_free and scene.is_smooth:
+        return None
+    measures = parameters(scene.period, periodic=not is_free)
+    slope, laplacian = float(measures["Sdq"]), 2 * float(measures["rms_curvature"])
+    if not slope > 0:
+        raise NotKnown("The surface is flat: it has no roughness.")
+    [w] = scene.need("work_of_adhesion")
+    tabor = effects.tabor_parameter(2 / laplacian, 1 / scene.late, w)
+    spots = f"spots (Tabor parameter {as_text(tabor, '1')})"
+    if tabor <= _STIFF:
+        ratio = effects.rough_attraction(slope, laplacian, 1 / scene.late, w)
+        return ratio, f"Stiff {spots}: attraction around them is {ratio:.2g} times the repulsion in them."
+    energy = effects.conformal_energy(scene.waves[0], 1 / scene.late)
+    if math.isnan(energy):
+        raise NotKnown("Points are missing: the energy of full contact is not known.")
+    return w / energy, f"Soft {spots}: full contact stores {as_text(energy, 'J/m^2')} of elastic energy."
+
+
+@limits("yielding", 1.6, 3, "first yield under a sphere; full plasticity: Johnson (1985), sections 6.1 and 6.3")
+def yielding(scene: Scene) -> Found:
+    """Largest pressure over the yield strength in tension."""
+    peak = float(scene.pressure.max())
+    for frame in scene.dataset["pressure"]:  # one frame in memory at a time
+        peak = max(peak, float(np.nan_to_num(frame.values).max()))
+    [strength] = scene.need("yield_strength")
+    return peak / strength, f"The largest pressure is {as_text(peak, 'Pa')}."
+
+
+@limits(
+    "thickness",
+    0.1,
+    0.5,
+    "10 % off; the approach twice the true one, or the force half of it: Johnson (1985), section 5.8",
+)
+def thickness(scene: Scene) -> Found:
+    """Relative error of a half-space: of the approach at the same load, in free space also of the force."""
+    modelled, stated = scene.facts.get("thickness", math.inf), scene.given.get("thickness")
+    if modelled < math.inf:
+        if stated is not None and not math.isclose(stated, modelled, rel_tol=1e-9):
+            raise NotKnown(f"The result is for a sheet of {as_text(modelled, 'm', 3)}: run the study with the other.")
+        return 0.0, f"Modelled: a sheet of {as_text(modelled, 'm', 3)}, {scene.facts['base']}."
+    if "kernel" in scene.facts:
+        return 0.0, f"Modelled: {scene.facts['kernel']}."
+    if len(scene.bodies) != 1 or scene.bodies[0][2] < 0:
+        raise NotKnown("Two bodies, or a Poisson ratio that changes or is negative: a sheet cannot be compared.")
+    [depth] = scene.need("thickness")
+    sheet, approach = Sheet(depth, scene.bodies[0][2], scene.given.get("base", BASE)), float(scene.fullest["approach"])
+    shortfall = 0.0
+    if scene.boundary == "free":
+        first = sheet.relief * scene.late * scene.force / approach
+        # stiffness 2 a / C of a round contact, equal to the stiffness of a flat punch of its radius
+        if 2 * scene.half_width * approach / (scene.late * scene.force) > _PROPORTIONAL:
+            shortfall = effects.half_space_shortfall(first)
+    else:
+        pressure = with_images(scene.pressure) if scene.boundary == "mirror" else scene.pressure
+        first = scene.late * effects.periodic_relief(pressure, scene.cells, sheet) / approach
+    excess = effects.half_space_excess(first)
+    smaller = f"On a {sheet.base} sheet of {as_text(depth, 'm', 3)} the approach would be {percent(excess)} smaller at"
+    larger = f"; at the same approach the force would be {percent(shortfall)} larger" if shortfall > excess else ""
+    return max(excess, shortfall), f"{smaller} the same load{larger}."
+
+
+@limits("slope", 0.3, 1, "true area 4.5 % larger than projected; 50 % larger: Johnson (1985), section 4.1")
+def slope(scene: Scene) -> Found:
+    """Rms slope of the loaded surface."""
+    more = percent(scene.loaded_slope**2 / 2)
+    return scene.loaded_slope, f"The loaded surface has {more} more area than its projection."
+
+
+@limits("strain", 1, 5, "largest strains exceed the linear range; the representative strain does: Tabor (1951)")
+def strain(scene: Scene) -> Found:
+    """Rms slope of the loaded surface over the largest strain at which the material is linear."""
+    largest, [linear] = scene.loaded_slope, scene.need("linear_strain")
+    return largest / linear, f"Strains are at most about {percent(largest)}, and on average {percent(0.2 * largest)}."
+
+
+@limits("inertia", 0.1, 1, "10 % off the quasi-static value; 100 % off: Lysmer, Richart (1966); Cole, Huth (1958)")
+def inertia(scene: Scene) -> Found:
+    """Lag of waves over the time scale of the program, or relative increase of the displacement in a slide."""
+    width, scale, (speed, _) = scene.half_width, float(scene.facts["time_scale"]), scene.slide
+    [density] = scene.need("density")
+    bodies = [(late, poisson) for _, late, poisson in scene.bodies] or [(scene.late, _SOFTEST)]
+    solids = [((1 - poisson) / (2 * late), poisson) for late, poisson in bodies if late > 0]
+    shear = min(modulus for modulus, _ in solids)
+    lag = effects.radiation_lag(width, shear, density)
+    excess = max(effects.moving_load_excess(speed, modulus, density, poisson) for modulus, poisson in solids)
+    if speed > 0 and excess > lag / scale:
+        waves = as_text(math.sqrt(shear / density), "m/s")
+        return excess, f"Shear waves travel at {waves}, and the profile slides at {as_text(speed, 'm/s')}."
+    program = f"the program changes within {as_text(scale, 's')}" if math.isfinite(scale) else "nothing changes"
+    return lag / scale, f"Waves lag by {as_text(lag, 's')} over {as_text(2 * width, 'm')}; {program}."
+
+
+@limits("heating", 1, 10, "retardation times a fifth shorter; six times shorter: Williams, Landel, Ferry (1955)")
+def heating(scene: Scene) -> Found:
+    """Mean temperature rise of the spots in a slide [K] if all heat flows into the body."""
+    (speed, power), rubbed = scene.slide, scene.fullest
+    if speed == 0:
+        return None
+    if "speed" in scene.dataset.dims:
+        powers = np.nan_to_num((scene.dataset["friction_force"] * scene.dataset["speed"]).values)  # NaN: not solved
+        rubbed = scene.dataset.isel(speed=int(powers.argmax()))
+    spots, area, heat = _spots(scene.pressure_in(rubbed)), float(rubbed["contact_area"]), max(power, 0.0)
+    conductivity, capacity = scene.need("heat_conductivity", "volumetric_heat_capacity")
+    radius = math.sqrt(area / (math.pi * spots))
+    rise = effects.flash_temperature(heat / area, radius, speed, conductivity, capacity)
+    heats = f"{as_text(heat, 'W')} of friction heat {_counted(spots).lower()} of mean radius {as_text(radius, 'm')}"
+    return rise, f"{heats} by {as_text(rise, 'K')} above the surface around."
+
+
+@limits("coupling", 0.5, 1, "a punch with full friction is 10 % stiffer; cannot be reached: Spence (1968)")
+def coupling(scene: Scene) -> Found:
+    """Dundurs' second constant, (1 - 2 nu)/(2 - 2 nu) of one body."""
+    if not scene.bodies:
+        raise NotKnown("Poisson's ratio of each body is not known, or changes in time.")
+    early, late, poissons = zip(*scene.bodies, strict=True)
+    number = max(effects.dundurs_coupling(each, poissons) for each in (early, late) if sum(each) > 0)
+    change = "does not change the pressure" if number == 0 else "would change the pressure slightly"
+    return number, f"Static friction {change}."
+
+
+@limits("resolution", 0.1, 0.5, "10 % of the area; half of it, and as much again for the next octave: Persson (2001)")
+def resolution(scene: Scene) -> Found:
+    """Part of the rms slope from the last octave of wavelengths, about the part of the area that it removes."""
+    if scene.stated_wave is not None:
+        return None
+    _, last, shortest = scene.waves
+    if is_analytic(scene.period):
+        return 0.0, "The profile is analytic: it has no shorter wavelengths."
+    if scene.is_smooth:
+        return _ONLY_FORM, f"Only form: 99 % of the squared slope lies above {as_text(shortest / 2, 'm')}."
+    if math.isnan(last):
+        raise NotKnown("Points are missing, or the surface is flat: its shortest wavelengths are not known.")
+    adds = f"Wavelengths below {as_text(shortest, 'm')} add {percent(last)} of the slope, and remove as much of the"
+    return last, f"{adds} area; the next octave may do so again."
+
+
+@limits(
+    "resolution (stated)",
+    _JUST / 8,
+    _JUST / 4,
+    "fewer than 8 cells per wavelength: a crest is 8 % too low; fewer than 4: 29 %, 1 - cos(pi / n)",
+)
+def stated_resolution(scene: Scene) -> Found:
+    """Cell size over the shortest wavelength."""
+    if scene.stated_wave is None:
+        return None
+    wave, cells = scene.stated_wave
+    return 1 / cells, f"The shortest wavelength of the generator, {as_text(wave, 'm')}, has {cells:.3g} cells."
+
+
+@limits("border", 2, 10, "a step is visible; on 100 rows the seam has as much mean square slope as all other rows")
+def border(scene: Scene) -> Found:
+    """Difference between opposite borders over that between neighbouring rows."""
+    if scene.boundary == "free":
+        return None
+    number = max(border_mismatch(scene.period).of_neighbours)
+    advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
+    return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
+
+
+def _spots(pressure: NDArray[np.float64]) -> int:
+    """Return the number of connected regions in contact; a region across a periodic border counts twice."""
+    return int(ndimage.label(pressure > 0, np.ones((3, 3)))[1])
+
+
+def _counted(spots: int) -> str:
+    return "One spot" if spots == 1 else f"{spots} spots"
+
+
+def as_text(value: float, unit: str, digits: int = 2) -> str:
+    """Return a quantity in SI as text with some significant digits, as 490 kPa and not 4.9e+02 kPa."""
+    return format_quantity(float(f"{value:.{digits}g}"), unit)
+
+
+def percent(share: float) -> str:
+    """Return a fraction as text with two digits, as 100 % and not 1e+02 %; a very small fraction as a bound."""
+    return "less than 0.1 %" if 0 < share < 1e-3 else f"{float(f'{100 * share:.2g}'):g} %"
