@@ -88,11 +88,7 @@ _EXTRA = {
     },
     **{
         f"material: {model}": {"file": _FILE}
-        | {
-            one.unit_key: _COLUMN_UNIT
-            for one in columns.values()
-            if one.unit_key not in ("", "frequency_unit")
-        }
+        | {one.stated: _COLUMN_UNIT for one in columns.values() if one.stated}
         for model, columns in COLUMNS.items()
     },
 }

@@ -49,7 +49,7 @@ EXPECTED = {
     **{(f"material: {name}",): keys_of(one) for name, one in MODELS.items() if name not in COLUMNS},
     **{
         (f"material: {name}",): keys_of(MODELS[name])
-        | {"file", *(column.unit_key for column in columns.values() if column.unit_key)}
+        | {"file", *(column.stated for column in columns.values() if column.stated)}
         for name, columns in COLUMNS.items()
     },
     ("material: any", "material: temperature", "material: thickness"): {

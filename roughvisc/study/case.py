@@ -153,7 +153,7 @@ class Case:
 
     @cached_property
     def _checksums(self) -> list[tuple[str, str]]:
-        return _checksums(self.surface)
+        return checksums_of(self.surface)
 
     @cached_property
     def key(self) -> str:
@@ -185,24 +185,20 @@ class Case:
         """
         from roughvisc.experiment.resources import require_surface  # slow to import
 
-        before, problem = self._checksums, None
+        before, where = self._checksums, f"{self.origin}: " if self.origin else ""
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
             height = surface_height(self.surface)
+            is_changed = checksums_of(self.surface) != before
         except InputError as error:
-            problem = error
-        try:
-            now = _checksums(self.surface)
-        except InputError:  # a file was removed
-            now = []
-        if now != before:
-            where = f"{self.origin}: surface" if self.origin else "surface"
-            changed = f"{where}: {self.surface.get('file', 'the second face')}: was changed after the study was read"
+            raise error.prefixed(str(self.origin) if self.origin else "case") from error
+        if is_changed:
+            changed = (
+                f"{where}surface: {self.surface.get('file', 'the second face')}: was changed after the study was read"
+            )
             expected = "the heights that the case's key stands for; run the study again for the new ones"
-            raise RoughviscError(f"{changed}: expected {expected}", transient=True) from problem
-        if problem:
-            raise problem.prefixed(str(self.origin) if self.origin else "case") from problem
+            raise RoughviscError(f"{changed}: expected {expected}", transient=True)
         return height
 
     def to_json(self) -> str:
@@ -364,7 +360,7 @@ def _faces(surface: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [surface, *([surface["second"]] if "second" in surface else [])]
 
 
-def _checksums(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
+def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
     found = []
     for face in _faces(surface):

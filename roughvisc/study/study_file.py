@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -58,37 +58,18 @@ _MOST_SPEEDS = 1000
 _ROUNDING = 1e-12
 
 
-class Column(NamedTuple):
-    """Column of a CSV file that states an argument of a material.
-
-    Attributes
-    ----------
-    heading, unit : str
-        Name in the heading, and unit in SI. Without a unit, `unit_key` states the unit of the argument, too.
-    unit_key : str
-        Key that states the unit of the column, if the heading does not.
-    """
-
-    heading: str
-    unit: str
-    unit_key: str
-
-
-#: Columns of the CSV file of each model.
-COLUMNS: dict[str, dict[str, Column]] = {
+#: Columns of the CSV file of each model; ``stated`` is the key of the unit of a column whose heading has none.
+COLUMNS: dict[str, dict[str, Wanted]] = {
     "creep_table": {
-        "times": Column("time", "s", "time_unit"),
-        "compliances": Column("compliance", "1/Pa", "compliance_unit"),
+        "times": Wanted("time", "s", "time_unit"),
+        "compliances": Wanted("compliance", "1/Pa", "compliance_unit"),
     },
-    "relaxation_table": {
-        "times": Column("time", "s", "time_unit"),
-        "moduli": Column("modulus", "Pa", "modulus_unit"),
-    },
+    "relaxation_table": {"times": Wanted("time", "s", "time_unit"), "moduli": Wanted("modulus", "Pa", "modulus_unit")},
     "dynamic_table": {
-        "frequencies": Column("frequency", "", "frequency_unit"),
-        "storage": Column("storage", "Pa", "modulus_unit"),
-        "loss": Column("loss", "Pa", "modulus_unit"),
-        "shift_factors": Column("shift_factor", "1", ""),
+        "frequencies": Wanted("frequency", ""),  # in the argument frequency_unit
+        "storage": Wanted("storage", "Pa", "modulus_unit"),
+        "loss": Wanted("loss", "Pa", "modulus_unit"),
+        "shift_factors": Wanted("shift_factor", "1", optional=True),
     },
 }
 
@@ -115,19 +96,24 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     for name in ("surface", "material"):
         if name not in data:
             raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
-    tables, surface = dict(data), a_table("surface", data["surface"])
-    if "second" in surface:
-        surface["second"] = a_table("surface.second", surface["second"])
-    for where, face in (("surface", surface), ("surface.second", surface.get("second", {}))):
-        if "file" in face:
-            face["file"] = existing_file(f"{where}.file", face["file"], folder)
-    tables |= {"surface": surface, "material": with_columns("material", data["material"], folder)}
-    if isinstance(data.get("program"), list):
-        segments = enumerate(data["program"])
-        tables["program"] = [with_rows(f"program.{place}", segment, folder) for place, segment in segments]
+    tables = dict(data)
+    tables["surface"] = with_scan("surface", data["surface"], folder)
+    tables["material"] = with_columns("material", data["material"], folder)
+    if isinstance(segments := data.get("program"), list):
+        tables["program"] = [with_rows(f"program.{place}", one, folder) for place, one in enumerate(segments)]
     if isinstance(friction := data.get("friction"), Mapping) and "speeds" in friction:
         tables["friction"] = {**friction, "speeds": speeds_of("friction.speeds", friction["speeds"])}
     return tables
+
+
+def with_scan(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
+    """Return a table of a surface with the absolute paths of its scan and of the scan of its second face."""
+    table = a_table(where, stated)
+    if "second" in table:
+        table["second"] = with_scan(f"{where}.second", table["second"], folder)
+    if "file" in table:
+        table["file"] = existing_file(f"{where}.file", table["file"], folder)
+    return table
 
 
 def existing_file(where: str, file: Any, folder: Path | None) -> str:
@@ -162,7 +148,7 @@ def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]
     table = a_table(where, stated)
     table |= {key: with_columns(f"{where}.{key}", table[key], folder) for key in ("a", "b", "on") if key in table}
     columns = COLUMNS.get(str(table.get("model")), {})
-    units, rest = split(table, *(one.unit_key for one in columns.values() if one.unit_key != "frequency_unit"))
+    units, rest = split(table, *(one.stated for one in columns.values() if one.stated))
     file = rest.pop("file", None) if columns else None
     for key, unit in units.items():
         if file is None or not isinstance(unit, str):
@@ -170,13 +156,12 @@ def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]
             raise InputError(key=f"{where}.{key}", found=unit, expected=expected)
     if file is None:
         return table
-    for key in columns:
-        if key in table:
-            raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
+    for key in columns.keys() & table.keys():
+        raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
     if "frequencies" in columns:
         one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
     wanted = {
-        key: Wanted(one.heading, one.unit or table["frequency_unit"], units.get(one.unit_key), not one.unit_key)
+        key: one._replace(unit=one.unit or table["frequency_unit"], stated=units.get(one.stated or ""))
         for key, one in columns.items()
     }
     path = existing_file(f"{where}.file", file, folder)
@@ -303,13 +288,12 @@ def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
 
 def experiment_of(tables: Mapping[str, Any]) -> Experiment:
     """Return the experiment of the tables ``[[program]]`` or the table ``[friction]``."""
-    if "friction" not in tables and "program" not in tables:
-        expected = "a list of [[program]] tables, or a table [friction]"
-        raise InputError(f"program: missing: expected {expected}", key="program", expected=expected)
-    if "friction" not in tables:
-        return Loading(program_of(tables["program"]))
+    if ("friction" in tables) == ("program" in tables):
+        expected = "either a list of [[program]] tables or a table [friction]"
+        found = [name for name in ("program", "friction") if name in tables]
+        raise InputError(key="program", found=found, expected=expected)
     if "program" in tables:
-        raise InputError(key="program", found=tables["program"], expected="either [[program]] or [friction]")
+        return Loading(program_of(tables["program"]))
     return call(SteadySliding, "friction", a_table("friction", tables["friction"]))
 
 
