@@ -27,7 +27,7 @@ FIGURES = {
     },
     "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
     "load_sweep": {
-        "sweep": rv.plot.sweep,
+        "sweep": lambda results: rv.plot.sweep(results, times=[0.01, -1]),
         "histories": rv.plot.history,
         "area": lambda results: rv.plot.area_against_load(by_load(results)),
     },
@@ -38,8 +38,8 @@ FIGURES = {
         "lines": lambda results: rv.plot.sweep(results, "approach", times=[0.01, 0.05]),
     },
     "thickness_sweep": {
-        "approach": lambda results: rv.plot.sweep(results, "approach"),
-        "area": rv.plot.sweep,
+        "approach": lambda results: rv.plot.sweep(results, "approach", times=[0, 0.05, 1]),
+        "area": lambda results: rv.plot.sweep(results, times=[0, 0.05, 1]),
     },
     "stop_and_go": {"friction": lambda ds: rv.plot.history(ds, over="sliding_distance")},
     "scan_to_area": {

@@ -20,11 +20,9 @@ from roughvisc.errors import printable
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import AXES, VARIABLES
 
-#: Print-ready: sans serif at the size of a caption, thin lines, embedded fonts.
+#: Print-ready: text at the size of a caption, thin lines, embedded fonts.
 STYLE = {
-    "font.family": "sans-serif",
     "font.size": 9,
-    "axes.labelsize": 9,
     "axes.titlesize": 9,
     "axes.linewidth": 0.7,
     "axes.axisbelow": True,
@@ -42,7 +40,6 @@ STYLE = {
     "ytick.direction": "in",
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
-    "savefig.dpi": 200,
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
 }
@@ -66,6 +63,26 @@ def apply(draw):
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure of a size [inch], independent of windows and of matplotlib's global state."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def new_panels(count: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, list[Axes]]:
+    """Return a figure of a size [inch] and its panels, in rows of some columns; `options` as in ``Figure.subplots``."""
+    figure = new_figure(width, height)
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel()
+    for unused in axes[count:]:
+        unused.remove()
+    return figure, list(axes[:count])
+
+
+def label_outer(axes: Sequence[Axes], columns: int, *, along_y: bool = True) -> None:
+    """Keep labels of the horizontal axis at the lowest panels, and `along_y` of the vertical axis at the left ones."""
+    for number, ax in enumerate(axes):
+        is_lowest = number + columns >= len(axes)
+        ax.tick_params(labelbottom=is_lowest)
+        ax.set_xlabel(ax.get_xlabel() if is_lowest else "")
+        if along_y and number % columns:
+            ax.tick_params(labelleft=False)
+            ax.set_ylabel("")
 
 
 def verbatim(text: str) -> str:
@@ -133,15 +150,22 @@ def value_axis(ax: Axes, *values: Any) -> None:
     ax.grid()
 
 
+def described(variable: xr.DataArray) -> tuple[str, str]:
+    """Return the label and the SI unit of a variable, as declared or from its attributes."""
+    if declared := VARIABLES.get(str(variable.name)):
+        return declared.label, declared.units
+    name = str(variable.attrs.get("long_name", str(variable.name).replace("_", " ")))
+    return name[:1].upper() + name[1:], str(variable.attrs.get("units", ""))
+
+
 def row_unit(rows: xr.DataArray) -> Unit:
     """Return the unit of the times, speeds or distances of some rows, without prefix on a logarithmic axis."""
-    unit = VARIABLES[str(rows.name)].units if rows.name in VARIABLES else str(rows.attrs.get("units", ""))
+    _, unit = described(rows)
     return Unit(1.0, unit) if _spreads(rows.values) else unit_for(rows.values, unit)
 
 
 def row_axis(ax: Axes, rows: xr.DataArray) -> None:
     """Scale and label the horizontal axis of times, speeds or distances; a logarithmic axis can show zero."""
-    unit, name = row_unit(rows), str(rows.name)
     places = np.asarray(rows.values, dtype=float)
     if _spreads(places):
         first, last = float(places[places > 0].min()), float(places.max())
@@ -152,8 +176,7 @@ def row_axis(ax: Axes, rows: xr.DataArray) -> None:
             ax.set_xlim(-0.3 * first, 1.3 * last)
         else:
             ax.set_xscale("log")
-    label = "Time" if name == "time" else VARIABLES[name].label if name in VARIABLES else name.replace("_", " ")
-    ax.set_xlabel(unit.label(label))
+    ax.set_xlabel(row_unit(rows).label(described(rows)[0]))
 
 
 def _spreads(places: np.ndarray) -> bool:

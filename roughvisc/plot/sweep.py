@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
@@ -13,6 +14,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -23,94 +25,96 @@ from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.study.case_text import names_of
 from roughvisc.study.realisations import statistics
-from roughvisc.study.si_tables import unit_of
-from roughvisc.study.storage.sweep_cases import identifier
-from roughvisc.study.sweep_table import DRAWN, ITSELF, REALISATION
+from roughvisc.study.sweep_table import ITSELF, REALISATION
 from roughvisc.units import Unit, in_si, unit_for
 from roughvisc.variables import CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
-#: Coordinates over the cases that are not swept keys.
-_NO_KEYS = ("case", "case_key", ROWS, REALISATION)
-#: Largest number of panels, and of values of a key in a legend.
-_MOST_PANELS, _MOST_NAMED = 12, 8
+#: Largest number of panels, of values of a key in a legend, and of ticks.
+_MOST_PANELS, _MOST_NAMED, _MOST_TICKS = 12, 8, 12
 #: Viridis without its light end, which is hard to see on a white page.
 _SHADES = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.88, 256)))
 _ITSELF_LINE = {"ls": (0, (4, 1.5)), "lw": 1.1}
 
 
+@dataclass(frozen=True)
 class Key:
-    """Swept key of a table of cases: its name, its values in order, and their unit."""
+    """Swept key.
 
-    def __init__(self, column: str, dotted: str, name: str, values: pd.Series, units: str) -> None:
-        self.column, self.dotted, self.name = column, dotted, name
-        numbers = values.dtype.kind in "iuf" and np.isfinite(values).all()
-        self.is_numeric = bool(numbers and not dotted.endswith("seed"))
-        self.levels = sorted(values.unique()) if self.is_numeric else list(dict.fromkeys(values))
-        middle = [np.sqrt(self.levels[0] * self.levels[-1])] if self.is_log else self.levels
-        self.unit = unit_for(middle, units) if self.is_numeric else Unit(1.0, "")
-        self._units = units
+    Attributes
+    ----------
+    column : str
+        Column in a table of cases.
+    dotted, name : str
+        Key of the study, and its name in words.
+    levels : list
+        Values: numbers in ascending order [SI], others in the order of the cases.
+    units : str
+        SI unit of the numbers.
+    is_numeric : bool
+        Whether the levels are numbers of an axis.
+    """
+
+    column: str
+    dotted: str
+    name: str
+    levels: list[Any]
+    units: str = ""
+    is_numeric: bool = False
 
     @property
-    def is_log(self) -> bool:
-        """Whether the values are positive and span decades."""
-        return self.is_numeric and style.is_logarithmic(self.levels)
+    def unit(self) -> Unit:
+        """Unit of an axis or a colour bar."""
+        if not self.is_numeric:
+            return Unit(1.0, "")
+        middle = [np.sqrt(self.levels[0] * self.levels[-1])] if style.is_logarithmic(self.levels) else self.levels
+        return unit_for(middle, self.units)
 
     @property
     def label(self) -> str:
-        """Label of an axis or a legend."""
+        """Label of an axis or a colour bar."""
         return self.unit.label(self.name)
 
     def text(self, level: Any, *, named: bool = False) -> str:
-        """Return a value as text; `named` with the name of the key before a number."""
+        """Return a level as text; `named` with the name of the key before a number."""
         if isinstance(level, str):
             shown = PurePath(level).name if self.dotted.endswith("file") else level
             return style.verbatim(textwrap.shorten(shown or "none", 40, placeholder="…"))
-        shown = "half-space" if level == np.inf else unit_for([level], self._units).text(level, 4)
+        shown = "half-space" if level == np.inf else unit_for([level], self.units).text(level, 4)
         return f"{self.name.lower()} {shown}" if named else shown
+
+    def colour(self, level: Any) -> Any:
+        """Return the colour of a level."""
+        return _SHADES(_norm(self.levels)(level)) if self.is_numeric else style.CYCLE[self.levels.index(level) % 8]
 
 
 def swept_keys(results: xr.Dataset) -> list[Key]:
     """Return the keys that vary between the cases, longest list of numbers first; a dependent key is left out."""
-    drawn = {identifier(key) for key in DRAWN} if REALISATION in results.dims else set()
-    columns = [
-        str(name)
-        for name, one in results.coords.items()
-        if one.dims == ("case",) and name not in _NO_KEYS and name not in drawn and len(set(one.values.tolist())) > 1
-    ]
-    table = pd.DataFrame({name: results[name].values for name in columns})
-    independent: list[str] = []
-    for name in columns:
-        pairs = ((table.groupby([name, other]).ngroups, other) for other in independent)
-        if not any(count == table[name].nunique() == table[other].nunique() for count, other in pairs):
-            independent.append(name)
-    dotted = {}
-    for name in independent:
-        said = str(results[name].attrs.get("long_name", name))
-        dotted[name] = said if identifier(said) == identifier(name) else name
+    varied: dict[str, list[Any]] = {}
+    for name, one in results.coords.items():
+        values = one.values.tolist()
+        if one.dims != ("case",) or name in ("case", "case_key", ROWS) or len(set(values)) < 2:
+            continue
+        if not any(
+            len(set(zip(values, other, strict=True))) == len(set(values)) == len(set(other))
+            for other in varied.values()
+        ):
+            varied[str(name)] = values
+    dotted = {name: str(results[name].attrs.get("long_name", name)) for name in varied}
     names = names_of(list(dotted.values()))
-    keys = [
-        Key(name, key, names[key], table[name], str(results[name].attrs.get("units") or unit_of(key)))
-        for name, key in dotted.items()
-    ]
+    keys = []
+    for name, values in varied.items():
+        is_numeric = results[name].dtype.kind in "iuf" and bool(np.isfinite(values).all())
+        is_numeric = is_numeric and not dotted[name].endswith("seed")  # the number of a seed has no meaning
+        levels = sorted(set(values)) if is_numeric else list(dict.fromkeys(values))
+        units = str(results[name].attrs.get("units", ""))
+        keys.append(Key(name, dotted[name], names[dotted[name]], levels, units, is_numeric))
     return sorted(keys, key=lambda key: (not key.is_numeric, -len(key.levels)))
 
 
 def case_label(keys: Sequence[Key], values: Sequence[Any]) -> str:
     """Return the values of some keys in words, such as ``Load 2 mN, seed 1``."""
     text = ", ".join(key.text(value, named=True) for key, value in zip(keys, values, strict=True))
-    return text if text.startswith("t =") else text[:1].upper() + text[1:]
-
-
-def default_quantity(results: xr.Dataset) -> str:
-    """Return the friction coefficient over speeds, else the contact area (a fraction if surfaces differ in size)."""
-    if axis_of(results.variables) == "speed":
-        return "friction_coefficient"
-    if {"nominal_pressure", "contact_fraction", "force"} <= set(results):
-        force, pressure = results["force"], results["nominal_pressure"]
-        sizes = (force / pressure).where(pressure > 0).max([dim for dim in force.dims if dim != "case"])
-        if float(sizes.max() - sizes.min()) > 1e-6 * float(sizes.max()):
-            return "contact_fraction"
-    return "contact_area"
+    return text if text.startswith("t ") else text[:1].upper() + text[1:]
 
 
 @style.apply
@@ -131,16 +135,15 @@ def sweep(
     results : xarray.Dataset
         Result of :func:`roughvisc.sweep` or :func:`roughvisc.open_results`.
     quantity : str, optional
-        A history of every case, such as ``"approach"``. Default: the contact area, or the contact fraction if the
-        surfaces differ in size; for friction, the friction coefficient.
+        A history of every case, such as ``"approach"``. Default: the contact area or, for friction, the friction
+        coefficient.
     along : str, or a pair, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
         ``"reduced_speed"`` for curves of all cases; or two keys for maps. Default: the key with most numbers, or the
         speed.
     times : float or str, or a list, optional
-        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time, or the time
-        of the largest difference of the cases if the last difference is less than half as large; up to four times if
-        one key is swept. [s]
+        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time at which the
+        cases differ by at least half of their largest difference. [s]
 
     Returns
     -------
@@ -154,138 +157,129 @@ def sweep(
     if not isinstance(results, xr.Dataset) or results.sizes.get("case", 1) * results.sizes.get(REALISATION, 1) < 2:
         raise InputError("expected the Dataset of rv.open_results or rv.sweep, with several cases")
     axis = axis_of(results.variables)
-    quantity = quantity or default_quantity(results)
+    quantity = quantity or ("friction_coefficient" if axis == "speed" else "contact_area")
     row = ROW if ROW in results.dims else axis
     curves = [str(name) for name, one in results.variables.items() if row in one.dims and not {"x", "y"} & {*one.dims}]
     if quantity not in curves:
         raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
     keys = swept_keys(results)
-    asked = [along] if isinstance(along, str) else list(along or ())
-    asked = asked or (["speed"] if axis == "speed" else [])
-    over = asked[0] if asked and (asked[0] in curves or asked[0] in VARIABLES) else None
-    if over is not None and over not in curves:
-        raise InputError(key="along", found=over, expected=f"one of {', '.join(sorted(curves))} in every case")
-    if over is None:
-        known = {name: key for key in keys for name in (key.column, key.dotted)}
-        for name in asked:
-            if name not in known:
-                raise InputError(key="along", found=name, expected=f"one of {', '.join([*known, axis])}")
-        chosen = [known[name] for name in asked] or keys[:1]
-        if not chosen:
-            raise InputError("nothing varies between the cases: nothing to draw against")
-        keys = chosen + [key for key in keys if key not in chosen]
-        table, note = _at_times(results, quantity, times, axis, row, one=len(keys) == 1)
-    else:
-        table, note = _table(results[[quantity, over]], quantity), ""
-    return _draw(table, quantity, results[quantity].attrs, keys, over, len(asked) == 2 and over is None, note)
+    asked = [along] if isinstance(along, str) else list(along or (["speed"] if axis == "speed" else []))
+    if asked and (asked[0] in curves or asked[0] in VARIABLES):
+        over = asked[0]
+        if over not in curves:
+            raise InputError(key="along", found=over, expected=f"one of {', '.join(sorted(curves))} in every case")
+        table = results[[quantity, over]].load().to_dataframe().reset_index()
+        return _draw(_known(table, quantity), results[quantity], keys, over=results[over])
+    known = {name: key for key in keys for name in (key.column, key.dotted)}
+    for name in asked:
+        if name not in known:
+            raise InputError(key="along", found=name, expected=f"one of {', '.join([*known, axis])}")
+    chosen = [known[name] for name in asked] or keys[:1]
+    if not chosen:
+        raise InputError("nothing varies between the cases: nothing to draw against")
+    keys = chosen + [key for key in keys if key not in chosen]
+    tables = _at_times(results, quantity, times, axis, row)
+    table = pd.concat(one.assign(at=text) for text, one in tables.items())
+    keys.insert(2, Key("at", "at", "", list(tables)))
+    return _draw(_known(table, quantity), results[quantity], keys, as_map=len(chosen) == 2)
 
 
-def _table(results: xr.Dataset, quantity: str) -> pd.DataFrame:
-    """Return a table with a line for each case and row with a value of the quantity."""
-    wanted = results.load()
-    if "case_key" in wanted.coords and REALISATION in wanted.dims:
-        wanted = wanted.where(wanted["case_key"] != "")
-    table = wanted.to_dataframe().reset_index()
+def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
+    """Return the lines of a table that can be drawn."""
     table = table[np.isfinite(table[quantity])]
     return table[table[quantity] > 0] if quantity == "leak_rate" else table  # a logarithmic axis has no zero
 
 
-def _at_times(
-    results: xr.Dataset, quantity: str, times: Any, axis: str, row: str, *, one: bool
-) -> tuple[pd.DataFrame, str]:
-    """Return a table of a quantity at some times (column ``at``), and a note that states a single time."""
-    found = results[[quantity]].load()
-    rows = found[axis]
+def _at_times(results: xr.Dataset, quantity: str, times: Any, axis: str, row: str) -> dict[str, pd.DataFrame]:
+    """Return a table of a quantity of all cases at each of some times, named by the time."""
+    values = results[quantity].load()
+    rows = values[axis]
     if times is None and row == axis:
-        others = [dim for dim in found[quantity].dims if dim != axis]
-        spread = (found[quantity].max(others) - found[quantity].min(others)).fillna(0).values
-        last = rows.size - 1
-        if one:
-            frames = np.flatnonzero(np.abs(found[quantity]).max(others) > 0)
-            frames = frames[np.linspace(0, frames.size - 1, min(frames.size, 4)).astype(int)] if frames.size else [last]
-        else:
-            frames = [last if spread[-1] >= 0.5 * spread.max() else int(spread.argmax())]
-        places = [float(rows[int(frame)]) for frame in frames]
+        others = [dim for dim in values.dims if dim != axis]
+        spread = (values.max(others) - values.min(others)).fillna(0).values
+        places = [float(rows[np.flatnonzero(spread >= 0.5 * spread.max())[-1]])]
     else:
         places = np.atleast_1d(in_si(-1 if times is None else times, VARIABLES[axis].units, "times")).tolist()
     if not 0 < len(places) <= _MOST_PANELS:
         raise InputError(key="times", found=f"{len(places)} of them", expected=f"1 to {_MOST_PANELS}")
-    parts, texts = [], []
+    tables = {}
     for place in places:
         if place < 0:
-            counts = found[ROWS].fillna(1).astype(int) if row == ROW else rows.size
-            number: Any = counts + int(place)
+            number = int(place) + (results[ROWS].fillna(1).astype(int) if row == ROW else rows.size)
         else:
             number = np.abs(rows - place).fillna(np.inf).argmin(row)
-        at = found.isel({row: number})
-        near = np.unique(at[axis].values[np.isfinite(at[axis].values)])
-        text = style.row_text(xr.DataArray(near, name=axis), -1)
-        texts.append(text if near.size == 1 else "the end" if place == -1 else text.replace("=", "≈"))
-        parts.append(_table(at, quantity).assign(at=texts[-1]))
-    return pd.concat(parts), f"At {texts[0]}." if len(texts) == 1 else ""
+        at = values.isel({row: number})
+        near = xr.DataArray(np.unique(at[axis].values[np.isfinite(at[axis].values)]), name=axis)
+        text = style.row_text(near, -1)
+        text = text if near.size == 1 else "at the end" if place == -1 else text.replace("=", "≈")
+        tables[text] = at.to_dataframe().reset_index()
+    return tables
 
 
 def _draw(
     table: pd.DataFrame,
-    quantity: str,
-    attributes: dict[str, Any],
+    quantity: xr.DataArray,
     keys: list[Key],
-    over: str | None,
-    as_map: bool,
-    note: str,
+    *,
+    over: xr.DataArray | None = None,
+    as_map: bool = False,
 ) -> Figure:
-    """Draw a table of cases: one key across, one as colours, the others as panels."""
-    declared = VARIABLES.get(quantity)
-    label = declared.label if declared else str(attributes.get("long_name", quantity)).capitalize()
-    values = table[quantity].to_numpy()
-    if quantity == "contact_fraction":
-        unit = Unit(0.01, "%")
-    else:
-        middle = [np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values
-        unit = unit_for(middle, declared.units if declared else str(attributes.get("units", "")))
-    across, rest = (None, keys) if over else (keys[0], keys[1:])
+    """Draw a table of cases: one key, or `over`, across; the next key as colours or upwards; the others as panels."""
+    name, units = style.described(quantity)
+    values = table[str(quantity.name)].to_numpy()
+    unit = unit_for([np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values, units)
+    table = table.assign(shown=unit(values))
+    across, rest = (None, keys) if over is not None else (keys[0], keys[1:])
     second, rest = (rest[0], rest[1:]) if rest else (None, [])
-    several = "at" in table and table["at"].nunique() > 1
-    if several and second is None:
-        second = Key("at", "at", "Time", table["at"], "")
-    elif several:
-        rest = [Key("at", "at", "", table["at"], ""), *rest]
+    families = [second.column] if second else []  # columns that tell the lines of a panel apart
     while rest and table.groupby([key.column for key in rest]).ngroups > _MOST_PANELS:
-        rest = rest[:-1]  # a key without panels makes more lines of one colour
-    columns = [key.column for key in rest]
-    panels = list(table.groupby(columns, sort=False)) if columns else [((), table)]
-    if columns and columns != ["at"]:
-        panels.sort(key=lambda one: [key.levels.index(level) for key, level in zip(rest, one[0], strict=True)])
-    width = min(len(panels), 3 if len(panels) != 4 else 2)
-    if len(rest) > 1 and 2 <= len(rest[-1].levels) <= 4 and len(panels) % len(rest[-1].levels) == 0:
-        width = len(rest[-1].levels)  # a column for each of its values
-    height = -(-len(panels) // width)
-    figure = style.new_figure(4.6 if width == 1 else 1.2 + 2.3 * width, 1.2 + (2.4 if height == 1 else 1.8) * height)
-    axes = figure.subplots(height, width, sharex=True, sharey=True, squeeze=False).ravel()
-    norm = _norm(unit(values)) if as_map else None
-    for ax, (_, panel) in zip(axes, panels, strict=False):
-        if as_map:
-            _draw_cells(ax, panel.assign(**{quantity: unit(panel[quantity])}), quantity, across, second, norm)
-        else:
-            lines = [key.column for key in keys if key not in rest and key is not across and key is not second]
-            _draw_lines(ax, panel, quantity, unit, across, over, second, lines)
-    _finish_axes(axes[0], unit(values), unit.label(label), table, across, over, as_map)
-    for unused in axes[len(panels) :]:
-        unused.remove()
-    labels = axes[0].get_xlabel(), axes[0].get_ylabel()
-    for number, ax in enumerate(axes[: len(panels)]):
-        ax.set_xlabel(labels[0] if number + width >= len(panels) else "")
-        ax.set_ylabel(labels[1] if number % width == 0 else "")
-        ax.tick_params(labelbottom=number + width >= len(panels), labelleft=number % width == 0)
-        ax.grid(visible=not as_map)
-    titles = [case_label(rest, found) for found, _ in panels]
-    style.letter_panels(axes[: len(panels)], [textwrap.fill(one, 28) for one in titles])
-    if as_map:
-        bar = ScalarMappable(norm, "viridis")
-        figure.colorbar(bar, ax=list(axes[: len(panels)]), pad=0.02, aspect=22).set_label(unit.label(label))
+        families.append(rest.pop().column)
+    if over is not None:
+        places = xr.DataArray(np.unique(table[str(over.name)]), name=over.name, attrs=over.attrs)
+        table["across"] = style.row_unit(places)(table[str(over.name)])
+    elif across.is_numeric and not as_map:
+        table["across"] = across.unit(table[across.column])
     else:
-        _name_lines(figure, list(axes[: len(panels)]), table, second)
-    style.note_below(figure, note)
+        table["across"] = table[across.column].map(across.levels.index)
+    groups = {key.column: table[key.column].map(key.levels.index) for key in rest}
+    panels = list(table.groupby(list(groups.values()))) if rest else [((), table)]
+    columns = 1 if not rest else len(rest[-1].levels) if len(rest[-1].levels) <= 4 else 3
+    rows = -(-len(panels) // columns)
+    size = (4.6 if columns == 1 else 1.2 + 2.3 * columns, 1.2 + (2.4 if rows == 1 else 1.8) * rows)
+    figure, axes = style.new_panels(len(panels), columns, *size, sharex=True, sharey=True)
+    norm = _norm(table["shown"])
+    for ax, (_, panel) in zip(axes, panels, strict=True):
+        if as_map:
+            cells = panel.pivot_table(index=second.column, columns=across.column, values="shown", aggfunc="mean")
+            cells = cells.reindex(index=second.levels, columns=across.levels)
+            ax.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap="viridis", interpolation="nearest")
+            ax.set_facecolor(style.MISSING)
+        else:
+            for _, line in panel.groupby(families) if families else [((), panel)]:
+                colour = second.colour(line[second.column].iloc[0]) if second else style.BLUE
+                _draw_line(ax, line.sort_values("across"), colour, joined=across is None or across.is_numeric)
+            style.value_axis(ax, table["shown"])
+        ax.set_ylabel(second.label if as_map else unit.label(name))
+    ax = axes[0]
+    if as_map:
+        _level_ticks(ax.yaxis, second)
+    if over is not None:
+        style.row_axis(ax, places)
+        if over.name in ("speed", "reduced_speed"):
+            ax.set_xscale("log")
+    elif as_map or not across.is_numeric:
+        _level_ticks(ax.xaxis, across)
+    elif style.is_logarithmic(across.levels):
+        style.log_axis(ax.xaxis, across.unit(across.levels))
+    for ax in axes:
+        ax.set_xlabel(axes[0].get_xlabel() if over is not None else across.label)
+    style.label_outer(axes, columns)
+    titles = [case_label(rest, [key.levels[i] for key, i in zip(rest, found, strict=True)]) for found, _ in panels]
+    style.letter_panels(axes, [textwrap.fill(one, 28) for one in titles])
+    if as_map:
+        figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, pad=0.02, aspect=22).set_label(unit.label(name))
+    else:
+        _name_lines(figure, axes, table, second)
     return figure
 
 
@@ -295,134 +289,57 @@ def _norm(values: Any) -> Normalize:
     return LogNorm(low, high) if style.is_logarithmic(values) else Normalize(low, high if high > low else low + 1)
 
 
-def _colour(key: Key | None, level: Any) -> Any:
-    """Return the colour of a value of the key that colours the lines."""
-    if key is None:
-        return style.BLUE
-    if key.is_numeric:
-        return _SHADES(_norm(key.levels)(level))
-    number = key.levels.index(level)
-    return _SHADES(number / max(1, len(key.levels) - 1)) if key.column == "at" else style.CYCLE[number % 8]
+def _level_ticks(axis: Axis, key: Key) -> None:
+    """Write the levels of a key at the places 0, 1, ... of an axis."""
+    places = range(0, len(key.levels), -(-len(key.levels) // _MOST_TICKS))
+    texts = [f"{key.unit(key.levels[i]):.4g}" if key.is_numeric else key.text(key.levels[i]) for i in places]
+    axis.set_ticks(list(places), texts)
+    if axis.axis_name == "x" and sum(map(len, texts)) > 30:
+        axis.axes.tick_params(axis="x", labelrotation=90)
 
 
-def _draw_lines(
-    ax: Axes,
-    panel: pd.DataFrame,
-    quantity: str,
-    unit: Unit,
-    across: Key | None,
-    over: str | None,
-    second: Key | None,
-    others: list[str],
-) -> None:
-    """Draw the lines of one panel: one for each value of the second key, and of keys without panels."""
-    grouping = ([second.column] if second else []) + others
-    for found, line in (
-        panel.groupby(grouping, sort=second is None or second.is_numeric) if grouping else [((None,), panel)]
-    ):
-        look: dict[str, Any] = {"color": _colour(second, found[0])}
-        numbers = line[REALISATION] if REALISATION in line else pd.Series(np.nan, line.index)
-        if across is None:
-            assert over is not None
-            at = pd.Series(style.row_unit(_rows(panel, over))(line[over]), line.index)
-            look["marker"] = "o" if at.nunique() <= 20 and panel["case"].nunique() <= _MOST_NAMED else ""
-        elif across.is_numeric:
-            at, look["marker"] = pd.Series(across.unit(line[across.column]), line.index), "o"
-        else:
-            at = line[across.column].map(across.levels.index)
-            look |= {"marker": "o", "ls": "", "ms": 5}
-        shown = pd.Series(unit(line[quantity]), line.index)
-        if numbers.notna().any():  # realisations, interpolated to common abscissae
-            wide = pd.DataFrame({"at": at, "number": numbers, "value": shown}).pivot_table("value", "at", "number")
-            wide = wide.interpolate("index", limit_area="inside").dropna()
-            itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else pd.Series(dtype=float)
-            found = statistics(wide.to_numpy().T)
-            ends = (wide.index, found["patch_lower"], found["patch_upper"])
-            joined = look.get("ls") != "" and len(wide) > 1
-            if joined:
-                ax.fill_between(*ends, color=look["color"], alpha=0.22, lw=0)
-            else:
-                ax.vlines(*ends, color=look["color"], alpha=0.35, lw=5)
-            dashes = _ITSELF_LINE if joined else {"ls": ""}
-            if itself.size:
-                ax.plot(itself.index, itself, marker="D", mfc="w", ms=4, color=look["color"], **dashes)
-            ax.plot(wide.index, found["mean"], **look)
-        else:
-            order = at.sort_values(kind="stable").index
-            ax.plot(at[order], shown[order], **look)
-
-
-def _rows(table: pd.DataFrame, over: str) -> xr.DataArray:
-    """Return the distinct times, speeds or distances of a table."""
-    units = VARIABLES[over].units if over in VARIABLES else ""
-    return xr.DataArray(np.unique(table[over]), name=over, dims=over, attrs={"units": units})
-
-
-def _draw_cells(ax: Axes, panel: pd.DataFrame, quantity: str, across: Key, up: Key, norm: Normalize) -> None:
-    """Draw one cell for each pair of values of two keys, coloured by the mean of a quantity."""
-    cells = panel.pivot_table(index=up.column, columns=across.column, values=quantity, aggfunc="mean")
-    cells = cells.reindex(index=up.levels, columns=across.levels)
-    ax.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap="viridis", interpolation="nearest")
-    ax.set_facecolor(style.MISSING)
-    every = -(-len(up.levels) // 12)
-    numbers = range(0, len(up.levels), every)
-    shown = [f"{float(up.unit(up.levels[i])):.4g}" if up.is_numeric else up.text(up.levels[i]) for i in numbers]
-    ax.set_yticks(list(numbers), shown)
-    ax.set_ylabel(up.label)
-
-
-def _finish_axes(
-    ax: Axes, values: Any, label: str, table: pd.DataFrame, across: Key | None, over: str | None, as_map: bool
-) -> None:
-    """Set the scales, ticks and labels that all panels share."""
-    if not as_map:
-        style.value_axis(ax, values)
-        ax.set_ylabel(label)
-    if across is None:
-        assert over is not None
-        style.row_axis(ax, _rows(table, over))
-        if over.endswith("speed"):
-            ax.set_xscale("log")
+def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> None:
+    """Draw one line of a panel; of realisations the mean, the prediction interval, and the measured scan."""
+    look: dict[str, Any] = {"color": colour, "marker": "o" if len(line) <= 100 else ""}
+    if not joined:
+        look["ls"] = ""
+    if REALISATION not in line:
+        ax.plot(line["across"], line["shown"], **look)
         return
-    if across.is_numeric and not as_map:
-        if across.is_log:
-            style.log_axis(ax.xaxis, across.unit(across.levels))
+    # realisations with times of their own are interpolated to common times
+    wide = line.pivot_table("shown", "across", REALISATION).interpolate("index", limit_area="inside").dropna()
+    itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else None
+    found = statistics(wide.to_numpy().T)
+    ends = wide.index, found["patch_lower"], found["patch_upper"]
+    if joined and len(wide) > 1:
+        ax.fill_between(*ends, color=colour, alpha=0.22, lw=0)
     else:
-        every = -(-len(across.levels) // 12)
-        numbers = list(range(0, len(across.levels), every))
-        texts = [
-            f"{float(across.unit(across.levels[i])):.4g}" if across.is_numeric else across.text(across.levels[i])
-            for i in numbers
-        ]
-        ax.set_xticks(numbers, texts)
-        if sum(map(len, texts)) > 30:
-            ax.tick_params(axis="x", labelrotation=90)
-        if not as_map:
-            ax.set_xlim(-0.5, len(across.levels) - 0.5)
-    ax.set_xlabel(across.label)
+        ax.vlines(*ends, color=colour, alpha=0.35, lw=5)
+    if itself is not None:
+        ax.plot(
+            itself.index, itself, marker="D", mfc="w", ms=4, color=colour, **(_ITSELF_LINE if joined else {"ls": ""})
+        )
+    ax.plot(wide.index, found["mean"], **look)
 
 
 def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: Key | None) -> None:
     """Draw the legend or colour bar of the key that colours the lines, and entries for lines and bands."""
     named: dict[str, Artist] = {}
-    title = ""
-    if second is not None and second.is_numeric and len(second.levels) > _MOST_NAMED:
+    if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
         bar = ScalarMappable(_norm(second.unit(second.levels)), _SHADES)
         figure.colorbar(bar, ax=axes, pad=0.02, aspect=22).set_label(second.label)
-    elif second is not None and len(second.levels) <= 2 * _MOST_NAMED:
-        title = second.name
-        named = {second.text(one): Line2D([], [], color=_colour(second, one), marker="o") for one in second.levels}
+    elif second and len(second.levels) <= 2 * _MOST_NAMED:
+        named = {second.text(one): Line2D([], [], color=second.colour(one), marker="o") for one in second.levels}
     if REALISATION in table:
-        count, scan = (
-            table.loc[table[REALISATION] != ITSELF, REALISATION].nunique(),
-            (table[REALISATION] == ITSELF).any(),
-        )
-        kind = "Gaussian surrogates" if scan else "realisations"
-        named |= {f"mean of {count} {kind}": Line2D([], [], color="0.3")}
+        has_scan = (table[REALISATION] == ITSELF).any()
+        count = table.loc[table[REALISATION] != ITSELF, REALISATION].nunique()
+        named |= {
+            f"mean of {count} {'Gaussian surrogates' if has_scan else 'realisations'}": Line2D([], [], color="0.3")
+        }
         named |= {"95 % prediction interval": Patch(color="0.3", alpha=0.22, lw=0)}
-        if scan:
+        if has_scan:
             named["measured scan"] = Line2D([], [], color="0.3", **_ITSELF_LINE)
-    style.legend_above(figure, named, title)
+    style.legend_above(figure, named, second.name if second else "")
 
 
 def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
@@ -430,7 +347,7 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
 
     A quantity that is the same in all cases, or equal to a swept key, is left out.
     """
-    area, axis = default_quantity(results), axis_of(results.variables)
+    axis = axis_of(results.variables)
     if axis == "speed":
         for file, name in (("friction", "friction_coefficient"), ("area", "contact_fraction")):
             yield file, f"{VARIABLES[name].label} against speed, for each case.", sweep(results, name)
@@ -438,25 +355,22 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
             caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
             yield "master", caption, sweep(results, along="reduced_speed")
         return
-    loading = "nominal_pressure" if area == "contact_fraction" else "force"
-    keys = swept_keys(results)
-    for name in (area, "approach", loading, "leak_rate", *CONDUCTANCES):
+    keys, row = swept_keys(results), ROW if ROW in results.dims else axis
+    for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES):
         if name not in results:
             continue
-        if keys and not _is_known(results, name, keys, axis):
-            file = "area" if name == area else name
+        (table,) = _at_times(results, name, None, axis, row).values()
+        table = _known(table, name)
+        values = table[name].to_numpy()
+        stated = [values[:1], *(table[key.column] for key in keys if key.is_numeric)]
+        scale = 1e-6 * np.abs(values).max(initial=0.0)
+        if keys and not any(np.allclose(values, one, rtol=0, atol=scale) for one in stated):
+            file = "area" if name == "contact_area" else name
             yield file, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
-        if name in (area, "leak_rate", *CONDUCTANCES):
+        if name in ("contact_area", "leak_rate", *CONDUCTANCES):
             caption = f"{VARIABLES[name].label} over {axis}, for each case."
-            yield "histories" if name == area else f"{name}-histories", caption, sweep(results, name, along=axis)
-
-
-def _is_known(results: xr.Dataset, name: str, keys: list[Key], axis: str) -> bool:
-    """Return whether a quantity is the same in all cases, or equal to a swept key, at its drawn time."""
-    row = ROW if ROW in results.dims else axis
-    table, _ = _at_times(results, name, None, axis, row, one=False)
-    values = table[name].to_numpy()
-    scale = 1e-6 * float(np.max(np.abs(values), initial=0.0))
-    stated = [values[0]] if values.size else [values]
-    stated += [table[key.column].to_numpy() for key in keys if key.is_numeric]
-    return any(np.allclose(values, one, rtol=0, atol=scale) for one in stated)
+            yield (
+                "histories" if name == "contact_area" else f"{name}-histories",
+                caption,
+                sweep(results, name, along=axis),
+            )
