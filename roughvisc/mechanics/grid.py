@@ -123,6 +123,8 @@ class Grid:
         Whether a uniform pressure displaces the surface.
     convolutions : int
         Number of convolutions so far, applications of the inverse included.
+    threads : int
+        Threads that work on one field.
 
     Raises
     ------
@@ -157,12 +159,9 @@ class Grid:
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.convolutions = 0
+        self.threads = threads_of(self.size, workers)
+        self._transforms = transforms(self.threads, xp)
         self._memories: dict[Any, Array] = {}
-
-    @property
-    def threads(self) -> int:
-        """Number of threads that work on one field."""
-        return threads_of(self.size, self.workers)
 
     @property
     def wave_numbers(self) -> tuple[float, float]:
@@ -199,14 +198,15 @@ class Grid:
         if self.boundary == "free":
             return free_space_symbol(kernel, self.points, self.spacing)
         waves = periodic_waves(self.period, self.spacing)
-        return self._distinct(np.asarray(kernel.transfer(*waves), dtype=float))
+        symbol = np.asarray(kernel.transfer(*waves), dtype=float)
+        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     def _periodic_symbol(self) -> np.ndarray:
-        """Return the transform of the periodic kernel on the cells; it must be positive. [m]"""
-        return self._distinct(periodic_symbol(self.kernel, self.period, self.spacing))
+        """Return the transform of the periodic kernel on the cells; it must be positive. [m]
 
-    def _distinct(self, symbol: np.ndarray) -> np.ndarray:
-        """Return a symbol without the shortest wave of a mirrored surface along each axis, which is zero at cells."""
+        The shortest wave of a mirrored surface along each axis, which is zero at the cells, is left out.
+        """
+        symbol = periodic_symbol(self.kernel, self.period, self.spacing)
         return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
@@ -309,10 +309,6 @@ class Grid:
         return memory[: shape[0] * shape[1]].reshape(shape)
 
     # ----------------------------------------------------------------------------------------------------- transforms
-
-    @cached_property
-    def _transforms(self) -> Transforms:
-        return transforms(self.threads, self.xp)
 
     def spectrum(self, field: Array) -> Array:
         """Return the transform of a field, zero beyond the cells."""

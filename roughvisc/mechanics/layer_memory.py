@@ -13,7 +13,6 @@ of a step becomes a symbol too, so that the kernel of a step depends on its leng
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -52,12 +51,10 @@ class LayerMemory(Memory):
         limits = (waves.q[0], waves.q[-1]) if grid is None else grid.wave_numbers
         super().__init__(waves.fastest_wave(*limits), duration)
         self.waves, self.grid = waves, cast(Grid, grid)
-
-    @cached_property
-    def weights(self) -> list[Array]:
-        """Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]"""
-        kernels = [*(self.waves.kernel(one, 0.0) for one in np.eye(self.times.size)), self.waves.kernel()]
-        return [self.grid.xp.asarray(self.grid.symbol_of(kernel)) for kernel in kernels]
+        if grid is not None:
+            #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
+            kernels = [*(waves.kernel(one, 0.0) for one in np.eye(self.times.size)), waves.kernel()]
+            self.weights = [grid.xp.asarray(grid.symbol_of(kernel)) for kernel in kernels]
 
     def remaining(self, time: float) -> float:
         """Return one: a common rate of decay does not exist."""

@@ -114,18 +114,12 @@ class Memory:
         flow = [series.fluidity] if series.fluidity else []
         self.compliances = factor * np.array([*series.compliances, *flow])
         self.times = np.array([*series.times, *([np.inf] if flow else [])])
+        #: Contact compliance: of each exponential [1/Pa], of the fluidity [1/(Pa s)], instantaneous [1/Pa].
+        self.weights: Any = np.append(self.compliances, self.glassy)
+        #: Whether the response is independent of the history.
+        self.is_elastic = not bool(self.compliances.any())
         self.fields = 2 if keeps_pressure else 1
         self.may_ring = self.is_stiff(duration)
-
-    @cached_property
-    def weights(self) -> Any:
-        """Contact compliance: of each exponential [1/Pa], of the fluidity [1/(Pa s)], instantaneous [1/Pa]."""
-        return np.append(self.compliances, self.glassy)
-
-    @property
-    def is_elastic(self) -> bool:
-        """Whether the response is independent of the history."""
-        return not self.compliances.any()
 
     def is_stiff(self, step: float) -> bool:
         """Return whether the body creeps too far within a step for a linear ``v``."""

@@ -18,8 +18,9 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact import solve_contact
@@ -127,6 +128,8 @@ class Scene:
         Whether the body has an instantaneous compliance.
     stated : tuple of float
         Stated error over the difference between both solutions: of pressure and force, and of the approach.
+    motions : list of Slide
+        Slide of each segment for the friction: its own, the last one, or the first; empty without slides.
     """
 
     grid: Grid
@@ -139,8 +142,16 @@ class Scene:
     present: Array | None = None
     can_jump: bool = field(init=False)
     stated: tuple[float, float] = field(init=False)
+    motions: list[Slide] = field(init=False)
 
     def __post_init__(self) -> None:
+        motion, self.motions = None, []
+        for segment in reversed(self.program.segments):
+            motion = segment.slide or motion
+        for segment in self.program.segments:
+            motion = segment.slide or motion
+            if motion is not None:
+                self.motions.append(motion)
         self.can_jump = self.memory.compliance(0.0) > 0
         soft = self.is_soft(self.program.duration)
         self.stated = (STATED_SOFT, STATED_APPROACH_SOFT) if soft else (STATED, STATED_APPROACH)
@@ -152,15 +163,6 @@ class Scene:
     def prescribed(self, number: int, time: float, point: Point) -> float:
         """Return the prescribed value of a segment at a time [s], for the solution of a point in it. [N or m]"""
         return self.program.segments[number].value(time - self.program.corners[number], point.start)
-
-    @cached_property
-    def motions(self) -> tuple[Slide, ...]:
-        """Slide of each segment for the friction: its own, the last one, or the first; empty without slides."""
-        slides: list[Slide | None] = []
-        for segment in self.program.segments:
-            slides.append(segment.slide or (slides[-1] if slides else None))
-        first = next(filter(None, slides), None)
-        return tuple(slide or first for slide in slides) if first else ()
 
     def is_soft(self, step: float) -> bool:
         """Return whether hardly any compliance of a step is instantaneous. [s]"""
@@ -769,29 +771,19 @@ def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple
 
     Force and approach are parabolas through the three points. After a jump the load is constant.
     """
-    forces = middle.force if start.is_late else start.force, middle.force, end.force
-    approaches = start.approach, middle.approach, end.approach
     first, last = middle.time - start.time, end.time - start.time
     if not 0 < first < last or min(middle.force, end.force) == 0:  # equal times up to rounding, or contact is lost
         early = trapezoid(scene, start, middle)
         return early, early + trapezoid(scene, middle, end)
-
-    def slope_and_bend(values: tuple[float, float, float]) -> tuple[float, float]:
-        early, mean = (values[1] - values[0]) / first, (values[2] - values[0]) / last
-        bend = (mean - early) / (last - first)
-        return early - bend * first, bend
-
-    force, (rise, bend), (rate, turn) = forces[0], slope_and_bend(forces), slope_and_bend(approaches)
-
-    def work(time: float) -> float:
-        return time * (
-            force * rate
-            + time * (force * turn + rise * rate / 2)
-            + time**2 * (2 * rise * turn + bend * rate) / 3
-            + time**3 * bend * turn / 2
-        )
-
-    return work(first), work(last)
+    force = middle.force if start.is_late else start.force
+    begin = np.array([force, start.approach])
+    early, mean = (np.array([one.force, one.approach]) - begin for one in (middle, end))
+    bends = (mean / last - early / first) / (last - first)
+    (rise, rate), (bend, turn) = (early / first - bends * first).tolist(), bends.tolist()
+    t = np.array([first, last])
+    terms = force * turn + rise * rate / 2, (2 * rise * turn + bend * rate) / 3, bend * turn / 2
+    of_first, of_both = (t * (force * rate + t * terms[0] + t**2 * terms[1] + t**3 * terms[2])).tolist()
+    return of_first, of_both
 
 
 def trapezoid(scene: Scene, before: Point, after: Point) -> float:

@@ -163,6 +163,7 @@ def solve_contact(
         given[~present] = 0
     level = overlap / unit
     is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
+    has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
         raise ConvergenceError("the approach reaches full contact and does not determine the load")
 
@@ -245,7 +246,7 @@ def solve_contact(
             is_single, previous = False, None
             continue
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
-        waves = LongWaves.of(grid, cells, held, energy)
+        waves = LongWaves.of(grid, cells, held, energy) if has_blocks else None
         rest = residual if waves is None else residual - waves.means(residual)[waves.block]
         direction = grid.inverse(on_grid((rest / size).astype(np.float32), cells)).reshape(-1)[cells].astype(float)
         direction *= size
@@ -521,7 +522,7 @@ class LongWaves(NamedTuple):
     @classmethod
     def of(cls, grid: Grid, cells: Array, held: Array, energy: float) -> LongWaves | None:
         """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
-        if min(grid.shape) < BLOCKS_FROM or cells.size > SPARSE * grid.size:
+        if cells.size > SPARSE * grid.size:
             return None
         xp, blocks = grid.xp, grid.coarse
         block = grid.block_of_cell.take(cells)
