@@ -114,7 +114,7 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
         ("held", "Locked by another run"),
     ):
         rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
-    rows += accuracy_rows([entry.histories for entry in entries])
+    rows += accuracy_rows([entry.arrays for entry in entries])
     if spent:
         rows.append(("Cost: total wall time", readable(sum(spent), "s")))
     return two_columns(rows, title)

@@ -27,7 +27,6 @@ def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke)
         assert str(lock_path(out, first.key)) in err
         assert "held" in said
         assert not list(out.glob("*.failed.json"))
-        assert "held" in (out / "cases.csv").read_text(encoding="utf-8-sig").splitlines()[1]
         one = study(tmp_path / "one", SMALL.replace("5 mN", "4 mN"))
         status, said, err = invoke("run", one, "--out", out, "--no-plots", "-q")
         assert (status, said, err.count("\n")) == (1, "", 1)

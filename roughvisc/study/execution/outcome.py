@@ -63,7 +63,7 @@ class Outcome:
 
 def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
     """Return the outcome of a case whose result exists."""
-    message = unconverged(entry.histories)
+    message = unconverged(entry.arrays)
     return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
 
 

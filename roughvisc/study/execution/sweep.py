@@ -294,8 +294,7 @@ class Record:
                     record_path(self.folder, key).unlink(missing_ok=True)
                 if outcome.entry is None:
                     self._outcomes[key] = outcome_of(index[key], reused=True)
-        held = {key: outcome.message for key, outcome in self._outcomes.items() if outcome.kind == "held"}
-        write_table(self.folder, index, self._listed, held)
+        write_table(self.folder, index, self._listed)
 
     def _entries(self) -> list[Entry]:
         return [outcome.entry for outcome in self._outcomes.values() if outcome.entry]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import re
 from base64 import b64decode, b64encode
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -33,8 +33,8 @@ from roughvisc.study.storage.netcdf import ERRORS, NETCDF, foreign, unreadable
 from roughvisc.variables import ROW, STEP, VARIABLES, axis_of
 
 INDEX = ".index.json.gz"
-#: Names of histories over the rows, and of the coordinates of the rows.
-_HISTORIES = tuple(name for name, variable in VARIABLES.items() if variable.dims in ((ROW,), (STEP,)))
+#: Variables over one dimension: histories over the rows, coordinates of the rows and of the cells.
+_ARRAYS = ("x", "y", *(name for name, variable in VARIABLES.items() if variable.dims in ((ROW,), (STEP,))))
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
 
@@ -53,19 +53,15 @@ class Entry:
         Attributes of the file that are text or numbers.
     fields : dict
         dtype of each variable over x and y.
-    histories : dict
-        Each variable over the rows, with ``time`` or ``speed``.
-    x, y : ndarray
-        Positions of the cells. [m]
+    arrays : dict
+        Each variable over the rows, with ``time`` or ``speed``; and the positions ``x`` and ``y`` of the cells.
     """
 
     file: str
     stamp: tuple[int, int]
     attributes: dict[str, Any]
     fields: dict[str, str]
-    histories: dict[str, NDArray[Any]] = field(repr=False)
-    x: NDArray[np.float64] = field(repr=False)
-    y: NDArray[np.float64] = field(repr=False)
+    arrays: dict[str, NDArray[Any]] = field(repr=False)
 
     @property
     def key(self) -> str:
@@ -75,17 +71,17 @@ class Entry:
     @property
     def along(self) -> str:
         """Axis of the rows."""
-        return axis_of(self.histories)
+        return axis_of(self.arrays)
 
     @property
     def rows(self) -> int:
         """Number of kept times, or of speeds."""
-        return len(self.histories[self.along])
+        return len(self.arrays[self.along])
 
     @cached_property
     def case(self) -> dict[str, Any]:
         """The case as a dictionary, from its JSON."""
-        return json.loads(self.attributes.get("case", "{}"))
+        return json.loads(self.attributes["case"])
 
 
 def read_entry(path: Path) -> Entry:
@@ -102,18 +98,19 @@ def read_entry(path: Path) -> Entry:
         with NETCDF, netCDF4.Dataset(path) as file:  # in half the time of open_result
             file.set_auto_maskandscale(False)
             stored = file.variables
-            stated = {name: one.item() if isinstance(one, np.generic) else one for name, one in file.__dict__.items()}
-            found = foreign(stated, {name: one.dimensions for name, one in stored.items()})
-            histories = {name: stored[name][...] for name in _HISTORIES if name in stored}
+            attributes = {
+                name: one.item() if isinstance(one, np.generic) else one for name, one in file.__dict__.items()
+            }
+            found = foreign(attributes, {name: one.dimensions for name, one in stored.items()})
+            arrays = {name: stored[name][...] for name in _ARRAYS if name in stored}
             fields = {name: one.dtype.str for name, one in stored.items() if one.dimensions[-2:] == ("x", "y")}
-            grid = {name: np.asarray(stored[name][...], float) for name in ("x", "y") if name in stored}
     except ERRORS as error:
         raise unreadable(path, error) from error
-    absent = [name for name in ("status", "x", "y", "case") if name not in {**histories, **grid, **stated}]
+    absent = [name for name in ("status", "x", "y", "case") if name not in {**arrays, **attributes}]
     if found or absent:
         raise InputError(f"{path}: {found or f'holds no {absent[0]}'}: expected a result of roughvisc run")
-    attributes = {name: one for name, one in stated.items() if isinstance(one, str | int | float)}
-    return Entry(path.name, stamp, attributes, fields, histories, **grid)
+    plain = {name: one for name, one in attributes.items() if isinstance(one, str | int | float)}
+    return Entry(path.name, stamp, plain, fields, arrays)
 
 
 def _stamp(path: Path) -> tuple[int, int]:
@@ -158,21 +155,18 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
         except FileNotFoundError:  # removed in the meantime
             continue
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
-        _write_index(folder, entries)
+        results = [
+            (
+                entry.file,
+                entry.stamp,
+                entry.attributes,
+                entry.fields,
+                {name: [one.dtype.str, b64encode(one).decode()] for name, one in entry.arrays.items()},
+            )
+            for entry in entries.values()
+        ]
+        write_json(folder / INDEX, {"version": program_version(), "results": results})
     return entries
-
-
-def _write_index(folder: Path, entries: Mapping[str, Entry]) -> None:
-    """Write the cache of a folder; if this fails, opening results is only slower."""
-    grids: dict[str, int] = {}
-    results = {}
-    for entry in entries.values():
-        grid = json.dumps([_packed(entry.x), _packed(entry.y)])  # most results share one grid
-        histories = {name: _packed(values) for name, values in entry.histories.items()}
-        number = grids.setdefault(grid, len(grids))
-        results[entry.file] = [*entry.stamp, entry.attributes, entry.fields, number, histories]
-    stated = {"version": program_version(), "grids": [json.loads(grid) for grid in grids], "results": results}
-    write_json(folder / INDEX, stated)
 
 
 def _read_index(folder: Path) -> dict[str, Entry]:
@@ -180,20 +174,11 @@ def _read_index(folder: Path) -> dict[str, Entry]:
     entries = {}
     try:
         stated = read_json(folder / INDEX)
-        if stated["version"] == program_version():
-            grids = [(_unpacked(x), _unpacked(y)) for x, y in stated["grids"]]
-            for file, (size, changed, attributes, fields, grid, packed) in stated["results"].items():
-                histories = {name: _unpacked(one) for name, one in packed.items()}
-                entries[file] = Entry(file, (size, changed), attributes, fields, histories, *grids[grid])
+        for file, stamp, attributes, fields, arrays in (
+            stated["results"] if stated["version"] == program_version() else ()
+        ):
+            unpacked = {name: np.frombuffer(b64decode(text), dtype) for name, (dtype, text) in arrays.items()}
+            entries[file] = Entry(file, tuple(stamp), attributes, fields, unpacked)
     except DAMAGED:
         return {}
     return entries
-
-
-def _packed(values: NDArray[Any]) -> list[str]:
-    """Return a one-dimensional array as text: its type and its bytes."""
-    return [values.dtype.str, b64encode(values.tobytes()).decode()]
-
-
-def _unpacked(packed: list[str]) -> NDArray[Any]:
-    return np.frombuffer(b64decode(packed[1]), packed[0])

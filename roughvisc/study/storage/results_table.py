@@ -64,12 +64,10 @@ def to_table(out: str | Path) -> pd.DataFrame:
     index, cases = index_of(folder), read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)
-    return _table(folder, index, cases, {})
+    return _table(folder, index, cases)
 
 
-def write_table(
-    folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase], held: Mapping[str, str] | None = None
-) -> None:
+def write_table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> None:
     """Write the table of a sweep as CSV; if writing fails, log a warning.
 
     Parameters
@@ -80,10 +78,8 @@ def write_table(
         Key -> entry of each result in the folder.
     cases : sequence of SweepCase
         Cases of the sweep.
-    held : mapping, optional
-        Key -> message of each case that another run computes.
     """
-    tables = {CASES: _table(folder, index, cases, held or {})}
+    tables = {CASES: _table(folder, index, cases)}
     (folder / REALISATIONS).unlink(missing_ok=True)  # from an earlier sweep
     found = realisations_table(index, cases)
     if len(found):
@@ -104,9 +100,7 @@ def _no_formula(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
 
 
-def _table(
-    folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase], held: Mapping[str, str]
-) -> pd.DataFrame:
+def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
     import pandas as pd
 
     cases = cases or [SweepCase(key, entry.case) for key, entry in index.items()]
@@ -116,18 +110,17 @@ def _table(
         entry, message = index.get(one.key), ""
         found = {}
         if entry is not None:
-            bad = int((entry.histories["status"] == NOT_CONVERGED).sum())
+            bad = int((entry.arrays["status"] == NOT_CONVERGED).sum())
             status = f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"
             found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
             for name in variables_in_table("largest"):
-                values = np.asarray(entry.histories.get(name, ()), float)
+                values = np.asarray(entry.arrays.get(name, ()), float)
                 largest = values.max(where=np.isfinite(values), initial=-np.inf)
                 found[f"largest {heading(name, VARIABLES[name].units)}"] = largest if largest > -np.inf else np.nan
-        elif one.key in held:
-            status, message = "held by another run", held[one.key]
+        elif record := recorded_failure(folder, one.key):
+            status, message = "failed", str(record.get("message", ""))
         else:
-            record = recorded_failure(folder, one.key)
-            status, message = ("failed", str(record.get("message", ""))) if record else ("not computed", "")
+            status = "not computed"
         numbers.append(found)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)})
@@ -137,24 +130,22 @@ def _table(
 
 def _telling(entry: Entry) -> dict[str, float]:
     """Return the numbers of a case at its end, or at the speed of largest friction of a friction curve."""
-    row = AXES[entry.along].telling_row(entry.histories)
-    names = [name for name in variables_in_table("last") if len(entry.histories.get(name, ()))]
-    return {name: float(entry.histories[name][row]) for name in names}
+    row = AXES[entry.along].telling_row(entry.arrays)
+    names = [name for name in variables_in_table("last") if len(entry.arrays.get(name, ()))]
+    return {name: float(entry.arrays[name][row]) for name in names}
 
 
 def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the values of varied parameters, under their keys with the first unit that the study states."""
     columns: dict[str, Any] = {}
     for key, values in parameters_of(stated).items():
-        si = unit_of(key, stated[0]) if values.dtype.kind in "if" else ""
-        written = [case.get("written", {}).get(key) for case in stated]
-        unit = next((number_and_unit(text)[1] for text in written if text), si) if si else ""
-        numbers = values.tolist()
-        for place, text in enumerate(written):
-            if unit and math.isfinite(numbers[place]):
-                text = text or f"{numbers[place]!r} {si}"
-                exact = text.endswith(f" {unit}")
-                numbers[place] = number_and_unit(text)[0] if exact else quantity(text, unit)
+        numbers, unit = values.tolist(), ""
+        if values.dtype.kind in "if" and (si := unit_of(key, stated[0])):
+            written = [text for case in stated if (text := case.get("written", {}).get(key))]
+            unit = (number_and_unit(written[0])[1] if written else "") or si
+            for place, number in enumerate(numbers):
+                if math.isfinite(number):  # without the rounding error of the conversion
+                    numbers[place] = float(f"{quantity(f'{number!r} {si}', unit):.12g}")
         columns[heading(key, unit)] = numbers
     return columns
 

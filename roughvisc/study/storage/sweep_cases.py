@@ -74,22 +74,20 @@ def read_sweep(folder: Path) -> list[SweepCase]:
     except DAMAGED as error:
         raise InputError(
             f"{path}: cannot be read, or is damaged ({error}): expected the cases of the last sweep; run it again, "
-            "which computes nothing that is finished, or ask for cases='all'",
+            "which computes nothing that is finished",
             key=SWEEP,
         ) from error
 
 
 def numbers_of(cases: Sequence[SweepCase]) -> list[int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
-    parameters = parameters_of([one.case for one in cases])
-    if REALISATION not in parameters:
-        return list(range(len(cases)))
-    drawn = parameters[REALISATION].tolist()
-    stated = [values.tolist() for key, values in parameters.items() if key not in (REALISATION, *DRAWN)]
-    # compared as text, because NaN does not equal NaN
-    settings = [repr([values[n] for values in stated] if drawn[n] == drawn[n] else n) for n in range(len(cases))]
-    first = {one: number for number, one in enumerate(dict.fromkeys(settings))}
-    return [first[one] for one in settings]
+    numbers: dict[Any, int] = {}
+    found = []
+    for place, one in enumerate(cases):
+        varied = one.case.get("varied", {})
+        settings = json.dumps({key: value for key, value in varied.items() if key not in (REALISATION, *DRAWN)})
+        found.append(numbers.setdefault(settings if REALISATION in varied else place, len(numbers)))
+    return found
 
 
 def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:

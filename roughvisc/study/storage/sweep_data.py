@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -30,35 +30,22 @@ from roughvisc.study.storage.sweep_cases import (
     sweep_cases,
 )
 from roughvisc.study.sweep_table import DRAWN, REALISATION
-from roughvisc.units import unit_for
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
-#: Attributes that the Dataset has if all results of a sweep share their value.
-_SHARED = (
-    "Conventions",
-    "result_format",
-    "source",
-    "boundary",
-    "tolerance",
-    "direction",
-    "thickness",
-    "base",
-    "kernel",
-)
 
 
-def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "all"] = "last") -> xr.Dataset:
+def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.Dataset:
     """Open all results of a sweep together; fields are read when they are needed.
 
     Parameters
     ----------
     out : path
         Folder of the results.
-    cases : "last", "all", or sequence of Case
-        "last": the finished cases of the last sweep in this folder, or all results if no sweep ran in it. "all": all
-        results in the folder. A sequence: the results of these cases, in this order.
+    cases : sequence of Case, optional
+        Cases whose results to open, in this order. Default: the cases of the last sweep in this folder, or all results
+        if no sweep ran in it.
 
     Returns
     -------
@@ -89,13 +76,8 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | Literal["last", "al
     """
     folder = Path(out).absolute()
     index = index_of(folder)
-    if not isinstance(cases, str):
-        listed = sweep_cases(cases)
-    elif cases in ("last", "all"):
-        listed = read_sweep(folder) if cases == "last" else []
-        listed = listed or [SweepCase(key, entry.case) for key, entry in index.items()]
-    else:
-        raise InputError(key="cases", found=cases, expected="'last', 'all', or a list of cases")
+    listed = read_sweep(folder) if cases is None else sweep_cases(cases)
+    listed = listed or [SweepCase(key, entry.case) for key, entry in index.items()]
     here = [place for place, one in enumerate(listed) if one.key in index]
     if not here:
         raise no_results(folder)
@@ -114,18 +96,18 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
     """Return results stacked over ``case``."""
     first = entries[0]
     along = first.along
-    places = [entry.histories[along] for entry in entries]
+    places = [entry.arrays[along] for entry in entries]
     common = all(np.array_equal(one, places[0]) for one in places)
-    shared = [name for name in first.histories if all(name in entry.histories for entry in entries)]
+    shared = [name for name in first.arrays if all(name in entry.arrays for entry in entries)]
     variables: dict[str, Any] = {
-        name: (("case", *VARIABLES[name].over(along)), _side_by_side([entry.histories[name] for entry in entries]))
+        name: (("case", *VARIABLES[name].over(along)), _side_by_side([entry.arrays[name] for entry in entries]))
         for name in shared
-        if name != along
+        if name not in (along, "x", "y")
     }
     coords = {along: places[0]} if common else {}
-    grids = {(entry.x.tobytes(), entry.y.tobytes()): entry for entry in entries}
+    grids = {(entry.arrays["x"].tobytes(), entry.arrays["y"].tobytes()): entry.arrays for entry in entries}
     if len(grids) == 1:
-        coords |= {"x": first.x, "y": first.y}
+        coords |= {"x": first.arrays["x"], "y": first.arrays["y"]}
         one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
         for name in first.fields:
             if name in VARIABLES and all(name in entry.fields for entry in entries):
@@ -133,21 +115,13 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
                 field = _field(folder, entries[:1] if of_all else entries, name)
                 variables[name] = field[0] if of_all else field
     else:
-        texts = []
-        for entry in grids.values():
-            sides = [one[1] - one[0] if len(one) > 1 else 0.0 for one in (entry.x, entry.y)]
-            unit = unit_for(sides, "m")
-            cells = f"{len(entry.x)} x {len(entry.y)} cells of {unit.text(sides[0], 4)} by {unit.text(sides[1], 4)}"
-            texts.append(cells)
+        cells = dict.fromkeys(f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values())
         warn_once(
-            f"{folder}: the results lie on different grids ({', '.join(dict.fromkeys(texts))}): their histories are "
+            f"{folder}: the results lie on {len(grids)} different grids ({', '.join(cells)}): their histories are "
             "opened together, without fields; open each with open_result for its fields"
         )
-    alike = {
-        name: first.attributes[name]
-        for name in _SHARED
-        if name in first.attributes and all(e.attributes.get(name) == first.attributes[name] for e in entries)
-    }
+    others = [entry.attributes for entry in entries]
+    alike = {name: one for name, one in first.attributes.items() if all(other.get(name) == one for other in others)}
     dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))
     if common:
         return dataset
@@ -183,7 +157,7 @@ class _Frames(BackendArray):
         self.rows = [entry.rows for entry in entries]
         self.dtype = np.result_type(*(entry.fields[name] for entry in entries))
         rows = () if VARIABLES[name].dims == ("x", "y") else (max(self.rows),)
-        self.shape = (len(entries), *rows, len(entries[0].x), len(entries[0].y))
+        self.shape = (len(entries), *rows, *(len(entries[0].arrays[axis]) for axis in ("x", "y")))
 
     def __getitem__(self, key: Any) -> Any:
         return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)
