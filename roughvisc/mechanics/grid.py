@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
+from itertools import pairwise, starmap
 from typing import Any, Literal
 
 import numpy as np
@@ -155,7 +156,9 @@ class Grid:
             fast = scipy.fft.next_fast_len
             self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
         if symbol is None:
-            symbol = self.symbol_of(kernel) if boundary == "free" else self._periodic_symbol()
+            symbol = self.symbol_of(kernel) if boundary == "free" else periodic_symbol(kernel, self.period, spacing)
+        if boundary == "mirror":  # the shortest wave along each axis is zero at the cells
+            symbol = np.ascontiguousarray(symbol[: shape[0], : shape[1]])
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.convolutions = 0
@@ -199,14 +202,6 @@ class Grid:
             return free_space_symbol(kernel, self.points, self.spacing)
         waves = periodic_waves(self.period, self.spacing)
         symbol = np.asarray(kernel.transfer(*waves), dtype=float)
-        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
-
-    def _periodic_symbol(self) -> np.ndarray:
-        """Return the transform of the periodic kernel on the cells; it must be positive. [m]
-
-        The shortest wave of a mirrored surface along each axis, which is zero at the cells, is left out.
-        """
-        symbol = periodic_symbol(self.kernel, self.period, self.spacing)
         return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
@@ -260,7 +255,9 @@ class Grid:
 
     @cached_property
     def _inverse_symbol(self) -> Array:
-        symbol = self.xp.asarray(self._periodic_symbol()) if self.boundary == "free" else self.symbol.copy()
+        symbol = self.symbol.copy()
+        if self.boundary == "free":
+            symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
         return (1 / symbol).astype(np.float32)
 
@@ -362,7 +359,7 @@ def threads_of(size: int, workers: int | None = None) -> int:
 
 def on_threads(work: Callable[[slice], Any], count: int, length: int, threads: int) -> None:
     """Split `count` rows or columns into parts of a length, and call a function for each part on several threads."""
-    parts = [slice(first, min(first + length, count)) for first in range(0, count, length)]
+    parts = starmap(slice, pairwise([*range(0, count, length), count]))
     if threads == 1:
         for part in parts:
             work(part)

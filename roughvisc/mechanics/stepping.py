@@ -363,26 +363,20 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         if segments and segments[0].duration > 0:
             yield Step(state.fine, state.difference, 0, state)
     while state.segment < len(segments):
-        segment = segments[state.segment]
-        if segment.duration == 0:
-            is_start = state.fine.time == 0
+        number, segment = state.segment, segments[state.segment]
+        is_jump, is_start = segment.duration == 0, state.fine.time == 0
+        if is_jump:
             state = jump(scene, state, segment)
-            if (scene.can_jump or is_start) and not jumps_next(scene, state):
-                yield Step(state.fine, state.difference, state.segment - 1, state)
-            continue
-        advance = pair_of_steps if segment.slide is None else pair_of_cells
-        steps = advance(scene, state, segment)
-        state = steps[-1].state
-        if state.segment > steps[-1].segment and scene.can_jump and jumps_next(scene, state):
-            steps = steps[:-1]
+            steps = [Step(state.fine, state.difference, number, state)]
+        else:
+            advance = pair_of_steps if segment.slide is None else pair_of_cells
+            steps = advance(scene, state, segment)
+            state = steps[-1].state
+        jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
+        if (jumps_next and (scene.can_jump or is_jump)) or (is_jump and not (scene.can_jump or is_start)):
+            steps.pop()
         yield from steps
         steps = []  # frees their memory while the next steps are computed
-
-
-def jumps_next(scene: Scene, state: State) -> bool:
-    """Return whether the segment that a state has entered is a jump."""
-    segments = scene.program.segments
-    return state.segment < len(segments) and segments[state.segment].duration == 0
 
 
 # ---------------------------------------------------------------------------------------------------------- segments
@@ -777,7 +771,7 @@ def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple
         return early, early + trapezoid(scene, middle, end)
     force = middle.force if start.is_late else start.force
     begin = np.array([force, start.approach])
-    early, mean = (np.array([one.force, one.approach]) - begin for one in (middle, end))
+    early, mean = np.array([middle.force, middle.approach]) - begin, np.array([end.force, end.approach]) - begin
     bends = (mean / last - early / first) / (last - first)
     (rise, rate), (bend, turn) = (early / first - bends * first).tolist(), bends.tolist()
     t = np.array([first, last])
