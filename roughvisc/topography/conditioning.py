@@ -6,13 +6,12 @@ until :func:`fill`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple
 
 import xarray as xr
 
-from roughvisc.arguments import a_table, call, check, dotted, located, refuse_unknown
+from roughvisc.arguments import DataNeeded, a_table, call, dotted, located, refuse_unknown
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
@@ -77,7 +76,7 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.
     Parameters
     ----------
     h : xarray.DataArray
-        Height over (x, y). [m]
+        Height over (x, y) [m]; with :class:`~roughvisc.arguments.NoData`, the steps are only checked.
     steps : mapping
         Any of :data:`STEPS` with their values, in any order; they are applied in the order of :data:`STEPS`.
     where : str
@@ -93,50 +92,24 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.
     InputError
         If a step or an option is unknown, or a value is wrong.
     """
-    for name, arguments in _stated(steps, where):
-        with _named(steps, where, name):
-            h = call(STEPS[name].function, "", arguments, h)
-    return h
-
-
-def check_steps(steps: Mapping[str, Any], where: str = "") -> None:
-    """Check conditioning steps without heights.
-
-    Parameters
-    ----------
-    steps, where
-        As in :func:`condition`.
-    """
-    for name, arguments in _stated(steps, where):
-        with _named(steps, where, name):
-            check(STEPS[name].function, "", arguments)
-
-
-@contextmanager
-def _named(steps: Mapping[str, Any], where: str, name: str) -> Iterator[None]:
-    """Add the key of a step to errors about its arguments; a plain value of the key is itself the argument."""
-    try:
-        yield
-    except InputError as error:
-        key = dotted(where, name)
-        if error.key == STEPS[name].argument != "" and not isinstance(steps[name], Mapping | bool):
-            raise InputError(key=key, found=error.found, expected=error.expected) from error
-        raise located(error, key) from error
-
-
-def _stated(steps: Any, where: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the name and the arguments of each requested step, in order."""
     refuse_unknown(where, a_table(where or "conditioning", steps), STEPS)
     for name, step in STEPS.items():
-        value = steps.get(name, False)
-        if isinstance(value, Mapping):
-            yield name, dict(value)
-        elif value is True:
-            yield name, {}
-        elif value is not False:
-            if not step.argument:
-                raise InputError(key=dotted(where, name), found=value, expected="true, false or a table")
-            yield name, {step.argument: value}
+        value, key = steps.get(name, False), dotted(where, name)
+        if value is False:
+            continue
+        is_plain = not isinstance(value, Mapping | bool)
+        if is_plain and not step.argument:
+            raise InputError(key=key, found=value, expected="true, false or a table")
+        arguments = {step.argument: value} if is_plain else {} if value is True else dict(value)
+        try:
+            h = call(step.function, "", arguments, h)
+        except DataNeeded:
+            continue
+        except InputError as error:
+            if is_plain and error.key == step.argument:  # the value of the key is itself the argument
+                raise InputError(key=key, found=error.found, expected=error.expected) from error
+            raise located(error, key) from error
+    return h
 
 
 def boundary_after(

@@ -42,21 +42,7 @@ _READER = threading.RLock()
 
 
 class Reading(NamedTuple):
-    """Options with which a user reads a file.
-
-    Attributes
-    ----------
-    unit, height_unit : str or None
-        Unit of length if the file states none, and of the heights if they have another unit.
-    spacing : tuple of float or None
-        Cell sides. [m]
-    grid : float or None
-        Side of the cells into which points are sorted. [m]
-    no_data : float or None
-        Number that marks a missing height in the file.
-    height_scale : float or None
-        Factor of the heights.
-    """
+    """Options with which a user reads a file, see :func:`roughvisc.open_scan`."""
 
     unit: str | None = None
     height_unit: str | None = None
@@ -70,18 +56,36 @@ def read_file(
     path: Path, *, format: str | None = None, channel: int | str | None = None, **options: Any
 ) -> xr.DataArray:
     """Read one channel of an instrument or grid file, with the options of :func:`roughvisc.open_scan`."""
-    how = _valid(Reading(**options))
+    how = Reading(**options)
+    for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
+        if unit is not None:
+            quantity(f"1 {unit}", "m", key)
+    for key, value, unit, low in (
+        ("no_data", how.no_data, "-", -math.inf),
+        ("height_scale", how.height_scale, "-", 0.0),
+        ("grid", how.grid, "m", 0.0),
+    ):
+        if value is not None:
+            number(key, value, unit, low=low)
+    how = how._replace(spacing=None if how.spacing is None else pair("spacing", how.spacing))
     with _reading(path), closing(open_file(path, format)) as file:
         chosen = _chosen(file, channel)
         h = _in_metres(file, chosen, how)
     for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
-    _plausible(h, path)
+    if min(h.shape) < 2:
+        raise InputError(f"{path}: it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
+    for axis, d, n in zip(("x", "y"), cell_sides(h, str(path)), h.shape, strict=True):
+        if n * d > WIDEST or d < FINEST:
+            raise InputError(
+                f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
+                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing, and "
+                "height_scale if its heights are in another unit too"
+            )
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
-    others = [other.name for other in file.channels if other is not chosen]
     attrs["orientation"] = orientation(file.format)
-    attrs |= {"instrument": file.instrument} if file.instrument else {}
-    attrs |= {"other_channels": ", ".join(others)} if others else {}
+    attrs["instrument"] = file.instrument or None
+    attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not chosen) or None
     given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
     stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
     h = noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
@@ -89,48 +93,30 @@ def read_file(
     return h
 
 
-def _valid(how: Reading) -> Reading:
-    """Check the options, and return them with numbers in SI."""
-    for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
-        if unit is not None:
-            quantity(f"1 {unit}", "m", key)
-    if how.no_data is not None:
-        number("no_data", how.no_data, "-", low=-math.inf)
-    if how.height_scale is not None:
-        number("height_scale", how.height_scale, "-")
-    sides = None if how.spacing is None else pair("spacing", how.spacing)
-    return how._replace(spacing=sides, grid=None if how.grid is None else number("grid", how.grid, "m"))
-
-
 def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     """Return the heights of a channel over x and y. [m]"""
     xy, z = _metres(channel, how)
-    sides, spacing = channel.spacing, how.spacing
-    if how.grid is not None and (channel.kind != "points" or spacing is not None):
+    if how.grid is not None and (channel.kind != "points" or how.spacing is not None):
         raise InputError("grid: expected none for a map, or with spacing", key="grid", found=how.grid, expected="none")
-    raw = channel.load()
+    raw, sides = channel.load(), channel.spacing
     if channel.kind == "points":
         points = raw[np.isfinite(raw[:, :2]).all(axis=1)]
         points[:, 2] = _without_no_data(points[:, 2], how.no_data, file.complaints)
         values, sides = _of_points(points, xy, how.grid, file.complaints)
     else:
-        values = np.asarray(raw.values if isinstance(raw, xr.DataArray) else raw, dtype=float)
-        values = _without_no_data(values, how.no_data, file.complaints)
-    values = values if z == 1.0 else values * z
-    values = values if how.height_scale is None else values * how.height_scale
+        values = _without_no_data(np.asarray(raw, dtype=float), how.no_data, file.complaints)
+    values = values * z * (1.0 if how.height_scale is None else how.height_scale)
     if top_line_first(file.format):
         values = values[:, ::-1]
-    if channel.positions is None or spacing is not None:
-        spacing = spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
+    if channel.positions is None or how.spacing is not None:
+        spacing = how.spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
         if not all(math.isfinite(d) and d > 0 for d in spacing):
             raise InputError('it states no size: expected spacing, such as "1 um"', key="spacing")
         h = labelled(values, spacing)
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
-        masks = {
-            name: one for name, one in raw.coords.items() if name not in ("x", "y") and set(one.dims) == {"x", "y"}
-        }
+        masks = {name: one for name, one in raw.coords.items() if set(one.dims) == {"x", "y"}}
         h = h.assign_coords({name: (("x", "y"), one.transpose("x", "y").values) for name, one in masks.items()})
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
     for axis in ("x", "y"):
@@ -222,27 +208,23 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
 
 
 def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
-    named = [f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels)]
+    """Return the channel of a name or a number; the default height if None."""
+    named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
     if channel is None:
-        heights = [c for c in file.channels if c.is_height]
-        default = [c for c in heights if file.default is not None and c is file.channels[file.default]]
+        heights = [i for i, c in enumerate(file.channels) if c.is_height]
         if not heights:
-            kinds = {c.kind for c in file.channels} or {"no areal height"}
-            raise InputError(
-                f"it holds {' and '.join(sorted(kinds))} (channels {', '.join(named) or 'none'}): expected heights "
-                "over x and y"
-            )
-        return (default + heights)[0]
+            kinds = " and ".join(sorted({c.kind for c in file.channels})) or "no areal height"
+            raise InputError(f"it holds {kinds} (channels {named or 'none'}): expected heights over x and y")
+        return file.channels[file.default if file.default in heights else heights[0]]
     for i, c in enumerate(file.channels):
-        if channel == c.name or (isinstance(channel, int) and channel == i):
+        if channel in (i, c.name):
             if not c.is_height:
+                expected = f"another of {named}"
                 raise InputError(
-                    f"channel {channel!r} holds {c.kind}: expected another of {', '.join(named)}",
-                    key="channel",
-                    found=channel,
+                    f"channel {channel!r} holds {c.kind}: expected {expected}", key="channel", found=channel
                 )
             return c
-    raise InputError(key="channel", found=channel, expected=f"one of {', '.join(named)}")
+    raise InputError(key="channel", found=channel, expected=f"one of {named}")
 
 
 @quantities(spacing="m")
@@ -357,18 +339,6 @@ def _reading(path: Path) -> Iterator[None]:
             raise InputError(
                 f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format"
             ) from error
-
-
-def _plausible(h: xr.DataArray, path: Path) -> None:
-    if min(h.shape) < 2:
-        raise InputError(f"{path}: it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
-    for axis, d, n in zip(("x", "y"), cell_sides(h, str(path)), h.shape, strict=True):
-        if n * d > WIDEST or d < FINEST:
-            raise InputError(
-                f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
-                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing, and "
-                "height_scale if its heights are in another unit too"
-            )
 
 
 def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:

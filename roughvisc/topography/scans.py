@@ -14,10 +14,10 @@ from typing import Any
 
 import xarray as xr
 
-from roughvisc.arguments import call, check, check_keys, dotted, one_key, one_of, split
+from roughvisc.arguments import NoData, call, check, check_keys, dotted, one_key, one_of, split
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, check_steps, combine, condition
+from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, combine, condition
 from roughvisc.topography.readers import existing, finite, read_file, sha256
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, in_si, quantities
@@ -249,7 +249,7 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     is_second = where != "surface"
     steps, rest = split(table, *(FACE_STEPS if is_second else STEPS))
     placing, source = split(rest, *(("flip", "offset") if is_second else ("second", "missing")))
-    check_steps(steps, where)
+    condition(NoData(), steps, where)
     if source_key == "generate":
         check_recipe(where, source)
     else:

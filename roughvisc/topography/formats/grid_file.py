@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
-from roughvisc.topography.formats.registry import Channel, ScanFile, affordable
+from roughvisc.topography.formats.libraries import read_with_surface_topography
+from roughvisc.topography.formats.registry import Channel, ScanFile
 from roughvisc.topography.grid import metres_in, unit_of
 from roughvisc.units import is_quantity
 
@@ -32,13 +32,14 @@ def read_grid(path: Path) -> ScanFile:
         return ScanFile("nc", [_channel(path, name, dataset[name]) for name in found])
 
 
-def is_labelled(path: Path) -> bool:
-    """Return whether an HDF5 file holds a variable over x and y, as netCDF does."""
-    try:
-        return any(channel.is_height for channel in read_grid(path).channels)
-    # of another layout, or damaged: the reader of its format reports it
-    except (OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError):
-        return False
+def read_hdf5(path: Path) -> ScanFile:
+    """Read a grid in HDF5, as netCDF stores it, or else the file of an instrument."""
+    # of another layout, or damaged: the other reader reports it
+    with suppress(OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError):
+        found = read_grid(path)
+        if any(channel.is_height for channel in found.channels):
+            return found
+    return read_with_surface_topography(path, "h5")
 
 
 def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
@@ -49,7 +50,6 @@ def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
 
     def load() -> xr.DataArray:
         with _open(path) as dataset:
-            affordable(path, int(np.prod(variable.shape, dtype=object)))
             return dataset[name].astype(float).compute().transpose("x", "y")
 
     shape = (variable.sizes["x"], variable.sizes["y"])

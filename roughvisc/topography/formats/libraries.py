@@ -13,12 +13,8 @@ from typing import Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.topography.formats.registry import EXPANSION, Channel, ScanFile, affordable, brief, suffixes
+from roughvisc.topography.formats.registry import Channel, ScanFile, brief, suffixes
 from roughvisc.units import quantity
-
-#: Formats without compression: a point takes at least one byte.
-_PLAIN = {"al3d", "asc", "bcr", "di", "ezd", "frt", "hgt", "ibw", "mdt", "metropro", "mi", "nms", "opd", "os3d", "plu"}
-_PLAIN |= {"wsxm"}
 
 
 def read_x3p(path: Path) -> ScanFile:
@@ -26,7 +22,6 @@ def read_x3p(path: Path) -> ScanFile:
     import x3pio
 
     info = x3pio.info(path, verify=False)
-    affordable(path, info.layer_count * int(np.prod([int(n) for n in info.shape], dtype=object)))
     complaints: list[str] = []
 
     def load(index: int) -> np.ndarray:
@@ -95,7 +90,6 @@ def read_with_surface_topography(path: Path, format: str, source: BytesIO | Text
     reader = lookup_reader_by_format[format](str(path) if source is None else source)
 
     def load(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-        affordable(path, int(np.prod(shape, dtype=object)), 1 if format in _PLAIN else EXPANSION)
         if found.is_uniform is False:
             raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
         sized = found.physical_sizes is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ _OWN: dict[str, tuple[tuple[str, ...], str]] = {
     "sdf": (("sdf",), "libraries.read_sdf"),
     "npy": (("npy",), "libraries.read_npy"),
     "nc": (("nc", "nc4", "cdf", "hdf5", "zarr"), "grid_file.read_grid"),
+    "h5": (("h5",), "grid_file.read_hdf5"),
     "csv": (("csv",), "text.read_csv"),
     "xyz": (("xyz",), "text.read_points"),
     "asc": ((), "text.read_matrix"),
@@ -35,8 +37,6 @@ _TEXT = ("xyz", "asc")
 _SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
 #: Formats that users added in this process.
 _ADDED: dict[str, tuple[tuple[str, ...], Callable[[Path], ScanFile]]] = {}
-#: Largest expansion of a deflated stream.
-EXPANSION = 1040
 
 
 @dataclass(frozen=True)
@@ -109,21 +109,19 @@ class ScanFile:
 
 def open_file(path: Path, format: str | None) -> ScanFile:
     """Read the header of a scan file; find its format by name, by content (``"auto"``) or by suffix (None)."""
-    if format == "auto":
-        format = _detected(path)
-    names = (format,) if format else formats_of(path)
-    if len(names) == 1:
-        return _reader(names[0])(path)
-    failures: dict[str, Exception] = {}
+    names = (_detected(path),) if format == "auto" else (format,) if format else _formats_of(path)
+    failures = []
     for name in names:
         try:
             return _reader(name)(path)
         except InputError:
             raise
-        except Exception as error:  # noqa: BLE001  (readers raise many types, such as struct.error and KeyError)
+        except Exception as error:  # readers raise many types, such as struct.error and KeyError
+            if len(names) == 1:
+                raise
             forget(error)
-            failures[name] = error
-    raise InputError("; ".join(f"not {name}: {brief(error)}" for name, error in failures.items()))
+            failures.append(f"not {name}: {brief(error)}")
+    raise InputError("; ".join(failures))
 
 
 def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
@@ -161,24 +159,17 @@ def suffixes() -> dict[str, tuple[str, ...]]:
     return {**theirs, **own, "card": ("toml",)}
 
 
-def formats_of(path: Path) -> tuple[str, ...]:
+def _formats_of(path: Path) -> tuple[str, ...]:
     """Return the formats to try for the suffix of a file, in order."""
     suffix = path.suffix.lower().removeprefix(".")
-    for name, (theirs, _) in (_ADDED | _OWN).items():
-        if suffix and suffix in theirs:
-            return (name,)
-    if suffix in _SHARED:
-        return _SHARED[suffix]
+    quick = _SHARED | {one: (name,) for name, (theirs, _) in (_OWN | _ADDED).items() for one in theirs}
+    if suffix in quick:
+        return quick[suffix]
     if len(suffix) == 3 and suffix.isdigit():
         return ("di",)
-    if suffix == "h5":  # a grid in HDF5, or an instrument's file
-        from roughvisc.topography.formats.grid_file import is_labelled
-
-        if is_labelled(path):
-            return ("nc",)
-    found = tuple(name for name, theirs in suffixes().items() if suffix and suffix in theirs)
+    found = tuple(name for name, theirs in suffixes().items() if suffix in theirs)
     if not found:
-        known = sorted({s for theirs in suffixes().values() for s in theirs})
+        known = sorted({one for theirs in suffixes().values() for one in theirs})
         raise InputError(
             f'the suffix {path.suffix!r} is not known: expected format, or "auto" to detect it; known suffixes are '
             f"{', '.join(known)}",
@@ -188,14 +179,12 @@ def formats_of(path: Path) -> tuple[str, ...]:
 
 
 def _reader(name: str) -> Callable[[Path], ScanFile]:
+    """Return the reader of a format."""
     if name in _ADDED:
         return _ADDED[name][1]
-    module, _, function = _OWN.get(name, ((), ""))[1].partition(".")
-    if module:
-        return getattr(import_module(f"roughvisc.topography.formats.{module}"), function)
-    from roughvisc.topography.formats.libraries import read_with_surface_topography
-
-    return lambda path: read_with_surface_topography(path, name)
+    module, _, function = _OWN[name][1].partition(".") if name in _OWN else ("libraries", "", "")
+    readers = import_module(f"roughvisc.topography.formats.{module}")
+    return getattr(readers, function) if function else partial(readers.read_with_surface_topography, format=name)
 
 
 def _detected(path: Path) -> str:
@@ -220,10 +209,3 @@ def forget(error: BaseException | None) -> None:
     while error is not None:
         traceback.clear_frames(error.__traceback__)
         error = error.__context__
-
-
-def affordable(path: Path, points: int, expansion: float = EXPANSION) -> None:
-    """Refuse a header that claims more points than the file can hold, before they are allocated."""
-    held = sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size
-    if points > max(held * expansion, 1024):
-        raise InputError(f"the header claims {points} points, which {held} bytes cannot hold: the file is damaged")
