@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
@@ -17,10 +14,12 @@ from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, plane_ratio
 from roughvisc.plot.rows import expect_result, measured_part, rows_of
+from roughvisc.study.storage.folder import atomic_write
 from roughvisc.units import unit_for
 from roughvisc.variables import FIELDS, VARIABLES
 
 
+@style.apply
 def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames: int = 100, rate: float = 12.0) -> Path:
     """Write an animation of a map, whose title states the time or speed.
 
@@ -48,36 +47,23 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
         If the suffix is not supported, ffmpeg is missing, or the result does not hold the field.
     """
     path = Path(path)
-    expect_result(dataset, "x", "y")
     name = field or ("pressure" if "pressure" in dataset else "gap")
     if name not in FIELDS:
         raise InputError(key="field", found=name, expected=f"one of {', '.join(FIELDS)}")
-    expect_result(dataset, name)
+    expect_result(dataset, "x", "y", name)
     if frames < 1 or rate <= 0:
         raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
-    suffix = path.suffix.lower()
-    if suffix in (".gif", ".webp"):
+    if path.suffix.lower() in (".gif", ".webp"):
         writer: Any = PillowWriter(fps=rate)
-    elif suffix not in (".mp4", ".m4v", ".mov"):
-        raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or .mp4")
-    elif not FFMpegWriter.isAvailable():
-        raise InputError(f"{path.name}: ffmpeg was not found, which {suffix} needs: install it, or write a .gif")
-    else:  # even numbers of pixels and this pixel format play everywhere
+    elif path.suffix.lower() == ".mp4" and FFMpegWriter.isAvailable():
+        # even numbers of pixels and this pixel format play everywhere
         writer = FFMpegWriter(fps=rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
-    unfinished = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    try:
-        with matplotlib.rc_context(style.STYLE):
-            _film(measured_part(dataset.sortby(str(rows_of(dataset).name))), name, frames).save(unfinished, writer)
-        os.replace(unfinished, path)
-    finally:
-        unfinished.unlink(missing_ok=True)
-    return path
-
-
-def _film(dataset: xr.Dataset, name: str, count: int) -> FuncAnimation:
-    """Return the animation of one map, with one colour scale for all frames."""
+    else:
+        raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or, if ffmpeg is installed, .mp4")
+    dataset = measured_part(dataset.sortby(str(rows_of(dataset).name)))
     rows = rows_of(dataset).size
-    chosen = np.unique(np.linspace(0, rows - 1, min(rows, count)).round().astype(int)).tolist()
+    chosen = np.unique(np.linspace(0, rows - 1, min(rows, frames)).round().astype(int)).tolist()
+    # one colour scale for all frames
     ends = [colour_limits(name, frame_of(dataset, name, frame).values) for frame in chosen]
     low, high = min(one[0] for one in ends), max(one[1] for one in ends)
     unit = unit_for([high], VARIABLES[name].units)
@@ -101,4 +87,6 @@ def _film(dataset: xr.Dataset, name: str, count: int) -> FuncAnimation:
             outline.extend(draw_outline(ax, dataset, frame))
         return [title]
 
-    return FuncAnimation(figure, draw, chosen, cache_frame_data=False)
+    with atomic_write(path) as temporary:
+        FuncAnimation(figure, draw, chosen, cache_frame_data=False).save(temporary, writer)
+    return path

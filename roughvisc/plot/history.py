@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -14,14 +15,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
-from roughvisc.labels import own_rows
 from roughvisc.observables import history as steps_of
 from roughvisc.observables.theory import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.plot import style
-from roughvisc.plot.rows import expect_result, rows_of
-from roughvisc.plot.sweep import case_label, sweep, swept_keys
+from roughvisc.plot.rows import expect_result
+from roughvisc.plot.sweep import sweep
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import quantities, unit_for
+from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES, axis_of
 
 #: Quantities that are drawn if the result holds them, and their colours.
@@ -36,8 +36,6 @@ _COLOURS = {
     "thermal_conductance": style.VERMILION,
     "electrical_conductance": style.VERMILION,
 }
-#: Quantity -> other quantities in its panel, with their labels.
-_BESIDE = {"contact_area": {"contact_area_counted": "counted cells", "persson_contact_area": "Persson"}}
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
@@ -88,64 +86,57 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     if over == "sliding_distance":  # the loading before the first slide has one sliding distance
         begins = max(int((steps[over].values > 0).argmax()) - 1, 0)
         steps, kept = steps.isel(time=slice(begins, None)), kept.sel(time=slice(float(steps["time"][begins]), None))
+    places = (steps if over in steps else kept)[over]
     columns = 1 if len(names) <= 3 else 2
-    rows = -(-len(names) // columns)
-    figure = style.new_figure(4.6 if columns == 1 else 7.2, 1.5 * rows + 0.8)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax, name in zip(axes, names, strict=False):
-        _draw_history(ax, steps if name in steps and over in steps else kept, kept, name, over)
-    for unused in axes[len(names) :]:
-        unused.remove()
-    axes = list(axes[: len(names)])
-    for ax in axes[:-columns]:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
+    size = (4.6 if columns == 1 else 7.2, 1.5 * -(-len(names) // columns) + 0.8)
+    figure, axes = style.new_panels(len(names), columns, *size, sharex=True)
+    for ax, name in zip(axes, names, strict=True):
+        line = steps if name in steps and over in steps else kept
+        _draw_history(ax, name, line, kept, over, style.row_unit(places))
+        style.row_axis(ax, places)
+    style.label_outer(axes, columns, along_y=False)
     style.letter_panels(axes)
     named = style.named_in(*axes)
-    if rows_of(steps).size > rows_of(kept).size and rows_of(kept).size <= _DOTS:
-        look = {"color": "0.3", "label": ""}
-        named = {"time steps": Line2D([], [], **look), "kept times": Line2D([], [], ls="", marker="o", **look)} | named
+    if steps.sizes[axis] > kept.sizes[axis] and kept.sizes[axis] <= _DOTS:
+        named = {
+            "time steps": Line2D([], [], color="0.3"),
+            "kept times": Line2D([], [], color="0.3", ls="", marker="o"),
+        } | named
     style.legend_above(figure, named)
     figure.align_ylabels(axes)
     return figure
 
 
-def _draw_history(ax: Axes, steps: xr.Dataset, kept: xr.Dataset, name: str, over: str) -> None:
-    """Draw a quantity as a line through the steps and dots at the kept rows."""
-    declared = VARIABLES[name]
-    if name == "leak_rate":  # a logarithmic axis has no zero
-        steps, kept = (one.assign({name: one[name].where(one[name] > 0)}) for one in (steps, kept))
-    steps, kept = (one.assign({name: one[name].where(np.isfinite(one[name]))}) for one in (steps, kept))
-    unit, across = unit_for(steps[name], declared.units), style.row_unit(steps[over])
-    colour = _COLOURS.get(name, style.BLUE)
-    beside = {
-        label: one[other]
-        for other, label in _BESIDE.get(name, {}).items()
-        for one in (steps if other in steps else kept,)
-        if other in one and one[other].notnull().any()
-    }
-    ax.plot(across(steps[over]), unit(steps[name]), color=colour, label="corrected for the grid" if beside else None)
+def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over: str, across: Unit) -> None:
+    """Draw a quantity as a line through the steps and dots at the kept rows, with Persson's theory if known."""
+    label, si = style.described(kept[name])
+    colour, theory = _COLOURS.get(name, style.BLUE), f"persson_{name}"
+
+    def known(values: xr.DataArray) -> xr.DataArray:
+        drawn = values.where(np.isfinite(values))
+        return drawn.where(drawn > 0) if name == "leak_rate" else drawn  # a logarithmic axis has no zero
+
+    unit = unit_for(known(steps[name]), si)
+    ax.plot(across(steps[over]), unit(known(steps[name])), color=colour)
     if kept[over].size <= _DOTS:
-        ax.plot(across(kept[over]), unit(kept[name]), "o", color=colour)
-    for (label, other), shade in zip(beside.items(), ("k", "0.5"), strict=False):
-        at = (steps if other.size == steps[name].size else kept)[over]
-        ax.plot(across(at), unit(other), "--", color=shade, lw=0.9, label=label)
-    style.value_axis(ax, *map(unit, (steps[name], *beside.values())))
+        ax.plot(across(kept[over]), unit(known(kept[name])), "o", color=colour)
+    if theory in kept:
+        ax.plot(across(kept[over]), unit(kept[theory]), "--", color="k", lw=0.9, label="Persson")
+    style.value_axis(ax, *(line.get_ydata() for line in ax.lines))
     if ax.get_yscale() == "linear":
         ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
-    style.row_axis(ax, steps[over])
-    ax.set_ylabel(unit.label(declared.label + "\n" if len(declared.label) > 14 else declared.label))
+    ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label))
 
 
 @style.apply
 @quantities(contact_modulus="Pa")
-def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
-    r"""Draw the contact area, corrected for the grid, against the force at every time step, one line per case.
+def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact_modulus: Any = None) -> Figure:
+    r"""Draw the contact area, corrected for the grid, against the force at every time step, one line per result.
 
     Parameters
     ----------
     results : xarray.Dataset, or mapping of str to xarray.Dataset
-        One case's result, several over ``case``, or a mapping whose keys name the lines.
+        One case's result, or a mapping whose keys name the lines.
     contact_modulus : float or str, or mapping of str to float or str, optional
         Contact modulus for the lines of the theories, or several moduli by name, such as
         ``{"glassy": 4e6, "rubbery": 1e6}``. [Pa]
@@ -158,21 +149,14 @@ def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
     -----
     The line for low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_. The line of Persson's theory
     [2]_ is :math:`A = A_0 \, \mathrm{erf}(\sqrt2 F / (A_0 E^* h'_\mathrm{rms}))`. Both use the root-mean-square slope
-    of the first case's surface, and are drawn up to the nominal area.
+    of the first surface, and are drawn up to the nominal area.
 
     References
     ----------
     .. [1] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
     .. [2] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
     """
-    if isinstance(results, xr.Dataset) and "case" in results.dims:
-        keys, several = swept_keys(results), results
-        cases = [several.isel(case=number) for number in range(several.sizes["case"])]
-        labels = [case_label(keys, [one[key.column].item() for key in keys]) for one in cases]
-        results = {
-            label or f"case {i}": own_rows(one) for i, (label, one) in enumerate(zip(labels, cases, strict=True))
-        }
-    elif isinstance(results, xr.Dataset):
+    if isinstance(results, xr.Dataset):
         results = {"computed": results}
     if not isinstance(results, Mapping) or not results:
         raise InputError(key="results", found=type(results).__name__, expected="a result, or a mapping of results")
@@ -203,16 +187,9 @@ def area_against_load(results: Any, *, contact_modulus: Any = None) -> Figure:
         style.log_axis(ax.yaxis, up(areas))
     ax.set_xlabel(across.label(VARIABLES["force"].label))
     ax.set_ylabel(up.label(VARIABLES["contact_area"].label))
-    if len(ax.lines) > 1 and len(lines) <= 12:
+    if len(ax.lines) > 1:
         style.legend_above(figure, style.named_in(ax))
     return figure
-
-
-#: Variables of a friction curve: computed value, value of Persson's theory, and error of the grid.
-_FRICTION = (
-    ("friction_coefficient", "persson_friction_coefficient", "grid_error_friction", style.BLUE),
-    ("contact_fraction", "persson_contact_fraction", "grid_error_area", style.CONTACT),
-)
 
 
 @style.apply
@@ -242,30 +219,27 @@ def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     """
     if isinstance(dataset, xr.Dataset) and "case" in dataset.dims:
         return sweep(dataset, "friction_coefficient", along="reduced_speed" if reduced else "speed")
-    for name, *_ in _FRICTION:
+    panels = {"friction_coefficient": "grid_error_friction", "contact_fraction": "grid_error_area"}
+    for name in panels:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
             raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")
     ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
     across = unit_for(ordered["speed"].values, "m/s")
     speed = across(ordered["speed"].values)
-    figure = style.new_figure(6.4, 2.9)
-    axes = figure.subplots(1, 2)
-    named: dict[str, Any] = {}
-    for ax, (name, theory, grid, colour) in zip(axes, _FRICTION, strict=True):
-        values = ordered[name].values
-        shown = [values]
-        ax.plot(speed, values, "o-", ms=3, color=colour, label=VARIABLES[name].label)
-        if grid in ordered and np.isfinite(ordered[grid]).any():
-            error = ordered[grid].values * values
-            ax.fill_between(speed, np.maximum(values - error, 0), values + error, color=colour, alpha=0.18, lw=0)
+    figure, axes = style.new_panels(2, 2, 6.4, 2.9)
+    named: dict[str, Artist] = {}
+    for ax, (name, error), colour in zip(axes, panels.items(), (style.BLUE, style.CONTACT), strict=True):
+        values, theory = ordered[name].values, f"persson_{name}"
+        ax.plot(speed, values, "o-", ms=3, color=colour)
+        if error in ordered and np.isfinite(ordered[error]).any():
+            half = ordered[error].values * values
+            ax.fill_between(speed, np.maximum(values - half, 0), values + half, color=colour, alpha=0.18, lw=0)
             named["error of the grid"] = Patch(color="0.3", alpha=0.25, lw=0)
-            shown.append(values + error)
         if theory in ordered:
             ax.plot(speed, ordered[theory].values, ":", color=colour)
             named["Persson (2001): waves stressed as in full contact"] = Line2D([], [], color="0.3", ls=":")
-            shown.append(ordered[theory].values)
         ax.set_xscale("log")
-        ax.set_ylim(0, 1.08 * float(np.nanmax(np.concatenate(shown), initial=0.0)) or 1.0)
+        ax.set_ylim(bottom=0)
         ax.set_xlabel(across.label(VARIABLES["speed"].label))
         ax.set_ylabel(VARIABLES[name].label)
         ax.grid()

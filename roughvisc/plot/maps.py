@@ -21,7 +21,7 @@ from roughvisc.errors import InputError
 from roughvisc.observables import asked, contact, leakage
 from roughvisc.plot import style
 from roughvisc.plot.rows import expect_result, frames_at, measured_part, representative_frames, rows_of
-from roughvisc.topography.grid import cell_edges
+from roughvisc.topography.grid import cell_edges, cell_side
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES, axis_of
 
@@ -37,7 +37,7 @@ _BELOW = {
 _OF_BLOCK = {"pressure": "max", "gap": "min", "flux": "max", "contact": "max"}
 #: Largest number of drawn cells along the longer side.
 MOST_CELLS = 1024
-#: Part of the values within a colour scale [%], and ratio of their full range to it above which the scale is limited.
+#: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN, _SPIKE = 99.8, 1.2
 
 
@@ -51,14 +51,10 @@ def drawn(field: xr.DataArray) -> xr.DataArray:
     every = block_side(field)
     if every == 1:
         return field.load()
-    steps = {axis: float(field[axis][1] - field[axis][0]) for axis in ("x", "y") if field.sizes[axis] > 1}
-    blocks = field.coarsen(x=every, y=every, boundary="pad")
+    blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
     coarse = getattr(blocks, _OF_BLOCK.get(str(field.name), "mean"))()
-    centres = {
-        axis: float(field[axis][0]) + step * ((np.arange(coarse.sizes[axis]) + 0.5) * every - 0.5)
-        for axis, step in steps.items()
-    }
-    return coarse.assign_coords({axis: (axis, one, field[axis].attrs) for axis, one in centres.items()}).load()
+    to_centre = {axis: (every - 1) / 2 * cell_side(field[axis]) for axis in ("x", "y")}
+    return coarse.assign_coords({axis: coarse[axis] + shift for axis, shift in to_centre.items()}).load()
 
 
 def plane_unit(field: xr.DataArray | xr.Dataset) -> Unit:
@@ -107,19 +103,16 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, colours: str, **limits: 
     return image
 
 
-def colour_limits(name: str, values: np.ndarray) -> tuple[float, float, str]:
-    """Return the ends of a colour scale [SI], and the ends at which its colour bar has an arrow."""
+def colour_limits(name: str, values: np.ndarray) -> tuple[float, float]:
+    """Return the ends of a colour scale [SI]; a few values far beyond all others are above it."""
     known = values[np.isfinite(values)]
-    above_zero = known[known > 0] if name in _BELOW else known
-    if not above_zero.size:
-        return (0.0, 1.0, "min") if name in _BELOW else (0.0, 1.0, "neither")
-    low, high = np.percentile(above_zero, (100 - _SHOWN, _SHOWN))
-    low, most = (0.0 if name in _BELOW else low), above_zero.max()
-    high, beyond = (high, True) if known.size > 1000 and most - low > _SPIKE * (high - low) else (most, False)
-    low = low if name in _BELOW or beyond else above_zero.min()
-    high = high if high > low else low + (abs(low) or 1.0)
-    below = known.min() <= 0 if name in _BELOW else known.min() < low
-    return float(low), float(high), {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[below, beyond]
+    if name not in _BELOW:
+        return (float(known.min()), float(known.max())) if np.ptp(known) > 0 else (0.0, 1.0)
+    known = known[known > 0]
+    if not known.size:
+        return 0.0, 1.0
+    high, most = float(np.percentile(known, _SHOWN)), float(known.max())
+    return 0.0, most if most < _SPIKE * high else high
 
 
 def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
@@ -134,29 +127,29 @@ def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
 def draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Sequence[int]) -> dict[str, Artist]:
     """Draw one field at some rows on one colour scale; return the entries of its legend."""
     shown = [frame_of(dataset, name, frame) for frame in frames]
-    low, high, extend = colour_limits(name, np.concatenate([one.values.ravel() for one in shown]))
+    values = np.concatenate([one.values.ravel() for one in shown])
+    low, high = colour_limits(name, values)
     unit = unit_for([high], VARIABLES[name].units)
-    limits: dict[str, Any] = {"vmin": float(unit(low)) or 1e-12 * float(unit(high)), "vmax": float(unit(high))}
+    limits: dict[str, Any] = {"vmin": float(unit(low)), "vmax": float(unit(high))}
     if name == "flux":
-        limits, extend = {"norm": LogNorm(1e-3 * limits["vmax"], limits["vmax"])}, "min"
+        limits = {"norm": LogNorm(1e-3 * limits["vmax"], limits["vmax"])}
         shown = [one.where(one.isnull() | (one > 0), 1e-9 * high) for one in shown]  # zero has no logarithm
-    elif name not in _BELOW:
-        limits["vmin"] = float(unit(low))
+    elif name in _BELOW:
+        limits["vmin"] = 1e-12 * limits["vmax"]  # zero lies below the scale
     images = [draw_map(ax, one, unit, COLOUR_MAPS[name], **limits) for ax, one in zip(axes, shown, strict=True)]
     named: dict[str, Artist] = {}
-    if name in _BELOW and extend in ("min", "both"):
+    if name in _BELOW and (values <= 0).any():
         named[_BELOW[name][1]] = Patch(facecolor=_BELOW[name][0], edgecolor="0.5", lw=0.4)
-    if any(one.isnull().any() for one in shown):
+    if np.isnan(values).any():
         bad = {"contact": style.CONTACT} if name == "flux" else {"missing": style.MISSING}
         named |= {label: Patch(color=colour) for label, colour in bad.items()}
     if name == "displacement" and {"pressure", "gap"} & set(dataset):
         for ax, frame in zip(axes, frames, strict=True):
             draw_outline(ax, dataset, frame)
         named["contact"] = Line2D([], [], color=style.CONTACT)
-    figure = axes[0].figure
-    bar = figure.colorbar(images[0], ax=list(axes), pad=0.02, aspect=22, extend=extend)
+    extend = "max" if np.nanmax(values) > high else "neither"
+    bar = axes[0].figure.colorbar(images[0], ax=list(axes), pad=0.02, aspect=22, extend=extend)
     bar.set_label(unit.label(VARIABLES[name].label))
-    bar.outline.set_linewidth(0.6)
     return named
 
 
@@ -234,7 +227,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     ratio = float(np.clip(plane_ratio(dataset), 0.1, 2.5))
     columns = 1 if ratio < 0.4 else min(len(frames), 4)
     rows = -(-len(frames) // columns)
-    width = 4.0 if columns == 1 and ratio < 0.4 else max(1.5, 2.9 - 0.45 * columns)
+    width = 4.0 if ratio < 0.4 else max(1.5, 2.9 - 0.45 * columns)
     size = (width * columns + 1.4, (width * ratio + 0.35) * rows * len(stored) + 0.9)
     figure = style.new_figure(*size)
     axes = figure.subplots(rows * len(stored), columns, sharex=True, sharey=True, squeeze=False)

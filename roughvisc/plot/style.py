@@ -126,13 +126,27 @@ def is_logarithmic(values: Any) -> bool:
 
 
 def log_axis(axis: Axis, values: Any) -> None:
-    """Make one axis logarithmic; its ticks have plain numbers if it covers less than three decades."""
+    """Make one axis logarithmic; zeros have a place of their own at its lower end.
+
+    Ticks have plain numbers if the positive values cover less than three decades.
+    """
     values = np.asarray(values, dtype=float)
-    values = values[np.isfinite(values) & (values > 0)]
-    (axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale)("log")
-    if values.size and values.max() < 1000 * values.min():
-        fine = (1.0, 2.0, 5.0) if values.max() < 100 * values.min() else (1.0,)
-        axis.set_major_locator(LogLocator(subs=fine, numticks=20))
+    positive = values[np.isfinite(values) & (values > 0)]
+    set_scale = axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale
+    low, high = (positive.min(), positive.max()) if positive.size else (1.0, 1.0)
+    fine = (1.0, 2.0, 5.0) if high < 100 * low else (1.0,)
+    if (values == 0).any():
+        set_scale("symlog", linthresh=low, linscale=0.5)
+        decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+        ticks = [one for one in np.outer(decades, fine).ravel() if 0.999 * low <= one <= 1.001 * high]
+        axis.set_ticks([0.0, *ticks[:: -(-len(ticks) // 5) or 1]])
+        axis.set_view_interval(-0.3 * low, 1.3 * high, ignore=True)
+        axis.axes.autoscale(axis=axis.axis_name, enable=False)
+    else:
+        set_scale("log")
+        if high < 1000 * low:
+            axis.set_major_locator(LogLocator(subs=fine, numticks=20))
+    if high < 1000 * low:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -166,16 +180,8 @@ def row_unit(rows: xr.DataArray) -> Unit:
 
 def row_axis(ax: Axes, rows: xr.DataArray) -> None:
     """Scale and label the horizontal axis of times, speeds or distances; a logarithmic axis can show zero."""
-    places = np.asarray(rows.values, dtype=float)
-    if _spreads(places):
-        first, last = float(places[places > 0].min()), float(places.max())
-        if (places == 0).any():
-            ax.set_xscale("symlog", linthresh=first, linscale=0.5)
-            decades = np.arange(np.ceil(np.log10(first) - 1e-9), np.floor(np.log10(last) + 1e-9) + 1)
-            ax.set_xticks([0.0, *10.0 ** decades[:: -(-len(decades) // 5)]])
-            ax.set_xlim(-0.3 * first, 1.3 * last)
-        else:
-            ax.set_xscale("log")
+    if _spreads(rows.values) or str(rows.name).endswith("speed"):
+        log_axis(ax.xaxis, row_unit(rows)(rows))
     ax.set_xlabel(row_unit(rows).label(described(rows)[0]))
 
 

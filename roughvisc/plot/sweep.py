@@ -5,7 +5,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
 from typing import Any
 
 import matplotlib
@@ -23,11 +22,11 @@ from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
-from roughvisc.study.case_text import names_of
+from roughvisc.study.case_text import names_of, value_text
 from roughvisc.study.realisations import statistics
 from roughvisc.study.sweep_table import ITSELF, REALISATION
-from roughvisc.units import Unit, in_si, unit_for
-from roughvisc.variables import CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.units import in_si, unit_for
+from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
 #: Largest number of panels, of values of a key in a legend, and of ticks.
 _MOST_PANELS, _MOST_NAMED, _MOST_TICKS = 12, 8, 12
@@ -42,79 +41,65 @@ class Key:
 
     Attributes
     ----------
-    column : str
-        Column in a table of cases.
-    dotted, name : str
-        Key of the study, and its name in words.
-    levels : list
-        Values: numbers in ascending order [SI], others in the order of the cases.
-    units : str
-        SI unit of the numbers.
-    is_numeric : bool
-        Whether the levels are numbers of an axis.
+    column, name, symbol : str
+        Column in a table of cases, name in words, and symbol of the unit.
+    levels : list of float or str
+        Numbers in this unit, ascending, or texts in the order of the cases.
     """
 
     column: str
-    dotted: str
     name: str
+    symbol: str
     levels: list[Any]
-    units: str = ""
-    is_numeric: bool = False
 
     @property
-    def unit(self) -> Unit:
-        """Unit of an axis or a colour bar."""
-        if not self.is_numeric:
-            return Unit(1.0, "")
-        middle = [np.sqrt(self.levels[0] * self.levels[-1])] if style.is_logarithmic(self.levels) else self.levels
-        return unit_for(middle, self.units)
+    def is_numeric(self) -> bool:
+        """Whether the levels are numbers."""
+        return isinstance(self.levels[0], float)
 
     @property
     def label(self) -> str:
-        """Label of an axis or a colour bar."""
-        return self.unit.label(self.name)
+        """Label of an axis or a legend."""
+        return f"{self.name} [{self.symbol}]" if self.symbol else self.name
 
-    def text(self, level: Any, *, named: bool = False) -> str:
-        """Return a level as text; `named` with the name of the key before a number."""
-        if isinstance(level, str):
-            shown = PurePath(level).name if self.dotted.endswith("file") else level
-            return style.verbatim(textwrap.shorten(shown or "none", 40, placeholder="…"))
-        shown = "half-space" if level == np.inf else unit_for([level], self.units).text(level, 4)
-        return f"{self.name.lower()} {shown}" if named else shown
+    @property
+    def texts(self) -> list[str]:
+        """The levels as texts without unit."""
+        return [f"{level:.4g}" if self.is_numeric else level for level in self.levels]
 
     def colour(self, level: Any) -> Any:
         """Return the colour of a level."""
         return _SHADES(_norm(self.levels)(level)) if self.is_numeric else style.CYCLE[self.levels.index(level) % 8]
 
 
-def swept_keys(results: xr.Dataset) -> list[Key]:
-    """Return the keys that vary between the cases, longest list of numbers first; a dependent key is left out."""
+def swept_keys(results: xr.Dataset) -> tuple[xr.Dataset, list[Key]]:
+    """Return results with the values of their swept keys as they are shown, and these keys.
+
+    Keys with most numbers come first. A key that depends on another key is left out.
+    """
     varied: dict[str, list[Any]] = {}
     for name, one in results.coords.items():
         values = one.values.tolist()
-        if one.dims != ("case",) or name in ("case", "case_key", ROWS) or len(set(values)) < 2:
-            continue
-        if not any(
-            len(set(zip(values, other, strict=True))) == len(set(values)) == len(set(other))
-            for other in varied.values()
-        ):
-            varied[str(name)] = values
+        if one.dims == ("case",) and name not in ("case", "case_key", ROWS) and len(set(values)) > 1:
+            pairs = (len(set(zip(values, other, strict=True))) for other in varied.values())
+            sizes = (len(set(other)) for other in varied.values())
+            if not any(both == len(set(values)) == size for both, size in zip(pairs, sizes, strict=True)):
+                varied[str(name)] = values
     dotted = {name: str(results[name].attrs.get("long_name", name)) for name in varied}
-    names = names_of(list(dotted.values()))
-    keys = []
+    names, keys = names_of(list(dotted.values())), []
     for name, values in varied.items():
-        is_numeric = results[name].dtype.kind in "iuf" and bool(np.isfinite(values).all())
-        is_numeric = is_numeric and not dotted[name].endswith("seed")  # the number of a seed has no meaning
-        levels = sorted(set(values)) if is_numeric else list(dict.fromkeys(values))
-        units = str(results[name].attrs.get("units", ""))
-        keys.append(Key(name, dotted[name], names[dotted[name]], levels, units, is_numeric))
-    return sorted(keys, key=lambda key: (not key.is_numeric, -len(key.levels)))
-
-
-def case_label(keys: Sequence[Key], values: Sequence[Any]) -> str:
-    """Return the values of some keys in words, such as ``Load 2 mN, seed 1``."""
-    text = ", ".join(key.text(value, named=True) for key, value in zip(keys, values, strict=True))
-    return text if text.startswith("t ") else text[:1].upper() + text[1:]
+        key, units = dotted[name], str(results[name].attrs.get("units", ""))
+        if results[name].dtype.kind in "iuf" and np.isfinite(values).all() and not key.endswith("seed"):
+            middle = [np.sqrt(min(values) * max(values))] if style.is_logarithmic(values) else values
+            unit = unit_for(middle, units)
+            shown = unit(values).tolist()
+            keys.append(Key(name, names[key], unit.symbol, sorted(set(shown))))
+        else:
+            texts = (textwrap.shorten(value_text(key, value) or "none", 40, placeholder="…") for value in values)
+            shown = [style.verbatim(text) for text in texts]
+            keys.append(Key(name, names[key], "", list(dict.fromkeys(shown))))
+        results = results.assign_coords({name: ("case", shown)})
+    return results, sorted(keys, key=lambda key: (not key.is_numeric, -len(key.levels)))
 
 
 @style.apply
@@ -123,7 +108,7 @@ def sweep(
     quantity: str | None = None,
     *,
     along: str | Sequence[str] | None = None,
-    times: Any = None,
+    times: Any = -1,
 ) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
@@ -142,8 +127,7 @@ def sweep(
         ``"reduced_speed"`` for curves of all cases; or two keys for maps. Default: the key with most numbers, or the
         speed.
     times : float or str, or a list, optional
-        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time at which the
-        cases differ by at least half of their largest difference. [s]
+        The nearest kept times are drawn; negative whole numbers count from the end. [s]
 
     Returns
     -------
@@ -162,7 +146,8 @@ def sweep(
     curves = [str(name) for name, one in results.variables.items() if row in one.dims and not {"x", "y"} & {*one.dims}]
     if quantity not in curves:
         raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
-    keys = swept_keys(results)
+    dotted = {name: str(one.attrs.get("long_name", name)) for name, one in results.coords.items()}
+    results, keys = swept_keys(results)
     asked = [along] if isinstance(along, str) else list(along or (["speed"] if axis == "speed" else []))
     if asked and (asked[0] in curves or asked[0] in VARIABLES):
         over = asked[0]
@@ -170,7 +155,7 @@ def sweep(
             raise InputError(key="along", found=over, expected=f"one of {', '.join(sorted(curves))} in every case")
         table = results[[quantity, over]].load().to_dataframe().reset_index()
         return _draw(_known(table, quantity), results[quantity], keys, over=results[over])
-    known = {name: key for key in keys for name in (key.column, key.dotted)}
+    known = {name: key for key in keys for name in (key.column, dotted[key.column])}
     for name in asked:
         if name not in known:
             raise InputError(key="along", found=name, expected=f"one of {', '.join([*known, axis])}")
@@ -178,10 +163,9 @@ def sweep(
     if not chosen:
         raise InputError("nothing varies between the cases: nothing to draw against")
     keys = chosen + [key for key in keys if key not in chosen]
-    tables = _at_times(results, quantity, times, axis, row)
-    table = pd.concat(one.assign(at=text) for text, one in tables.items())
-    keys.insert(2, Key("at", "at", "", list(tables)))
-    return _draw(_known(table, quantity), results[quantity], keys, as_map=len(chosen) == 2)
+    table = _at_times(results, quantity, times)
+    keys.insert(2, Key("at", "", "", table["at"].unique().tolist()))
+    return _draw(table, results[quantity], keys, as_map=len(chosen) == 2)
 
 
 def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
@@ -190,30 +174,25 @@ def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
     return table[table[quantity] > 0] if quantity == "leak_rate" else table  # a logarithmic axis has no zero
 
 
-def _at_times(results: xr.Dataset, quantity: str, times: Any, axis: str, row: str) -> dict[str, pd.DataFrame]:
-    """Return a table of a quantity of all cases at each of some times, named by the time."""
-    values = results[quantity].load()
-    rows = values[axis]
-    if times is None and row == axis:
-        others = [dim for dim in values.dims if dim != axis]
-        spread = (values.max(others) - values.min(others)).fillna(0).values
-        places = [float(rows[np.flatnonzero(spread >= 0.5 * spread.max())[-1]])]
-    else:
-        places = np.atleast_1d(in_si(-1 if times is None else times, VARIABLES[axis].units, "times")).tolist()
+def _at_times(results: xr.Dataset, quantity: str, times: Any = -1) -> pd.DataFrame:
+    """Return a table of a quantity of all cases at some times, with the text of the time as column ``at``."""
+    values, axis = results[quantity].load(), axis_of(results.variables)
+    rows, row = values[axis], ROW if ROW in values.dims else axis
+    places = np.atleast_1d(in_si(times, VARIABLES[axis].units, "times"))
     if not 0 < len(places) <= _MOST_PANELS:
         raise InputError(key="times", found=f"{len(places)} of them", expected=f"1 to {_MOST_PANELS}")
-    tables = {}
+    parts = []
     for place in places:
         if place < 0:
             number = int(place) + (results[ROWS].fillna(1).astype(int) if row == ROW else rows.size)
         else:
             number = np.abs(rows - place).fillna(np.inf).argmin(row)
-        at = values.isel({row: number})
-        near = xr.DataArray(np.unique(at[axis].values[np.isfinite(at[axis].values)]), name=axis)
-        text = style.row_text(near, -1)
+        table = values.isel({row: number}).to_dataframe().reset_index()
+        near = table[axis].dropna().unique()
+        text = AXES[axis].place(near[0], 3)
         text = text if near.size == 1 else "at the end" if place == -1 else text.replace("=", "≈")
-        tables[text] = at.to_dataframe().reset_index()
-    return tables
+        parts.append(table.assign(at=text))
+    return _known(pd.concat(parts), quantity)
 
 
 def _draw(
@@ -238,7 +217,7 @@ def _draw(
         places = xr.DataArray(np.unique(table[str(over.name)]), name=over.name, attrs=over.attrs)
         table["across"] = style.row_unit(places)(table[str(over.name)])
     elif across.is_numeric and not as_map:
-        table["across"] = across.unit(table[across.column])
+        table["across"] = table[across.column]
     else:
         table["across"] = table[across.column].map(across.levels.index)
     groups = {key.column: table[key.column].map(key.levels.index) for key in rest}
@@ -265,17 +244,18 @@ def _draw(
         _level_ticks(ax.yaxis, second)
     if over is not None:
         style.row_axis(ax, places)
-        if over.name in ("speed", "reduced_speed"):
-            ax.set_xscale("log")
     elif as_map or not across.is_numeric:
         _level_ticks(ax.xaxis, across)
     elif style.is_logarithmic(across.levels):
-        style.log_axis(ax.xaxis, across.unit(across.levels))
+        style.log_axis(ax.xaxis, across.levels)
     for ax in axes:
         ax.set_xlabel(axes[0].get_xlabel() if over is not None else across.label)
     style.label_outer(axes, columns)
-    titles = [case_label(rest, [key.levels[i] for key, i in zip(rest, found, strict=True)]) for found, _ in panels]
-    style.letter_panels(axes, [textwrap.fill(one, 28) for one in titles])
+    titles = []
+    for found, _ in panels:
+        parts = (f"{key.name.lower()} {key.texts[i]} {key.symbol}".strip() for key, i in zip(rest, found, strict=True))
+        titles.append(textwrap.fill(", ".join(parts), 28))
+    style.letter_panels(axes, [one if one.startswith("t ") else one[:1].upper() + one[1:] for one in titles])
     if as_map:
         figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, pad=0.02, aspect=22).set_label(unit.label(name))
     else:
@@ -292,7 +272,7 @@ def _norm(values: Any) -> Normalize:
 def _level_ticks(axis: Axis, key: Key) -> None:
     """Write the levels of a key at the places 0, 1, ... of an axis."""
     places = range(0, len(key.levels), -(-len(key.levels) // _MOST_TICKS))
-    texts = [f"{key.unit(key.levels[i]):.4g}" if key.is_numeric else key.text(key.levels[i]) for i in places]
+    texts = [key.texts[i] for i in places]
     axis.set_ticks(list(places), texts)
     if axis.axis_name == "x" and sum(map(len, texts)) > 30:
         axis.axes.tick_params(axis="x", labelrotation=90)
@@ -326,10 +306,11 @@ def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: K
     """Draw the legend or colour bar of the key that colours the lines, and entries for lines and bands."""
     named: dict[str, Artist] = {}
     if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
-        bar = ScalarMappable(_norm(second.unit(second.levels)), _SHADES)
+        bar = ScalarMappable(_norm(second.levels), _SHADES)
         figure.colorbar(bar, ax=axes, pad=0.02, aspect=22).set_label(second.label)
     elif second and len(second.levels) <= 2 * _MOST_NAMED:
-        named = {second.text(one): Line2D([], [], color=second.colour(one), marker="o") for one in second.levels}
+        colours = (second.colour(level) for level in second.levels)
+        named = {text: Line2D([], [], color=one, marker="o") for text, one in zip(second.texts, colours, strict=True)}
     if REALISATION in table:
         has_scan = (table[REALISATION] == ITSELF).any()
         count = table.loc[table[REALISATION] != ITSELF, REALISATION].nunique()
@@ -339,7 +320,7 @@ def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: K
         named |= {"95 % prediction interval": Patch(color="0.3", alpha=0.22, lw=0)}
         if has_scan:
             named["measured scan"] = Line2D([], [], color="0.3", **_ITSELF_LINE)
-    style.legend_above(figure, named, second.name if second else "")
+    style.legend_above(figure, named, second.label if second else "")
 
 
 def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
@@ -355,12 +336,11 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
             caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
             yield "master", caption, sweep(results, along="reduced_speed")
         return
-    keys, row = swept_keys(results), ROW if ROW in results.dims else axis
+    keys = swept_keys(results)[1]
     for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES):
         if name not in results:
             continue
-        (table,) = _at_times(results, name, None, axis, row).values()
-        table = _known(table, name)
+        table = _at_times(results, name)
         values = table[name].to_numpy()
         stated = [values[:1], *(table[key.column] for key in keys if key.is_numeric)]
         scale = 1e-6 * np.abs(values).max(initial=0.0)

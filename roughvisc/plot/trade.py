@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,20 +15,18 @@ from roughvisc.plot import style
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: Sign of (coarsening - 1) -> label, marker and colour of the points.
-_GRIDS = {
-    0: ("grid of the study", "o", style.BLUE),
-    1: ("coarser grid", "v", style.VERMILION),
-    -1: ("finer grid", "^", style.VERMILION),
-}
+#: Markers of the grids, from the finest on.
+_MARKERS = "o^vsDP"
+#: Width and height of the label of a point. [1/72 inch]
+_LABEL = 26, 9
 
 
 @style.apply
 def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
-    Errors below the uncertainty of the reference lie in a grey band, and are not part of the front. An error of zero is
-    drawn at the bottom.
+    Each grid has a marker. Labels state the tolerances; a label that would touch another one is left out, of the front
+    last. Errors below the uncertainty of the reference lie in a grey band, and are not part of the front.
 
     Parameters
     ----------
@@ -55,8 +54,7 @@ def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> F
     shown = [name for name in wanted if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")
-    figure = style.new_figure(0.6 + 3.3 * len(shown), 3.7)
-    axes = figure.subplots(1, len(shown), squeeze=False)[0]
+    figure, axes = style.new_panels(len(shown), len(shown), 0.6 + 3.3 * len(shown), 3.7)
     for ax, name in zip(axes, shown, strict=True):
         _draw_trade(ax, dataset, name)
     style.letter_panels(axes)
@@ -71,31 +69,30 @@ def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
     time, error = dataset["run_time"].values, 100 * dataset["error"].sel(quantity=quantity).values
     unsure = float(np.nan_to_num(100 * uncertainty(dataset, quantity)))
     known = np.isfinite(time) & np.isfinite(error)
-    positive = error[known & (error > 0)]
-    floor = 0.4 * (positive.min() if positive.size else 1e-3)
-    height = np.maximum(error, floor)
     front = np.flatnonzero(pareto_front(dataset, quantity) & (error > unsure))
     front = front[np.argsort(time[front], kind="stable")]
-    ax.plot(time[front], height[front], color="0.35", lw=1.0, zorder=1, label="Pareto front")
-    side = np.sign(dataset["coarsening"].values - 1)
-    for kind, (label, marker, colour) in _GRIDS.items():
-        chosen = known & (side == kind)
-        if chosen.any():
-            ax.plot(time[chosen], height[chosen], marker, color=colour, ms=5, mew=0, label=label, zorder=3)
-        for i in np.flatnonzero(chosen):
-            if i in front or kind:
-                cells = f", {int(dataset['cells_x'][i])} × {int(dataset['cells_y'][i])}" if kind else ""
-                text = format_tolerance(float(dataset["tolerance"][i])) + cells
-                offset = {"xytext": (6, (-7, 3)[i % 2]), "textcoords": "offset points"}
-                ax.annotate(text, (time[i], height[i]), fontsize=6, color=colour, **offset)
     style.log_axis(ax.xaxis, time[known])
-    style.log_axis(ax.yaxis, height[known])
-    ax.set_xlim(time[known].min() / 1.6, time[known].max() * 3)
-    ax.set_ylim(floor / 1.6, height[known].max() * 2)
-    if unsure > floor:
-        ax.axhspan(floor / 1.6, unsure, color="0.93", zorder=0, label="uncertainty of the reference")
-    if (error[known] == 0).any():
-        ax.text(0.02, floor, "zero", transform=ax.get_yaxis_transform(), fontsize=6, style="italic", va="center")
+    style.log_axis(ax.yaxis, error[known])
+    ax.plot(time[front], error[front], color="0.35", lw=1.0, zorder=1, label="Pareto front")
+    grids = list(zip(dataset["cells_x"].values, dataset["cells_y"].values, strict=True))
+    order = sorted({grids[i] for i in np.flatnonzero(known)}, reverse=True)
+    for grid, marker, colour in zip(order, itertools.cycle(_MARKERS), itertools.cycle(style.CYCLE)):
+        chosen = [i for i in np.flatnonzero(known) if grids[i] == grid]
+        look = {"color": colour, "ms": 5, "mew": 0, "label": f"{grid[0]} × {grid[1]} cells", "zorder": 3}
+        ax.plot(time[chosen], error[chosen], marker, **look)
+    ax.margins(0.15)
+    low, high = ax.get_ylim()
+    if unsure > low:
+        ax.axhspan(low, unsure, color="0.93", zorder=0, label="uncertainty of the reference")
+        ax.set_ylim(low, high)
+    ax.figure.draw_without_rendering()
+    placed: list[np.ndarray] = []
+    for i in [*front, *np.flatnonzero(known)]:
+        at = ax.transData.transform((time[i], error[i])) * 72 / ax.figure.dpi
+        if all((abs(at - other) > _LABEL).any() for other in placed):
+            placed.append(at)
+            text = format_tolerance(float(dataset["tolerance"][i]))
+            ax.annotate(text, (time[i], error[i]), (5, 3), textcoords="offset points", fontsize=6.5, color="0.25")
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
     ax.grid()

@@ -83,16 +83,23 @@ def _last_word(key: str) -> str:
 
 def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
     """Return dotted key -> varied value of a case, as written in the study, or in a suitable unit."""
-    texts = {}
-    for key, value in case.get("varied", {}).items():
-        if written := case.get("written", {}).get(key):
-            texts[key] = written
-        elif isinstance(value, bool) or not isinstance(value, int | float):
-            texts[key] = value if isinstance(value, str) else json.dumps(value)
-            texts[key] = PurePath(texts[key]).name if key.rpartition(".")[2] == "file" else texts[key]
-        else:  # only the thickness may be infinite
-            texts[key] = "half-space" if value == math.inf else unit_for([value], unit_of(key)).text(value, 4)
-    return texts
+    written = case.get("written", {})
+    return {key: written.get(key) or value_text(key, value) for key, value in case.get("varied", {}).items()}
+
+
+def value_text(key: str, value: Any) -> str:
+    """Return the value [SI] of a dotted key as text, in a suitable unit.
+
+    Examples
+    --------
+    >>> value_text("program.0.load", 2e-3), value_text("surface.file", "scans/a.sur")
+    ('2 mN', 'a.sur')
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        text = value if isinstance(value, str) else json.dumps(value)
+        return PurePath(text).name if key.rpartition(".")[2] == "file" else text
+    # only the thickness may be infinite
+    return "half-space" if value == math.inf else unit_for([value], unit_of(key)).text(value, 4)
 
 
 def case_words(case: Mapping[str, Any]) -> str:

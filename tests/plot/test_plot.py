@@ -57,7 +57,7 @@ def test_history__data_and_units():
     np.testing.assert_allclose(gap.lines[0].get_ydata(), 1e6 * ds["mean_gap"])
     np.testing.assert_allclose(work.lines[0].get_ydata(), 1e6 * ds["work"])
     np.testing.assert_allclose(approach.lines[0].get_ydata(), 1e6 * ds["approach"])
-    np.testing.assert_allclose(lines(area)["corrected for the grid"].get_ydata(), 1e6 * ds["contact_area"])
+    np.testing.assert_allclose(area.lines[0].get_ydata(), 1e6 * ds["contact_area"])
 
 
 def test_area_against_load__one_line_per_case_and_the_low_load_line():
@@ -72,13 +72,10 @@ def test_area_against_load__one_line_per_case_and_the_low_load_line():
     np.testing.assert_allclose(1e-6 * y, np.sqrt(2 * np.pi) * x / (4e6 * slope))
 
 
-def test_area_against_load__of_cases_in_many_shapes():
-    one = made.hertz_creep((21, 16))
-    stacked = xr.concat([one, one], dim="case").assign_coords(program_0_load=("case", [0.5, 1.0]))
-    assert {"Program 0 load 0.5", "Program 0 load 1"} <= set(lines(plot.area_against_load(stacked).axes[0]))
-    assert set(lines(plot.area_against_load(one).axes[0])) == {"computed"}
+def test_area_against_load__of_one_result():
+    assert set(lines(plot.area_against_load(made.hertz_creep((21, 16))).axes[0])) == {"computed"}
     for wrong in ([], 3):
-        with pytest.raises(InputError):
+        with refused("results"):
             plot.area_against_load(wrong)
 
 

@@ -64,15 +64,14 @@ def test_sweep__of_one_key_has_a_line_for_each_time():
         np.testing.assert_allclose(line.get_xdata(), [10, 20, 40])
         np.testing.assert_allclose(line.get_ydata(), share * LOADS**0.9)
     assert legend(plot.sweep(ds)) == ["t = 10 s"]
-    released = ds.assign(contact_area=ds.contact_area * [1.0, 1.0, 0.0])
-    assert legend(plot.sweep(released)) == ["t = 1 s"], "the cases do not differ at the end"
 
 
 def test_sweep__of_two_keys_has_a_panel_for_each_time():
     ds = stacked(by_both, program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES)
     figure = plot.sweep(ds, along="program.0.load", times=[1.0, -1])
     assert [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes] == ["t = 1 s", "t = 10 s"]
-    assert legend(figure) == ["1 kPa s", "10 kPa s", "100 kPa s", "1 MPa s"]
+    assert legend(figure) == ["1", "10", "100", "1000"]
+    assert figure.legends[0].get_title().get_text() == "Kelvin viscosity [kPa s]"
     for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
         for line, power in zip(ax.lines, (3, 4, 5, 6), strict=True):
             np.testing.assert_allclose(line.get_ydata(), share * power * LOADS**0.9)
@@ -111,7 +110,7 @@ def test_history_of_a_sweep__names_its_lines_in_a_legend_or_a_colour_bar(count):
         np.testing.assert_allclose(line.get_ydata() / line.get_ydata()[-1], [0.25, 0.5, 1.0])
         assert line.get_ydata()[-1] / ax.lines[0].get_ydata()[-1] == pytest.approx((load / loads[0]) ** 0.9)
     if count == 2:
-        assert legend(figure) == ["10 mN", "1 N"]
+        assert legend(figure) == ["10", "1000"]
     else:
         assert figure.axes[1].get_yscale() == "log"
         assert figure.axes[1].get_ylabel() == "Load [mN]"

@@ -180,8 +180,8 @@ def made_up(rows=MADE_UP, unsure=0.0, grid_unsure=0.0, grid_is_data=0):
         "quantity": quantities,
         "tolerance": ("setting", tolerance),
         "coarsening": ("setting", coarsening),
-        "cells_x": ("setting", [96] * len(rows)),
-        "cells_y": ("setting", [90] * len(rows)),
+        "cells_x": ("setting", (96 / coarsening).astype(int)),
+        "cells_y": ("setting", (90 / coarsening).astype(int)),
     }
     variables = {
         "error": (("setting", "quantity"), error[:, None] * np.ones(3)),
@@ -258,8 +258,8 @@ def test_figure__draws_every_setting_and_the_front():
     ds = made_up([*MADE_UP, (3e-3, 1, np.nan, np.nan)], unsure=0.001)
     (ax,) = rv.plot.trade(ds, [AREA]).axes
     lines = {line.get_label(): line.get_xydata() for line in ax.lines}
-    assert lines["grid of the study"] == pytest.approx(np.array(MADE_UP[:4])[:, 2:] * [1, 100])
-    assert lines["coarser grid"] == pytest.approx(np.array([[0.5, 0.6]]))
+    assert lines["96 × 90 cells"] == pytest.approx(np.array(MADE_UP[:4])[:, 2:] * [1, 100])
+    assert lines["48 × 45 cells"] == pytest.approx(np.array([[0.5, 0.6]]))
     assert lines["Pareto front"] == pytest.approx(np.array([[0.5, 0.6], [4.0, 0.4]])), "not below the uncertainty"
     with refused("quantity", "colour"):
         rv.plot.trade(ds, ["colour"])
