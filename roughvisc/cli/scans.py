@@ -15,9 +15,6 @@ from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.console import Group
-
-    from roughvisc.topography.inspection import Inspection
 
 
 class _Sides(click.ParamType):
@@ -101,7 +98,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
       roughvisc scan focus_variation.x3p --plot scan.png
       roughvisc scan focus_variation.x3p --to scan.nc --card scan.toml
     """
-    from roughvisc.cli.tables import scan_table
+    from roughvisc.cli.tables import findings_table, scan_table
     from roughvisc.plot.save import write_figure
     from roughvisc.study.storage.folder import atomic_write, write_text
     from roughvisc.topography.writers import card_text, known_suffix, surface_table
@@ -117,7 +114,9 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     levelled, found = rv.level(height), rv.inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
-    console.print(scan_table(height, rv.parameters(levelled), file.name, channels), "", _advice(found), "", sep="\n")
+    console.print(
+        scan_table(height, rv.parameters(levelled), file.name, channels), "", findings_table(found), "", sep="\n"
+    )
     say(console, surface_table(file, Path(), options, found.steps))
     if picture.exists() and not force and not plot:
         say_path(console, "Existing picture kept (--force overwrites it)", picture)
@@ -156,6 +155,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
       roughvisc run focus_variation-study.toml
       roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
+    from roughvisc.cli.tables import findings_table
     from roughvisc.study.first_pressure import first_pressure
     from roughvisc.study.first_study import starter_study
     from roughvisc.study.storage.folder import write_text
@@ -181,23 +181,8 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     found = rv.inspect(height)
     write_text(out, starter_study(source, out, options, found, first_pressure(height, found, part)))
     console = screen()
-    console.print(_advice(found), "", sep="\n")
+    console.print(findings_table(found), "", sep="\n")
     if file is None:
         say_path(console, "Scan", source)
     say_path(console, "Study", out)
     say(console, f"Next: roughvisc plan {out}\n      roughvisc run {out}")
-
-
-def _advice(found: Inspection) -> Group:
-    """Return the findings in a scan, each with its recommendation."""
-    from rich.console import Group
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for one in found.findings.values():
-        table.add_row(one.name, Text(one.seen))
-        table.add_row("", Text(f"-> {one.advice or 'no action needed'}", style="bold" if one.advice else ""))
-    return Group(Text("Findings and recommendations", style="bold"), table)

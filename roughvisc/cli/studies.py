@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from roughvisc.study.case import Case
-    from roughvisc.study.execution.outcome import Outcome
 
 #: Largest number of messages on failed cases.
 _SHOWN = 5
@@ -126,8 +124,7 @@ def run(
 
             watch, tell = partial(Display, not quiet, console, summary=False), partial(say, console)
             computing = {"client": client, "workers": settings["workers"], "threads": threads}
-            chosen = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
-            case, reasons, budgets = chosen
+            case, reasons, budgets = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
             tell("\n  ".join(["Chosen", *reasons]))
         problem = _run_one(case, folder, study.stem, console, not no_plots, threads)
         for name, one in budgets.items():
@@ -165,6 +162,43 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
         return unconverged(dataset) or missed
 
 
+def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
+    """Compute and summarise a sweep; raise its failure, if there is one."""
+    from roughvisc.cli.tables import realisations_tables, sweep_table
+    from roughvisc.study.execution.display import Display
+    from roughvisc.study.execution.outcome import REFUSED
+    from roughvisc.study.execution.sweep import run_cases
+    from roughvisc.study.storage.failures import LOG
+    from roughvisc.study.storage.index import index_of
+    from roughvisc.study.storage.results_table import CASES, REALISATIONS, realisations_table
+    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+
+    found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
+    outcomes, listed = list(found.values()), sweep_cases(cases)
+    with client.as_current() if client is not None else nullcontext():
+        missed = _observe(cases, folder, console)
+    console.print(sweep_table(outcomes, len(cases), cases[0].title))
+    if (folder / REALISATIONS).exists():
+        console.print(realisations_tables(realisations_table(index_of(folder), listed)))
+    say_path(console, "Results", folder)
+    for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
+        if (folder / name).exists():
+            say_path(console, what, folder / name)
+    bad = [outcome for outcome in outcomes if outcome.kind != "done"]
+    for outcome in bad[:_SHOWN]:
+        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
+        complain(f"case {number_by_key(listed)[outcome.key]}{again}: {outcome.message}")
+    if len(bad) > _SHOWN:
+        complain(f"and {len(bad) - _SHOWN} more; all of them are in {folder / LOG}")
+    if all(outcome.error in REFUSED for outcome in outcomes):
+        raise Failure("no case could be computed: the input is invalid", 2)
+    if missed:
+        complain(missed)
+    if bad or missed:
+        failed = f"{len(bad)} of {len(outcomes)} cases failed or are in use by another run"
+        raise Failure(failed if bad else "some observables could not be computed", 1)
+
+
 def _observe(cases: list[Case], folder: Path, console: Console) -> str:
     """Add the observables of the study to the results; return the problem, empty if there is none."""
     if not any(case.observed for case in cases):
@@ -175,51 +209,6 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
         except InputError as error:
             return str(error)
     return ""
-
-
-def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
-    """Compute and summarise a sweep, and end with its exit status."""
-    from roughvisc.cli.tables import realisations_tables, sweep_table
-    from roughvisc.study.execution.display import Display
-    from roughvisc.study.execution.sweep import run_cases
-    from roughvisc.study.storage.failures import LOG
-    from roughvisc.study.storage.index import index_of
-    from roughvisc.study.storage.results_table import CASES, REALISATIONS, realisations_table
-    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
-
-    outcomes = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
-    with client.as_current() if client is not None else nullcontext():
-        missed = _observe(cases, folder, console)
-    console.print(sweep_table(list(outcomes.values()), len(cases), cases[0].title))
-    if (folder / REALISATIONS).exists():
-        console.print(realisations_tables(realisations_table(index_of(folder), sweep_cases(cases))))
-    say_path(console, "Results", folder)
-    for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
-        if (folder / name).exists():
-            say_path(console, what, folder / name)
-    if missed:
-        complain(missed)
-    problem, status = _problem(outcomes, number_by_key(sweep_cases(cases)), folder / LOG)
-    if problem or missed:
-        raise Failure(problem or "some observables could not be computed", status)
-
-
-def _problem(outcomes: Mapping[str, Outcome], number: Mapping[str, int], log: Path) -> tuple[str, int]:
-    """Write the messages of the cases that are not done; return the problem of the sweep, and its exit status."""
-    from roughvisc.study.execution.outcome import REFUSED
-
-    bad = [outcome for outcome in outcomes.values() if outcome.kind != "done"]
-    for outcome in bad[:_SHOWN]:
-        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
-        complain(f"case {number[outcome.key]}{again}: {outcome.message}")
-    if len(bad) > _SHOWN:
-        complain(f"and {len(bad) - _SHOWN} more; all of them are in {log}")
-    if all(outcome.error in REFUSED for outcome in outcomes.values()):
-        return "no case could be computed: the input is invalid", 2
-    held, of = sum(outcome.kind == "held" for outcome in bad), f"of {len(outcomes)} cases"
-    problems = [f"{len(bad) - held} {of} failed"] * (len(bad) > held)
-    problems += [f"{held} {of} are in use by another run: repeat the command when it has ended"] * (held > 0)
-    return "; ".join(problems), 1
 
 
 @click.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,16 +14,16 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.errors import printable
-from roughvisc.observables.leakage import closing_times
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, CONDUCTANCES, GRID_ERROR, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of, variables_in_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from roughvisc.study.execution.outcome import Outcome
+    from roughvisc.topography.inspection import Inspection
 
 #: Stated error and its parts; the largest values are printed.
 _ERRORS = {
@@ -38,7 +39,7 @@ def readable(value: float, unit: str) -> str:
 
 
 def result_table(dataset: xr.Dataset) -> Group:
-    """Return a summary of a result: main results, accuracy, cost."""
+    """Return a summary of a result: main results with their errors, accuracy, cost."""
     axis = AXES[axis_of(dataset)]
     row = dataset.isel({axis.name: axis.telling_row(dataset)})
     where = f"at {axis.place(float(row[axis.name]), 3)}" if axis.telling else "at the end"
@@ -49,11 +50,16 @@ def result_table(dataset: xr.Dataset) -> Group:
         (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, from {' to '.join(ends)}{along}"),
     ]
     for name in variables_in_table("last"):
-        if name not in row or name in (axis.name, "contact_fraction", "friction_force_across"):
+        if name not in row or name in (axis.name, "contact_fraction"):
             continue
-        value = float(row[name])
-        text = "infinite: full contact" if math.isinf(value) else readable(value, VARIABLES[name].units)
-        rows.append((f"{VARIABLES[name].label} {where}", text + _remark(dataset, row, name, value)))
+        value, unit = float(row[name]), VARIABLES[name].units
+        text = "infinite: full contact" if math.isinf(value) else readable(value, unit)
+        if name == "contact_area" and "contact_fraction" in row:
+            text += f", {100 * float(row['contact_fraction']):.3g} % of the surface"
+        if f"{name}_error" in row and math.isfinite(value):
+            text += f"; error {readable(float(row[f'{name}_error']), unit)}"
+        text += ", the largest" if name == axis.telling else ""
+        rows.append((f"{VARIABLES[name].label} {where}", text))
     rows += accuracy_rows([dataset], dataset.attrs.get("tolerance"))
     for name in dict.fromkeys(GRID_ERROR.values()):
         if name in dataset and (dataset[name] != 0).any():
@@ -63,29 +69,6 @@ def result_table(dataset: xr.Dataset) -> Group:
     if "wall_time" in dataset:
         rows.append(("Cost: wall time", readable(float(dataset["wall_time"].max()), "s")))
     return two_columns(rows, dataset.attrs.get("title"))
-
-
-def _remark(dataset: xr.Dataset, row: xr.Dataset, name: str, value: float) -> str:
-    """Return a remark on a value of a result: its share of the area, the largest value, or its error."""
-    axis = AXES[axis_of(dataset)]
-    if name == axis.telling:
-        ordered = dataset[name].sortby(axis.name)
-        return f", the largest; {float(ordered[0]):.2g} and {float(ordered[-1]):.2g} at the ends"
-    if name == "nominal_pressure" and (most := float(dataset[name].max())) > value * (1 + 1e-6):
-        return f", at most {readable(most, 'Pa')}"
-    if name == "contact_area":
-        share = f", {100 * float(row['contact_fraction']):.3g} % of the surface" if "contact_fraction" in row else ""
-        counted = f"; {readable(float(row[f'{name}_counted']), 'm^2')} counted" if f"{name}_counted" in row else ""
-        return share + counted
-    if name == "friction_force" and f"{name}_error" in row:
-        return f", stated error {readable(float(row[f'{name}_error']), 'N')}"
-    if name == "leak_rate" and (closes := closing_times(dataset)):
-        return f", closed between {axis.place(closes[0])} and {axis.place(closes[1]).partition(' = ')[2]}"
-    if name == "leak_rate" and not dataset[name].values.any():
-        return f", closed at all {axis.rows}"
-    if name in CONDUCTANCES and 0 < value < math.inf:
-        return f", known to {100 * float(row[f'{name}_error']) / value:.2g} %"
-    return ""
 
 
 def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
@@ -100,21 +83,17 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     title : str
         Title of the study.
     """
-    kinds = [outcome.kind for outcome in outcomes]
-    entries = [outcome.entry for outcome in outcomes if outcome.entry]
+    from roughvisc.study.execution.outcome import IN_WORDS  # slow to import
+
+    finished = [outcome.entry for outcome in outcomes if outcome.entry]
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
     alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
     before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(entries)}, {before}")]
-    for kind, label in (
-        ("unconverged", "Not converged"),
-        ("failed", "Failed"),
-        ("hindered", "Interrupted"),
-        ("held", "Locked by another run"),
-    ):
-        rows += [(label, f"{kinds.count(kind)}")] if kind in kinds else []
-    rows += accuracy_rows([entry.arrays for entry in entries])
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(finished)}, {before}")]
+    kinds = Counter(IN_WORDS[outcome.kind] for outcome in outcomes if outcome.kind != "done")
+    rows += [(kind.capitalize(), str(count)) for kind, count in kinds.items()]
+    rows += accuracy_rows([entry.arrays for entry in finished])
     if spent:
         rows.append(("Cost: total wall time", readable(sum(spent), "s")))
     return two_columns(rows, title)
@@ -173,6 +152,12 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
         unit = str(measures[parameter].attrs["units"])
         rows.append((f"{label}, levelled", readable(float(measures[parameter]), unit)))
     return two_columns([row for row in rows if row[1]], name)
+
+
+def findings_table(found: Inspection) -> Group:
+    """Return the findings in a scan, each with its recommendation."""
+    rows = [(one.name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for one in found.findings.values()]
+    return two_columns(rows, "Findings and recommendations")
 
 
 def _channel_row(index: int, channel: Any) -> tuple[str, str]:

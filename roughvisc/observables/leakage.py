@@ -14,7 +14,7 @@ from roughvisc.mechanics.transport.flow import fluxes
 from roughvisc.observables.frames import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
-from roughvisc.variables import LEAK_MEANINGS, axis_of
+from roughvisc.variables import LEAK_MEANINGS
 
 #: Relative distance of the bounds up to which a leak rate counts as known.
 _CERTIFIED = 1e-6
@@ -135,13 +135,3 @@ def leakage(
         if name.startswith("leak"):
             described[name].attrs |= {"viscosity": viscosity, "pressure_drop": pressure_drop}
     return described
-
-
-def closing_times(dataset: xr.Dataset) -> tuple[float, float] | None:
-    """Return the last kept time with flow and the next kept time, from which on the contact is closed. [s]"""
-    closed = dataset["leak_status"].values == LEAK_MEANINGS.index("closed")
-    if not closed[-1] or closed.all():
-        return None
-    last = int(np.flatnonzero(~closed)[-1])
-    times = dataset[axis_of(dataset.variables)].values
-    return float(times[last]), float(times[last + 1])
