@@ -32,12 +32,12 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     from roughvisc.plot import save_sweep_figures
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files, write_figure
     from roughvisc.study.storage.folder import results_at
-    from roughvisc.study.trade import is_trade, open_trade
+    from roughvisc.study.trade import open_trade
 
     paths = results_at(result)
-    trades = [path for path in paths if path.is_file() and is_trade(path)]
+    trades = {path: found for path in paths if path.is_file() and (found := open_trade(path)) is not None}
     drawn = [
-        write_figure(rv.plot.trade(open_trade(path)), (out or path.parent) / f"{path.stem}.png") for path in trades
+        write_figure(rv.plot.trade(found), (out or path.parent) / f"{path.stem}.png") for path, found in trades.items()
     ]
     cases = [path for path in paths if path not in trades]
     together = results_of_sweep(result) if len(cases) > 1 else None

@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
-from roughvisc.study.neighbours import at_rows, compared, solve, with_rows
+from roughvisc.study.neighbours import at_rows, compared, solve, sources_of, with_rows
 from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.folder import result_path
 from roughvisc.study.storage.netcdf import open_result
@@ -97,25 +97,17 @@ def budget(
     --------
     roughvisc.audit : the assumptions of the model.
     """
-    found = budgets(
-        case,
-        [quantity] if isinstance(quantity, str) else list(quantity),
-        {
-            "modulus_error": modulus_error,
-            "time_scale_error": time_scale_error,
-            "cutoff": cutoff,
-            "population": population,
-        },
-        at=at,
-        out=out,
-        client=client,
-        workers=workers,
-        progress=progress,
-    )
+    names = [quantity] if isinstance(quantity, str) else list(quantity)
+    known = {
+        "modulus_error": modulus_error,
+        "time_scale_error": time_scale_error,
+        "cutoff": cutoff,
+        "population": population,
+    }
+    found = budgets(case, names, known, at=at, out=out, client=client, workers=workers, progress=progress)
     if isinstance(quantity, str):
         return found[quantity]
-    names = xr.DataArray(list(found), dims="quantity", name="quantity")
-    over_all = xr.concat(list(found.values()), names, combine_attrs="drop_conflicts")
+    over_all = xr.concat(list(found.values()), xr.Variable("quantity", names), combine_attrs="drop_conflicts")
     return over_all.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
 
 
@@ -138,31 +130,25 @@ def budgets(
     axis = case.experiment.axis
     given = in_si(at, VARIABLES[axis].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
-    base = with_rows(case, [field for one in observed for field in one.fields], places)
-    own = _own_result(case, finished, base, places)
+    base = with_rows(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
+    own = None
+    if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
+        whole = open_result(finished)
+        found = at_rows(whole, axis, places)
+        if not unconverged(whole) and (places is None or np.allclose(found[axis], places, rtol=1e-9, atol=0)):
+            own = found
     solved = partial(solve, folder=folder, watch=partial(Display, progress), client=client, workers=workers)
-    return compared(base, base.height(), known, observed, solved, own=own, places=places)
+    return compared(base, sources_of(base, base.height(), known), observed, solved, own=own, places=places)
 
 
 def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path, Path]:
     """Return the case, the file of its result, and the folder of the further solves."""
-    if not isinstance(case, xr.Dataset):
-        stated = case if isinstance(case, Case) else read_study(case)
-        finished = result_path(result_folder(stated), stated.key)
-    elif "case" in case.attrs:
-        stated = Case.from_json(case.attrs["case"])
-        finished = Path(case.encoding.get("source") or result_path(result_folder(stated), stated.key))
-    else:
-        raise InputError(key="case", found="a result without a case", expected="a result of rv.run, or its study")
-    return stated, finished, Path(out).expanduser() if out is not None else finished.parent / FOLDER
-
-
-def _own_result(case: Case, finished: Path, base: Case, places: list[float] | None) -> xr.Dataset | None:
-    """Return the finished result of the case at some times or speeds; None if it lacks a row or a field."""
-    if not set(base.settings.fields) <= set(case.settings.fields) or not is_result_of(case, finished):
-        return None
-    whole, axis = open_result(finished), case.experiment.axis
-    found = at_rows(whole, axis, places)
-    if unconverged(whole) or (places is not None and not np.allclose(found[axis], places, rtol=1e-9, atol=0)):
-        return None
-    return found
+    path = None
+    if isinstance(case, xr.Dataset):
+        if "case" not in case.attrs:
+            raise InputError(key="case", found="a result without a case", expected="a result of rv.run, or its study")
+        path, case = case.encoding.get("source"), Case.from_json(case.attrs["case"])
+    elif not isinstance(case, Case):
+        case = read_study(case)
+    finished = Path(path or result_path(result_folder(case), case.key))
+    return case, finished, Path(out).expanduser() if out is not None else finished.parent / FOLDER

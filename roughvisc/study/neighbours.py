@@ -22,7 +22,7 @@ from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
-from roughvisc.study.quantities import Observable, creep_time
+from roughvisc.study.quantities import Observable
 from roughvisc.study.storage.folder import result_path
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.study_file import TEMPERATURE
@@ -107,14 +107,15 @@ def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
     return vary(case, changes)
 
 
-def with_rows(case: Case, fields: Iterable[str], places: list[float] | None = None) -> Case:
-    """Return a case that keeps these fields, at the given places of its axis, without an estimate of the grid error.
+def with_rows(case: Case, fields: Iterable[str], times: Any = None) -> Case:
+    """Return a case that keeps more fields, and other times if given, without an estimate of the grid error.
 
     The changes do not count as varied values, so the title of the result does not name them.
     """
-    changes: dict[str, Any] = {"keep.fields": list(dict.fromkeys(fields)), "solve.grid_error": False}
-    if places is not None and case.experiment.axis == "time":
-        changes["keep.times"] = sorted(set(places))
+    kept = list(dict.fromkeys([*case.settings.fields, *fields]))
+    changes: dict[str, Any] = {"keep.fields": kept, "solve.grid_error": False}
+    if times is not None and case.experiment.axis == "time":
+        changes["keep.times"] = times
     return replace(vary(case, changes), varied=case.varied)
 
 
@@ -160,7 +161,7 @@ class Source:
 
 
 def sources_of(
-    base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0
+    base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0, others: float | None = None
 ) -> dict[str, Source]:
     """Return the sources of error of the numbers of a case, by name.
 
@@ -172,8 +173,9 @@ def sources_of(
         Its surface. [m]
     known : mapping
         Inputs of :data:`KNOWN`, as in :func:`roughvisc.budget`.
-    coarsening : float
-        Length of the cells over the length of the cells of the case, for the sources on another grid.
+    coarsening, others : float
+        Length of the cells over the length of the cells of the case, for the error of the grid, and for the other
+        sources, by default the same.
 
     Raises
     ------
@@ -185,10 +187,11 @@ def sources_of(
         raise InputError(key="population", found=population, expected="'patch' or 'ensemble'")
     if cutoff is not None:
         cutoff = number(cutoff, "m", "cutoff", above=0)
-    sample = is_sample(base, height)
+    sample, others = is_sample(base, height), others or coarsening
     own, coarse, coarsest = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0, 4.0))
     # two grids may agree by chance
     grids = Neighbour(coarse, GRID_FACTOR, own), Neighbour(coarsest, GRID_FACTOR / 2**ORDER, coarse)
+    own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
     found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
 
     if not sample:
@@ -197,7 +200,7 @@ def sources_of(
         words = "the number is of this patch; population 'ensemble' asks for its roughness"
         found[SAMPLE] = Source(words, state="none")
     else:
-        few = [max(2, round(n / (2 * coarsening))) for n in height.shape]
+        few = [max(2, round(n / (2 * others))) for n in height.shape]
         patches = (
             vary(base, {"surface.resample": few, "surface.realisation": patch}) for patch in range(1, _PATCHES + 1)
         )
@@ -227,7 +230,7 @@ def sources_of(
         TIME_SCALE: {f"material.{key}": None for key in TEMPERATURE if key in material}
         | {"material.shift_factor": _CHANGE * base.shift_factor},
     }
-    at_once, later = (float(base.material.contact_compliance(t)) for t in (0.0, creep_time(base.experiment, 1.0)))
+    at_once, later = (float(base.material.contact_compliance(t)) for t in (0.0, math.inf))
     for name, what in ((MODULUS, "moduli"), (TIME_SCALE, "times of the material")):
         key = f"{name.replace(' ', '_')}_error"
         if (error := known.get(key)) is not None:
@@ -306,23 +309,22 @@ def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
 
 
 def compared(
-    base: Case,
-    height: xr.DataArray,
-    known: Mapping[str, Any],
+    case: Case,
+    sources: Mapping[str, Source],
     observed: Sequence[Observable],
     solved: Callable[[list[Case]], dict[str, xr.Dataset]],
     *,
     own: xr.Dataset | None = None,
     places: Sequence[float] | None = None,
-    coarsening: float | None = None,
-    before: Mapping[str, xr.Dataset] | None = None,
+    loaded: bool = False,
 ) -> dict[str, xr.Dataset]:
     """Solve the neighbours of a case and return the budget of each quantity by name.
 
     Parameters
     ----------
-    base, height, known
-        As in :func:`sources_of`.
+    case : Case
+    sources : mapping
+        Sources of error, as :func:`sources_of` returns them.
     observed : sequence of Observable
     solved : callable
         Solves cases and returns the results by their keys: :func:`solve` with its settings.
@@ -330,105 +332,85 @@ def compared(
         Result of the case, if it is known.
     places : sequence of float, optional
         Times [s] or speeds [m/s] of the rows. Default: all.
-    coarsening : float, optional
-        Factor for the length of the cells; only rows with a force are used.
-    before : mapping, optional
-        Budgets on another grid. They provide the rows, and the errors that do not depend on the grid.
+    loaded : bool
+        Whether only rows with a force count.
 
     Returns
     -------
     dict of str to xarray.Dataset
         As :func:`roughvisc.budget` returns them.
     """
-    sources = sources_of(base, height, known, coarsening or 1.0)
-    new = sources if before is None else {name: sources[name] for name in (STEPS, GRID)}
-    case, axis = on_cells(base, height, coarsening or 1.0), base.experiment.axis
-    near = [one.case for source in new.values() for one in source.neighbours]
-    results = solved(near if own is not None else [case, *near])
-    if before is not None:
-        places = next(iter(before.values()))[axis].values
+    near = [one for source in sources.values() for one in source.neighbours]
+    wanted = [case, *(one.case for one in near), *(one.against for one in near)]
+    results = solved([one for one in wanted if own is None or one.key != case.key])
+    axis = case.experiment.axis
     own = at_rows(results[case.key] if own is None else own, axis, places)
-    if coarsening is not None and before is None:
+    if loaded:
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
     results[case.key] = own
-    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
     seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
-    found = {}
-    for one in observed:
-        values = {key: one.of(result, base) for key, result in rows.items()}
-        value, stated = values[case.key], one.stated_error(own, values[case.key])
-        errors: list[tuple[Any, ...]] = []
-        for name, source in sources.items():
-            if before is not None and name not in new:
-                kept = before[one.name].sel(source=name)
-                errors.append(tuple(kept[column].values for column in ("half_width", "direction", "cost")))
+    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
+    return {one.name: _budget(case, sources, one, rows, seconds) for one in observed}
+
+
+def _budget(
+    case: Case,
+    sources: Mapping[str, Source],
+    quantity: Observable,
+    rows: Mapping[str, xr.Dataset],
+    seconds: Mapping[str, float],
+) -> xr.Dataset:
+    """Return the budget of a quantity from the results of a case and its neighbours, at the same rows."""
+    own, axis, units = rows[case.key], case.experiment.axis, VARIABLES[quantity.name].units
+    values = {key: quantity.of(result, case) for key, result in rows.items()}
+    value = values[case.key]
+    half_width = np.zeros((len(sources), value.size))
+    direction = np.zeros(half_width.shape, dtype="int8")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = {key: np.log(one) for key, one in values.items()}
+        for i, (name, source) in enumerate(sources.items()):
+            change = [n.weight * (logarithms[n.case.key] - logarithms[n.against.key]) for n in source.neighbours]
+            if name == STEPS:
+                half_width[i] = quantity.stated_error(own, value)
+            elif not change:
+                half_width[i] = math.nan if source.state == "open" else 0.0
+            elif name == SAMPLE:
+                half_width[i] = np.std(change, axis=0, ddof=1)
             else:
-                cost = sum(seconds[neighbour.case.key] for neighbour in source.neighbours)
-                errors.append((*_error(name, source, one, values, stated), cost))
-        half_width, direction, costs = (np.array(column) for column in zip(*errors, strict=True))
-        over, units = ("source", axis), VARIABLES[one.name].units
-        states, methods = ([getattr(source, what) for source in sources.values()] for what in ("state", "method"))
-        table = xr.Dataset(
-            {
-                "half_width": (over, half_width, _described("half-width of the logarithm at 95 %", "1")),
-                "direction": (over, direction.astype("int8"), _described("direction of the error") | _DIRECTIONS),
-                "state": ("source", states, _described("whether a source counts")),
-                "method": ("source", methods, _described("how it was found")),
-                "cost": ("source", costs, _described("wall time of the solves that it took", "s")),
-                "value": (axis, value, _described(one.name.replace("_", " "), units)),
-                "case_cost": ((), seconds[case.key], _described("wall time of the case itself", "s")),
-            },
-            {"source": list(sources), axis: (axis, own[axis].values, {"units": VARIABLES[axis].units})},
-            {
-                "quantity": one.name,
-                "case": case.to_json(),
-                "title": case.title,
-                "open": "; ".join(name for name, source in sources.items() if source.state == "open"),
-            },
-        )
-        for name, side in (("lower", -1), ("upper", 1)):
-            bound = np.where(value == 0, math.nan, value) * np.exp(side * together(table, side))
-            table[name] = (axis, bound, _described(f"{name} bound at 95 %", units))
-        found[one.name] = table
-    return found
+                half_width[i] = np.max(np.abs(change), axis=0)
+            if change and name == OCTAVE:
+                half_width[i] *= quantity.octave_factor
+                direction[i] = -np.sign(np.nan_to_num(change[0]))
+    costs = [sum(seconds[one.case.key] for one in source.neighbours) for source in sources.values()]
+    table = xr.Dataset(
+        {
+            "half_width": (
+                ("source", axis),
+                half_width,
+                {"units": "1", "long_name": "half-width of the logarithm at 95 %"},
+            ),
+            "direction": (("source", axis), direction, _DIRECTIONS),
+            "state": ("source", [source.state for source in sources.values()]),
+            "method": ("source", [source.method for source in sources.values()]),
+            "cost": ("source", costs, {"units": "s", "long_name": "wall time of the solves"}),
+            "value": (axis, value, {"units": units}),
+            "case_cost": ((), seconds[case.key], {"units": "s", "long_name": "wall time of the case"}),
+        },
+        {"source": list(sources), axis: own[axis].variable},
+        {
+            "quantity": quantity.name,
+            "case": case.to_json(),
+            "title": case.title,
+            "open": "; ".join(name for name, source in sources.items() if source.state == "open"),
+        },
+    )
+    for name, side in (("lower", -1), ("upper", 1)):
+        bound = np.where(value == 0, math.nan, value) * np.exp(side * together(table, side))
+        table[name] = (axis, bound, {"units": units, "long_name": f"{name} bound at 95 %"})
+    return table
 
 
 _DIRECTIONS = {"flag_values": np.array([-1, 0, 1], dtype="int8"), "flag_meanings": "lowers both raises"}
-
-
-def _described(name: str, units: str | None = None) -> dict[str, Any]:
-    return {"long_name": name} if units is None else {"units": units, "long_name": name}
-
-
-def _error(
-    name: str, source: Source, quantity: Observable, values: Mapping[str, Array], stated: Array
-) -> tuple[Array, Array]:
-    """Return the half-width and the direction of the error of a quantity by a source, at each row.
-
-    Parameters
-    ----------
-    name, source
-        Name of the source, and the source.
-    quantity : Observable
-    values : mapping
-        Key of each case -> values of the quantity.
-    stated : ndarray
-        Error of the logarithm of the quantity by time steps and solver. [-]
-    """
-    both = np.zeros(stated.shape)
-    if name == STEPS:
-        return stated, both
-    if not source.neighbours:
-        return np.full(stated.shape, math.nan if source.state == "open" else 0.0), both
-    with np.errstate(divide="ignore", invalid="ignore"):
-        logarithms = {key: np.log(one) for key, one in values.items()}
-        change = [one.weight * (logarithms[one.case.key] - logarithms[one.against.key]) for one in source.neighbours]
-        if name == SAMPLE:
-            return np.std(change, axis=0, ddof=1), both
-        half_width = np.max(np.abs(change), axis=0)
-    if name == OCTAVE:
-        return quantity.octave_factor * half_width, -np.sign(np.nan_to_num(change[0]))
-    return half_width, both
 
 
 def together(table: xr.Dataset, side: int) -> Array:

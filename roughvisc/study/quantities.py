@@ -11,9 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.observables.conductance import conductance, incremental_stiffness
 from roughvisc.observables.leakage import leakage
 from roughvisc.study.case import Case
@@ -79,15 +77,18 @@ class Observable:
 
 
 def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    stated = dict(observe.get("conductance", {}))
-    found = conductance(result, **stated) if stated else conductance(result, (1.0, 1.0), kind="thermal")
+    found = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0), "kind": "thermal"}))
     if "thermal_conductance" not in found:
         expected = "a study that observes a thermal conductance, not an electrical one"
         raise InputError(key="quantity", found="thermal_conductance", expected=expected)
     return found["thermal_conductance"]
 
 
-def _incremental_stiffness(result: xr.Dataset) -> xr.DataArray:
+def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
+    return leakage(result, **observe.get("leakage", {}))["leak_rate"]
+
+
+def _incremental_stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     """Return the stiffness for a fast increment of load, with the instantaneous modulus."""
     body = Case.of_result(result).body
     compliance = float(body.material.contact_compliance(0.0))
@@ -106,29 +107,17 @@ QUANTITIES = {
         Observable("approach", follows="approach"),
         Observable("force"),
         Observable("friction_coefficient", octave_factor=1.8),
-        Observable(
-            "leak_rate",
-            lambda result, observe: leakage(result, **observe.get("leakage", {}))["leak_rate"],
-            ("gap",),
-            follows="gap",
-        ),
+        Observable("leak_rate", _leak_rate, ("gap",), follows="gap"),
         Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, "area"),
-        Observable(
-            "incremental_stiffness",
-            lambda result, observe: _incremental_stiffness(result),
-            ("pressure",),
-            2.5,
-            "area",
-        ),
+        Observable("incremental_stiffness", _incremental_stiffness, ("pressure",), 2.5, "area"),
     )
 }
 
 
-def quantities_of(case: Case) -> list[str]:
-    """Return the names of the quantities that the results of a case have."""
-    experiment = case.experiment
-    slides = not isinstance(experiment, Loading) or bool(experiment.program.slides)
-    return [name for name in QUANTITIES if slides or name != "friction_coefficient"]
+def quantities_of(case: Case) -> dict[str, Observable]:
+    """Return the quantities that the results of a case have, by name."""
+    slides = not isinstance(case.experiment, Loading) or case.experiment.program.slides
+    return {name: one for name, one in QUANTITIES.items() if slides or name != "friction_coefficient"}
 
 
 def quantity_of(case: Case, name: str) -> Observable:
@@ -141,15 +130,4 @@ def quantity_of(case: Case, name: str) -> Observable:
     """
     if name not in (known := quantities_of(case)):
         raise InputError(key="quantity", found=name, expected=f"one of {', '.join(known)}")
-    return QUANTITIES[name]
-
-
-def creep_time(experiment: Experiment, size: float) -> float:
-    """Return the time during which the material under a surface creeps. [s]
-
-    The time is the length of the program, or the time of sliding by the `size` [m] of the surface at the lowest speed.
-    """
-    if isinstance(experiment, Loading):
-        return experiment.program.duration
-    assert isinstance(experiment, SteadySliding)
-    return size / min(experiment.speeds)
+    return known[name]

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from roughvisc.arguments import nearest
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
 from roughvisc.study.budget import FOLDER
@@ -28,11 +27,9 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
 from roughvisc.study.neighbours import (
     GRID,
-    GRID_FACTOR,
     KNOWN,
     MODULUS,
     OCTAVE,
-    ORDER,
     SAMPLE,
     STEPS,
     TIME_SCALE,
@@ -42,6 +39,7 @@ from roughvisc.study.neighbours import (
     shape_on,
     shortest_wave,
     solve,
+    sources_of,
     together,
     with_rows,
 )
@@ -61,9 +59,7 @@ _PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
 _FINEST, _FEWEST = -2, 12
 #: Accepted ratio of an error to the target, since messages round both.
 _ROUNDING = 1.005
-#: Length of cells by level, in words.
-_LENGTHS = {1: "twice as long as", 0: "as long as", -1: "half as long as", -2: "a quarter as long as"}
-#: Remedy for the error of each source.
+#: Source -> what would reduce its error. The later ones depend neither on the grid nor on the tolerance.
 _REMEDIES = {
     STEPS: "a smaller tolerance",
     GRID: "finer cells",
@@ -72,8 +68,6 @@ _REMEDIES = {
     MODULUS: "moduli that are known more accurately",
     TIME_SCALE: "times of the material, or its temperature, that are known more accurately",
 }
-#: Sources that neither a finer grid nor a smaller tolerance reduces.
-_FLOOR = (SAMPLE, OCTAVE, MODULUS, TIME_SCALE)
 
 
 def targets_of(want: Mapping[str, Any]) -> dict[str, float]:
@@ -113,12 +107,9 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for text in texts:
         amount, _, name = text.strip().rpartition(" ")
-        if not (name.isidentifier() and is_quantity(amount, "1")):
-            raise InputError(key="for", found=text, expected="a target such as '1 % contact_area'")
-        if name not in QUANTITIES:
-            raise InputError(key="for", found=text, expected=f"a number of a budget{nearest(name, [*QUANTITIES])}")
-        if name in found:
-            raise InputError(key="for", found=text, expected=f"one target for {name}")
+        if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
+            expected = f"one target for each number, such as '1 % contact_area', and of {', '.join(QUANTITIES)}"
+            raise InputError(key="for", found=text, expected=expected)
         found[name] = amount
     return found
 
@@ -188,57 +179,47 @@ def choose(
         largest source.
     """
     targets = targets_of(want)
+    wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
     solved = partial(solve, folder=folder / FOLDER, watch=watch, client=client, workers=workers or 0, threads=threads)
     height, smallest = case.height(), min(targets.values())
-    base = with_rows(case, [*case.settings.fields, *(field for one in observed for field in one.fields)])
+    base = with_rows(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
         tolerance = min(tolerance, case.settings.tolerance)
-    times, places = case.settings.times, None
-    if case.experiment.axis == "time":
-        places = times if isinstance(times, tuple) else case.program.corners
+    places = case.settings.times if isinstance(case.settings.times, tuple) else None
+    if places is None and case.experiment.axis == "time":
+        places = case.program.corners
 
     # the coarsest grid resolves the waves of the surface, and leaves some cells to the third grid
     level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2
     if is_sample(case, height) and (wave := shortest_wave(height)):
         level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
-    level, before = max(level, 0), None
+    level = coarsest = max(level, 0)
     while True:
-        if (rounded := float(f"{tolerance:.2g}")) != base.settings.tolerance:
-            base = vary(base, {"solve.tolerance": rounded})
-        scale = 2.0**level
-        found = compared(base, height, want, observed, solved, places=places, coarsening=scale, before=before)
-        shape, length = shape_on(case, height, scale), _LENGTHS.get(level, f"{scale:g} times as long as")
-        cells = f"{shape[0]} x {shape[1]} cells, {length} those of the study"
-        reached = {
-            name: f"{name} {_percent(error_of(one))}, wanted {_percent(math.log1p(targets[name]))}"
-            for name, one in found.items()
-        }
-        tell(f"{cells}: {'; '.join(reached.values())}")
-        steps = max(error_of(one, [STEPS]) / math.log1p(targets[name]) for name, one in found.items())
-        if before is None and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
+        base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
+        chosen = on_cells(base, height, 2.0**level)
+        sources = sources_of(base, height, want, 2.0**level, 2.0**coarsest)
+        found = compared(chosen, sources, observed, solved, places=places, loaded=True)
+        cells = "{} x {} cells".format(*shape_on(case, height, 2.0**level))
+        reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
+        tell(f"{cells}: {'; '.join(reached)}")
+        steps = max(error_of(one, [STEPS]) / wanted[name] for name, one in found.items())
+        if level == coarsest and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
             continue  # steps and solver would use more than half of the target
-        _refuse_missed(case, targets, found, "whatever the grid", _FLOOR)
-        if all(error_of(one) <= _ROUNDING * math.log1p(targets[name]) for name, one in found.items()):
+        if all(error_of(one) <= _ROUNDING * wanted[name] for name, one in found.items()):
             break
-        level -= 1
-        if level <= _FINEST:
-            _refuse_missed(case, targets, found, f"with {cells}", before=before if level == _FINEST else None)
-        before = found
+        # neither a finer grid nor a smaller tolerance reduces the errors of other sources
+        _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
+        level, places = level - 1, next(iter(found.values()))[case.experiment.axis].values
 
-    chosen = on_cells(base, height, scale)
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
             shutil.copyfile(result_path(folder / FOLDER, chosen.key), temporary)
-    reasons = [f"grid: {cells}"]
-    for name, one in found.items():
-        by_grid, others = (_percent(error_of(one, names)) for names in ((STEPS, GRID), _FLOOR))
-        reasons.append(f"{reached[name]}: {by_grid} by grid and solver, {others} by all else")
-    reasons.append(f"tolerance: {chosen.settings.tolerance:.2g}")
+    reasons = [f"grid: {cells}", *reached, f"tolerance: {chosen.settings.tolerance:.2g}"]
     if unknown := found[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")
     return chosen, reasons, found
@@ -255,42 +236,22 @@ def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
 
 
 def _refuse_missed(
-    case: Case,
-    targets: Mapping[str, float],
-    budgets: Mapping[str, xr.Dataset],
-    where: str,
-    sources: Sequence[str] = tuple(_REMEDIES),
-    before: Mapping[str, xr.Dataset] | None = None,
+    case: Case, targets: Mapping[str, float], budgets: Mapping[str, xr.Dataset], sources: Sequence[str], cells: str
 ) -> None:
-    """Refuse targets that cannot be met; the message names the sources, and a remedy for the largest.
-
-    The error of the next grid is at least a part of the last change. With the budgets on the coarser grid, `before`, a
-    target is missed if even this smallest error exceeds it.
-    """
-    lines, first = [], ""
+    """Refuse the first target that is below the error by some sources; name them, and what would reduce the largest."""
     for name, budget in budgets.items():
-        wanted, least = math.log1p(targets[name]), budget
-        if before is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                change = np.abs(np.log(budget["value"].values / before[name]["value"].values))
-            part = GRID_FACTOR * change / 2**ORDER
-            least = budget.assign(half_width=budget["half_width"].where(budget["source"] != GRID, part))
-        if error_of(least, sources) <= _ROUNDING * wanted:
+        wanted, error = math.log1p(targets[name]), error_of(budget, sources)
+        if error <= _ROUNDING * wanted:
             continue
-        first = first or name
         parts = {one: error_of(budget, [one]) for one in sources}
         largest = max(parts, key=parts.__getitem__)
         if math.isinf(parts[largest]):
-            lines.append(f"{name}: found zero, or less, which has no relative error: expected another number")
-            continue
-        error = _percent(error_of(budget, sources), 3)
-        lines.append(f"{name}: found {_percent(wanted)}: its error is {error} at least, {where}")
+            raise InputError(key=name, found="zero, or less, which has no relative error", expected="another number")
+        lines = [f"its error on {cells} is {_percent(error, 3)}, and {_REMEDIES[largest]} would reduce it"]
         lines += [f"  {one}: {_percent(part)}" for one, part in parts.items() if part > 0.1 * wanted]
-        lines += [f"  {_REMEDIES[largest]} would reduce it"]
         lines += [f"  open, and not counted: {budget.attrs['open']}"] if budget.attrs["open"] else []
-    if lines:
-        named = f"{case.origin}: " if case.origin else ""
-        raise InputError("\n".join([named + lines[0], *lines[1:]]), key=first, found=targets[first])
+        where = f"{case.origin}: " if case.origin else ""
+        raise InputError(f"{where}{name}: found {_percent(wanted)}: " + "\n".join(lines), key=name, found=targets[name])
 
 
 def _percent(half_width: float, digits: int = 2) -> str:

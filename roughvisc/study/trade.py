@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,43 +16,28 @@ from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.rows import kept_times
-from roughvisc.labels import label, steps_of
-from roughvisc.mechanics.grid import transform_library
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged
-from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve
+from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_rows
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
 from roughvisc.study.storage.netcdf import NETCDF
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
-from roughvisc.variables import AXES, RESULT_FORMAT, Variable, axis_of
+from roughvisc.variables import AXES, axis_of
 
-_RUNS = ("setting",)
-_OFF = "largest possible error, by Richardson extrapolation"
-#: Variables of a trade.
-VARIABLES = {
-    "setting": Variable(_RUNS, "", "how the case was computed", dtype="str"),
-    "quantity": Variable(("quantity",), "", "what is compared", dtype="str"),
-    "tolerance": Variable(_RUNS, "1", "tolerance"),
-    "coarsening": Variable(_RUNS, "1", "length of a cell over that of the study's"),
-    "cells_x": Variable(_RUNS, "1", "cells along x", dtype="int32"),
-    "cells_y": Variable(_RUNS, "1", "cells along y", dtype="int32"),
-    "run_time": Variable(_RUNS, "s", "run time", "wall time of computing the result"),
-    "transforms": Variable(_RUNS, "1", "convolutions, each one forward and one inverse transform"),
-    "steps": Variable(_RUNS, "1", "accepted time steps, or speeds"),
-    "note": Variable(_RUNS, "", "why the setting was not measured; empty if it was", dtype="str"),
-    "error": Variable(
-        ("setting", "quantity"),
-        "1",
-        "relative error against the reference",
-        "the worst over the kept times; pressure: its absolute difference summed (L1) over the largest force; any "
-        "other: over its largest value",
-    ),
-    "reference_time_uncertainty": Variable(("quantity",), "1", "uncertainty of the reference due to time steps", _OFF),
-    "reference_grid_uncertainty": Variable(
-        ("quantity",), "1", "uncertainty of the reference due to the grid", f"{_OFF}; of a scan: what its spacing hides"
-    ),
+#: Variable of a trade -> unit and long name.
+COLUMNS = {
+    "tolerance": ("1", "tolerance"),
+    "coarsening": ("1", "length of a cell over its length in the study"),
+    "cells_x": ("1", "cells along x"),
+    "cells_y": ("1", "cells along y"),
+    "run_time": ("s", "wall time of computing the result"),
+    "transforms": ("1", "convolutions, each one forward and one inverse transform"),
+    "note": ("", "why the setting was not measured; empty if it was"),
+    "error": ("1", "largest error against the reference over all rows, over the largest value"),
+    "reference_time_uncertainty": ("1", "uncertainty of the reference due to time steps"),
+    "reference_grid_uncertainty": ("1", "uncertainty of the reference due to the grid"),
 }
 #: Folder of the solves and of the table, in the folder of the results.
 FOLDER = "trade"
@@ -134,7 +116,7 @@ def trade(
     if not budget > 0:
         raise InputError(key="budget", found=budget, expected="a positive number of seconds")
     asked = [quantity] if isinstance(quantity, str) else list(quantity)
-    fields = [field for name in asked if name != "pressure" for field in quantity_of(case, name).fields]
+    observed = [quantity_of(case, name) for name in asked if name != "pressure"]
     known = {"pressure", *quantities_of(case)}
     names = [name for name in dict.fromkeys([*asked, *_USUAL]) if name in known]
     height = case.height()
@@ -152,12 +134,18 @@ def trade(
     finest = [1.0] if data else [grid for grid in grids if grid <= 1] or grids[:1]
     wanted = {(sharpest / _SHARPER, part * grid) for grid in finest for part in (1.0, 2.0, 4.0)}
     wanted |= {*rungs, *((sharpest, grid) for grid in finest)}
-    base = _with_common_rows(case, height, fields, {grid for _, grid in wanted})
+    times, experiment = case.settings.times or _FEW, case.experiment
+    if isinstance(experiment, Loading) and experiment.program.slides:
+        shapes = [shape_on(case, height, grid) for _, grid in wanted]
+        sides = np.array(spacing(height)) * height.shape / np.array(shapes)
+        times = kept_times(experiment.program, times, *map(tuple, sides)) or "all"
+    fields = ["pressure", *(field for one in observed for field in one.fields)]
+    base = with_rows(case, fields, list(times) if isinstance(times, tuple) else times)
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
+    solved = partial(solve, folder=folder, watch=partial(Display, progress, summary=False))
 
     # relative work: the number of steps grows with the inverse root of the tolerance, iterations hardly change
-    axis = base.experiment.axis
-    power, spent, rate = (0.5 if axis == "time" else 0.1), 0.0, 0.0
+    power, spent, rate = (0.5 if experiment.axis == "time" else 0.1), 0.0, 0.0
     work = {(tolerance, grid): tolerance**-power / grid**2 for tolerance, grid in wanted}
     results: dict[tuple[float, float], xr.Dataset] = {}
     notes: dict[tuple[float, float], str] = {}
@@ -166,9 +154,8 @@ def trade(
             left = max(budget - spent, 0.0)
             notes[setting] = f"would take about {expected:.2g} s, {left:.0f} s are left of the budget"
             continue
-        changed = on_cells(vary(base, {"solve.tolerance": setting[0]}), height, setting[1])
         try:
-            (result,) = solve([changed], folder, watch=partial(Display, progress, summary=False)).values()
+            [result] = solved([on_cells(vary(base, {"solve.tolerance": setting[0]}), height, setting[1])]).values()
         except RoughviscError as error:
             notes[setting] = str(error).removeprefix(f"{case.origin}: ")
             continue
@@ -177,13 +164,13 @@ def trade(
             continue
         seconds = float(result["wall_time"].values[-1])
         spent, rate = spent + seconds, seconds / work[setting]
-        derived = {name: (axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
+        derived = {name: (experiment.axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
         results[setting] = result.assign(derived)
-    candidates = [(sharpest / _SHARPER, grid) for grid in finest]  # otherwise the run with the smallest tolerance
-    reference = next((one for one in (*candidates, *sorted(results)) if one in results and one[1] in finest), None)
+    reference = min((one for one in results if one[1] in finest), default=None)
     if reference is None:
         where = f"{case.origin}: " if case.origin else ""
-        raise InputError(f"{where}the reference run: {notes[candidates[-1]]}: expected a larger budget, or fewer cells")
+        why = notes[sharpest / _SHARPER, finest[-1]]
+        raise InputError(f"{where}the reference run: {why}: expected a larger budget, or fewer cells")
     return _compared(base, height, rungs, names, results, notes, reference)
 
 
@@ -192,21 +179,6 @@ def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
     rungs = [(tolerance, 1.0) for tolerance in _TOLERANCES]
     rungs += [(tolerance, grid) for grid, tolerance in _COARSER if min(shape) / grid >= _FEWEST]
     return rungs if data else rungs + [(one, grid) for grid, one in _FINER if max(shape) / grid <= _MOST]
-
-
-def _with_common_rows(case: Case, height: xr.DataArray, fields: Sequence[str], grids: set[float]) -> Case:
-    """Return the case with these fields, the pressure, and kept times that are possible in all settings."""
-    changes: dict[str, Any] = {"solve.grid_error": False, "solve.boundary": case.settings.boundary}
-    changes["keep.fields"] = list(dict.fromkeys([*case.settings.fields, *fields, "pressure"]))
-    experiment = case.experiment
-    if isinstance(experiment, Loading):
-        times = case.settings.times or _FEW
-        if experiment.program.slides:
-            shapes = [shape_on(case, height, grid) for grid in grids]
-            sides = np.array(spacing(height)) * height.shape / np.array(shapes)
-            times = kept_times(experiment.program, times, *map(tuple, sides)) or "all"
-        changes["keep.times"] = list(times) if isinstance(times, tuple) else times
-    return replace(vary(case, changes), varied=case.varied)
 
 
 def _compared(
@@ -219,34 +191,29 @@ def _compared(
     reference: tuple[float, float],
 ) -> xr.Dataset:
     """Return the cost and the errors of the settings that were solved."""
-    (sharp, finest), axis = reference, case.experiment.axis
-    missing = np.full(len(names), math.nan)
+    (sharp, finest), axis = reference, AXES[case.experiment.axis]
 
     def apart(one: tuple[float, float], other: tuple[float, float] = reference) -> NDArray[np.float64]:
-        return _differences(results[one], results[other], names) if {one, other} <= results.keys() else missing
+        both = {one, other} <= results.keys()
+        return _differences(results[one], results[other], names) if both else np.full(len(names), math.nan)
 
     rows = []
-    for tolerance, grid in rungs:
-        setting, shape = (tolerance, grid), shape_on(case, height, grid)
-        found, note, error = results.get(setting), notes.get(setting, ""), apart(setting)
-        if grid < finest:
-            found, note = None, note or "finer than the reference, for which there is no time"
-        elif found is not None and np.isnan(error).all():
-            found, note = None, f"its {AXES[axis].rows} differ from those of the reference"
-        row = {"setting": _label(tolerance, grid, shape), "tolerance": tolerance, "coarsening": grid, "note": note}
-        row |= {"cells_x": shape[0], "cells_y": shape[1], "error": missing}
-        row |= {"run_time": math.nan, "transforms": math.nan, "steps": math.nan}
-        if found is not None:
-            steps = steps_of(found)
-            row |= {"run_time": float(found["wall_time"][-1]), "transforms": float(found["convolutions"].sum())}
-            row |= {"steps": found.sizes[axis] if steps is None else steps.sizes["step"], "error": error}
-        rows.append(row)
-    columns = {name: (VARIABLES[name].dims, [row[name] for row in rows]) for name in rows[0]}
-    table = xr.Dataset(columns, {"quantity": list(names)})
-    table = table.set_coords(["tolerance", "coarsening", "cells_x", "cells_y"])
+    for setting in rungs:
+        shape, note, error = shape_on(case, height, setting[1]), notes.get(setting, ""), apart(setting)
+        if setting[1] < finest:
+            note, error = note or "finer than the reference, for which there is no time", np.full_like(error, math.nan)
+        elif not note and np.isnan(error).all():
+            note = f"its {axis.rows} differ from those of the reference"
+        found = None if note else results[setting]
+        spent = math.nan if found is None else float(found["wall_time"][-1])
+        transforms = math.nan if found is None else float(found["convolutions"].sum())
+        rows.append((_label(*setting, shape), *setting, *shape, spent, transforms, note, error))
+    columns = dict(zip(("setting", *COLUMNS), zip(*rows, strict=True), strict=False))
+    errors = ("setting", "quantity"), np.array(columns.pop("error"))
+    table = xr.Dataset({name: ("setting", list(column)) for name, column in columns.items()} | {"error": errors})
     # the error decreases unevenly with the tolerance, which requires the larger safety factor
     looser = min((one for one in results if one[0] > sharp and one[1] == finest), default=(math.inf, finest))
-    by_steps = TWO_GRIDS * apart(looser) / (looser[0] / sharp - 1)
+    table["reference_time_uncertainty"] = ("quantity", TWO_GRIDS * apart(looser) / (looser[0] / sharp - 1))
     second, third = (sharp, 2 * finest), (sharp, 4 * finest)
     shapes = [shape_on(case, height, grid) for grid in (finest, 2 * finest)]
     ratio, moving = math.sqrt(math.prod(shapes[0]) / math.prod(shapes[1])), "friction_coefficient" in names
@@ -254,21 +221,17 @@ def _compared(
         float(grid_uncertainty(name, near, far, ratio, moving=moving))
         for name, near, far in zip(names, apart(second), apart(third, second), strict=True)
     ]
-    table["reference_time_uncertainty"], table["reference_grid_uncertainty"] = (
-        ("quantity", unsure) for unsure in (by_steps, by_grid)
+    table["reference_grid_uncertainty"] = ("quantity", by_grid)
+    for name, (units, long_name) in COLUMNS.items():
+        table[name].attrs = {"long_name": long_name} | ({"units": units} if units else {})
+    table = table.assign_coords(quantity=names).set_coords(["setting", "tolerance", "coarsening", "cells_x", "cells_y"])
+    return table.assign_attrs(
+        title=case.title,
+        case=case.to_json(),
+        reference=f"finest run: {_label(*reference, shapes[0])}",
+        grid_is_data=int(is_data(case)),
+        rows=axis.rows,
     )
-    attributes = {
-        "Conventions": "CF-1.11",
-        "result_format": RESULT_FORMAT,
-        "title": case.title,
-        "source": f"roughvisc {metadata.version('roughvisc')}",
-        "case": case.to_json(),
-        "reference": f"finest run: {_label(*reference, shapes[0])}",
-        "grid_is_data": int(is_data(case)),
-        "rows": AXES[axis].rows,
-        "transforms": transform_library(),
-    }
-    return label(table, VARIABLES).assign_attrs(attributes)
 
 
 def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
@@ -366,24 +329,10 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
 # files
 
 
-def open_trade(path: str | Path) -> xr.Dataset:
-    """Open the file that ``roughvisc trade`` wrote.
-
-    Raises
-    ------
-    InputError
-        If the file is absent or was not written by ``roughvisc trade``.
-    """
-    if not is_trade(path):
-        raise InputError(key=str(path), found="no trade", expected="a file that roughvisc trade wrote (.nc)")
-    with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
-        return file.load()
-
-
-def is_trade(path: str | Path) -> bool:
-    """Return whether a file was written by ``roughvisc trade``."""
+def open_trade(path: Path) -> xr.Dataset | None:
+    """Open the file that ``roughvisc trade`` wrote; any other file gives None."""
     try:
         with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
-            return "run_time" in file and "quantity" in file.dims
+            return file.load() if "run_time" in file and "quantity" in file.dims else None
     except (OSError, ValueError, RuntimeError):
-        return False
+        return None

@@ -285,13 +285,9 @@ def test_floor__above_the_wanted_error_is_refused_before_fine_grids_are_solved(t
 
 
 def test_target_that_the_finest_grid_misses__is_refused(tmp_path):
-    with refused("contact_area", 1e-4):
+    with refused("contact_area", 1e-4) as error:
         got(case(BALL, tmp_path), tmp_path, {"contact_area": 1e-4})
-    shapes = []
-    for path in (tmp_path / "results" / "budget").glob("*.nc"):
-        with xr.open_dataset(path) as one:
-            shapes.append(one["height"].shape[0])
-    assert max(shapes) == 91, "the next cannot be better than a part of it"
+    assert "finer cells" in str(error.value)
 
 
 @pytest.mark.parametrize("text", ["1 % frobnication", "1", "1 %", "60 s", "3 kg mean_gap"])

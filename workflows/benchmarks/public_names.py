@@ -45,7 +45,6 @@ def variables():
         declared("roughvisc.variables", "VARIABLES"),
         declared("roughvisc.variables.sliding", "SLIDING"),  # of the first edition
         declared("roughvisc.study.trade.trade", "VARIABLES"),  # of the first edition
-        declared("roughvisc.study.trade", "VARIABLES"),
     )
     return {
         name: f"{one.dims} {one.units} {getattr(one, 'group', '')}".strip()
@@ -84,7 +83,12 @@ KINDS = {
     "commands": lambda: {name.split()[0]: "" for name in commands()},
     "figures of a result": lambda: dict.fromkeys(declared("roughvisc.plot", "FIGURES"), ""),
     "errors": errors,
-    "columns of a plan": lambda: {name: str(one) for name, one in declared("roughvisc.study.plan", "COLUMNS").items()},
+    **{
+        f"columns of a {name}": lambda name=name: {
+            column: str(one) for column, one in declared(f"roughvisc.study.{name}", "COLUMNS").items()
+        }
+        for name in ("plan", "trade")
+    },
 }
 
 
