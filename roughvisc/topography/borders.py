@@ -115,20 +115,13 @@ def recipe_name(h: xr.DataArray) -> str:
 
 def is_mirrored(height: NDArray[np.float64]) -> bool:
     """Return whether a surface equals its mirror images along x and y; the numbers of cells must be even."""
-    nx, ny = (n // 2 for n in height.shape)
-    if height.shape != (2 * nx, 2 * ny):
+    if height.shape[0] % 2 or height.shape[1] % 2:
         return False
-    allowed = _ROUNDING * max(float(np.fmax.reduce(height, axis=None)), -float(np.fmin.reduce(height, axis=None)))
-    # once the halves of the rows are found equal, the second comparison needs one half only
-    return _alike(height[nx - 1 :: -1], height[nx:], allowed) and _alike(
-        height[nx:, ny - 1 :: -1], height[nx:, ny:], allowed
+    allowed = _ROUNDING * np.nanmax(np.abs(height))
+    return all(
+        np.allclose(half, image, rtol=0, atol=allowed, equal_nan=True)
+        for half, image in ((height, height[::-1]), (height, height[:, ::-1]))
     )
-
-
-def _alike(a: NDArray[np.float64], b: NDArray[np.float64], allowed: float) -> bool:
-    difference = a - b
-    near = np.abs(difference, out=difference) <= allowed
-    return bool(near.all() or (near | (np.isnan(a) & np.isnan(b))).all())
 
 
 def _rms(values: np.ndarray) -> float:

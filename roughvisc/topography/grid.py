@@ -19,9 +19,6 @@ from roughvisc.errors import InputError, short_repr
 from roughvisc.units import quantity
 from roughvisc.variables import VARIABLES
 
-#: Attributes of packed numbers, before xarray decodes them.
-_PACKED = {"scale_factor", "add_offset", "_FillValue", "missing_value"}
-
 #: 16384 squared: a field of doubles takes 2 GB.
 MOST_CELLS = 1 << 28
 
@@ -153,28 +150,20 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     Raises
     ------
     InputError
-        If they are not real numbers, are packed as in a file or held by pint, or their unit is not a length.
+        If they are not real numbers or held by pint, or their unit is not a length.
     """
     unit = unit_of(numbers)
-    factor = 1.0 if unit in (None, "m") else metres_in(unit, name)
-    if isinstance(numbers, xr.DataArray):
-        packed = _PACKED & set(numbers.attrs)
-        if packed:
-            raise InputError(
-                f"{name} is packed (attribute {sorted(packed)[0]!r}): expected decoded numbers, as xarray opens them "
-                "with mask_and_scale=True"
-            )
-        numbers = numbers.data
-    if hasattr(numbers, "magnitude"):  # NumPy would drop its unit
+    held = numbers.data if isinstance(numbers, xr.DataArray) else numbers
+    if hasattr(held, "magnitude"):  # NumPy would drop its unit
         raise InputError(f"{name} is a pint array: expected plain numbers [m]")
     try:
-        held = numbers if isinstance(numbers, np.ma.MaskedArray) else np.asarray(numbers)
+        held = held if isinstance(held, np.ma.MaskedArray) else np.asarray(held)
     except ValueError as error:  # rows of different lengths
         raise InputError(f"{name} is {type(numbers).__name__}: expected real numbers, as many in each row") from error
     if held.dtype.kind not in "fiu":
         raise InputError(f"{name} is of {held.dtype}: expected real numbers")
     values = np.ma.filled(held.astype(float, copy=False), np.nan)
-    return values if factor == 1.0 else values * factor
+    return values if unit in (None, "m") else values * metres_in(unit, name)
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:

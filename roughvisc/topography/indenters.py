@@ -103,18 +103,8 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
 
 
 def is_indenter(h: xr.DataArray) -> bool:
-    """Return whether a surface is a sphere, cone or flat punch on cells of its grid, so that the grid can grow.
-
-    xarray keeps attributes through arithmetic, so the recipe counts only if it reproduces the given heights.
-    """
-    known = _known(h)
-    if known is None:
-        return False
-    for axis, side in zip("xy", known[1], strict=True):
-        cells = h[axis].values / side - 0.5
-        if np.abs(cells - (np.arange(cells.size) + round(cells[0]))).max() > 1e-6:
-            return False
-    return True
+    """Return whether a surface is a sphere, cone or flat punch on cells of its grid, so that the grid can grow."""
+    return _known(h) is not None
 
 
 def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
@@ -132,7 +122,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     xarray.DataArray or None
         None if `h` is not a sphere, cone or flat punch, see :func:`is_indenter`.
     """
-    known = _known(h) if is_indenter(h) else None
+    known = _known(h)
     if known is None:
         return None
     evaluate, cell, centre = known
@@ -188,17 +178,18 @@ def highest(h: xr.DataArray) -> float:
     (0.0, True, True)
     """
     known = _known(h)
-    is_within = known is not None
-    for axis, side, centre in zip("xy", *known[1:], strict=True) if known else ():
-        at = h[axis].values
-        is_within = is_within and at[0] - side / 2 <= centre <= at[-1] + side / 2
+    is_within = known is not None and all(
+        float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2
+        for axis, side, centre in zip("xy", *known[1:], strict=True)
+    )
     return 0.0 if is_within else float(np.nanmax(h.values))
 
 
 def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
     """Return height as a function of x and y from the apex, cell sides, and position of the apex. [m]
 
-    None if the recipe does not reproduce the heights.
+    None if the recipe does not reproduce the heights on cells of its grid. xarray keeps attributes through arithmetic,
+    so that the recipe alone does not count.
     """
     try:
         recipe = json.loads(h.attrs["recipe"])
@@ -206,9 +197,12 @@ def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, flo
         (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
         cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
+        cells = [h[axis].values / side - 0.5 for axis, side in zip("xy", cell, strict=True)]
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
     near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
+    if any(np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6 for at in cells):
+        return None
     if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
         return None
     return evaluate, cell, centre

@@ -44,12 +44,12 @@ def modes(
     power, count : ndarray, shape (nx, ny // 2 + 1)
         Squared moduli [m2], and the number of modes of each entry: two if its conjugate is not stored.
     """
-    q_x, q_y, count = _wavevectors(z.shape, cells)
+    q_x, q_y, count = wavevectors(z.shape, cells)
     power = np.abs(scipy.fft.rfft2(z, norm=norm)) ** 2
     return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
 
 
-def _wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the wavevectors along x and, from zero on, along y [rad/m], and the number of modes of each column."""
     (nx, ny), (dx, dy) = shape, cells
     q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy)
@@ -117,7 +117,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     if window not in (None, "hann"):
         raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
     cells, shape = spacing(h), h.shape
-    q_x, q_y, stands_for = _wavevectors(shape, cells)
+    q_x, q_y, stands_for = wavevectors(shape, cells)
     step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)
     z = h.values - h.values.mean()
     density = np.abs(scipy.fft.rfft2(z if window is None else hann(z))) ** 2 * (cells[0] * cells[1] / h.size)

@@ -12,8 +12,8 @@ from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, labelled, noted, require_complete, spacing
-from roughvisc.topography.spectrum import psd
-from roughvisc.topography.synthesis import half_spectrum, random_heights
+from roughvisc.topography.spectrum import psd, wavevectors
+from roughvisc.topography.synthesis import random_heights
 
 
 def surrogates(
@@ -84,7 +84,7 @@ def surrogate(
     repeating = h if is_periodic(h) else mirror(h)
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
     sides = spacing(h)
-    q_x, q_y, _ = half_spectrum(h.shape, sides)
+    q_x, q_y, _ = wavevectors(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)
     rings = np.round(spectrum["wavevector"].values / step).astype(int)
     density = np.zeros(rings[-1] + 1)

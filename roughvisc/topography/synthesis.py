@@ -17,6 +17,7 @@ from roughvisc.arguments import check_keys, located, one_of, units_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, number, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, recipe_of, sphere
+from roughvisc.topography.spectrum import wavevectors
 from roughvisc.units import Quantity, quantities
 
 
@@ -163,7 +164,7 @@ def self_affine(
     except (TypeError, ValueError) as error:
         raise InputError(f"seed is {seed!r}: expected a whole number >= 0 or a numpy.random.Generator") from error
     entropy = source.integers(1 << 32, size=4).tolist()
-    q_x, q_y, weight = half_spectrum(shape, cell_of(size, shape))
+    q_x, q_y, weight = wavevectors(shape, cell_of(size, shape))
     q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
     inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, are outside
     amplitude = np.zeros(q.shape)
@@ -180,14 +181,6 @@ def self_affine(
     parameters |= {"seed": int(seed) if isinstance(seed, int | np.integer) else None}
     attrs = recipe_of("self_affine", parameters, size, shape) | {"period": list(size)}
     return labelled(heights, cell_of(size, shape), attrs)
-
-
-def half_spectrum(shape: Any, cell: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the wavevectors of a real transform along x and y [rad/m], and the number of modes of each along y."""
-    q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(shape[0], cell[0]), 2 * np.pi * scipy.fft.rfftfreq(shape[1], cell[1])
-    weight = np.full(q_y.size, 2.0)  # the half that is not stored
-    weight[0] = 1.0
-    return q_x, q_y, weight
 
 
 def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal: bool) -> np.ndarray:

@@ -44,7 +44,8 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
     known_suffix(path)
     cell = spacing(h)
     if path.suffix.lower() == ".nc":
-        _save_netcdf(h.rename("height"), path)
+        compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+        h.rename("height").to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
     elif path.suffix.lower() == ".x3p":
         import x3pio
 
@@ -56,12 +57,6 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
 
         metadata = sdfio.Metadata(manufacturer_id="roughvisc")
         sdfio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
-
-
-def _save_netcdf(h: xr.DataArray, path: Path) -> None:
-    """Write a grid with all its coordinates and attributes."""
-    compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
-    h.to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
 
 
 def known_suffix(path: Path) -> None:
@@ -128,15 +123,19 @@ def surface_table(
 
 def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of a table ``[surface]`` and their values as TOML."""
-    entries = {"file": _toml(file.as_posix())}
-    for key, value in options.items():
-        if value is not None:
-            entries[key] = _lengths(value, 15) if key in ("spacing", "grid") else _toml(value)
-    for key, value in steps.items():
-        if key == "crop":
-            entries[key] = "{ " + ", ".join(f"{axis} = {_lengths(limits)}" for axis, limits in value.items()) + " }"
-        else:
-            entries[key] = _lengths(value) if key == "filter" else _toml(value)
+
+    def lengths(value: Any, digits: int = 6) -> str:
+        if isinstance(value, tuple | list):
+            return f"[{', '.join(lengths(one, digits) for one in value)}]"
+        return _toml(written_quantity(float(value), "m", digits))
+
+    given = {key: value for key, value in options.items() if value is not None}
+    entries = {key: _toml(value) for key, value in {"file": file.as_posix(), **given, **steps}.items()}
+    entries |= {key: lengths(given[key], 15) for key in ("spacing", "grid") if key in given}
+    if "filter" in steps:
+        entries["filter"] = lengths(steps["filter"])
+    if "crop" in steps:
+        entries["crop"] = "{ " + ", ".join(f"{axis} = {lengths(at)}" for axis, at in steps["crop"].items()) + " }"
     return entries
 
 
@@ -152,13 +151,6 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
     exponent = 3 * math.floor(math.log10(abs(value) * (1 + 1e-12)) / 3) if value else 0
     exponent = min(max(exponent, -12), 0 if unit == "m" else 9)
     return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.{digits}g} {prefixes[exponent]}{unit}"
-
-
-def _lengths(value: Any, digits: int = 6) -> str:
-    """Return one length, or a list of lengths, as TOML."""
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(_lengths(part, digits) for part in value) + "]"
-    return _toml(written_quantity(float(value), "m", digits))
 
 
 def _toml(value: Any) -> str:

@@ -66,7 +66,6 @@ REFUSED = {
     "durations": lambda: (H * 1e9).astype("timedelta64[s]"),
     "objects": lambda: H.astype(object),
     "yes and no": lambda: H > 0,
-    "packed": lambda: H.assign_attrs(scale_factor=1e-9),
     "no height": lambda: xr.Dataset({"z": H}),
     "frames": lambda: H.expand_dims("time"),
     "an array": lambda: H.values,

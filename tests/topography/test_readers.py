@@ -264,6 +264,3 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     assert supported_formats()["ours"] == ("txt", "our")
     add_format("ours", [], read)
     assert supported_formats()["ours"] == ()
-    for format, suffixes in (("x3p", ["a"]), ("mine", ["toml"])):
-        with pytest.raises(InputError, match=format):
-            add_format(format, suffixes, read)

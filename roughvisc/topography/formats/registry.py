@@ -125,7 +125,7 @@ def open_file(path: Path, format: str | None) -> ScanFile:
 
 
 def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
-    """Add a format to :func:`roughvisc.open_scan` in this process, or replace an added format of the same name.
+    """Add a format to :func:`roughvisc.open_scan` in this process, or replace a format of the same name.
 
     Parameters
     ----------
@@ -136,17 +136,8 @@ def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Scan
     read : callable
         ``read(path)`` returns a :class:`ScanFile`. Any exception is reported as an
         :class:`~roughvisc.errors.InputError` that names the file.
-
-    Raises
-    ------
-    InputError
-        If the name or a suffix belongs to a format that roughvisc reads itself.
     """
-    given = tuple(suffix.lower().removeprefix(".") for suffix in suffixes)
-    own = {"card", "toml", *_OWN, *(suffix for theirs, _ in _OWN.values() for suffix in theirs)}
-    if taken := own & {format, *given}:
-        raise InputError(f"format {format!r}: found {', '.join(sorted(taken))}, used by roughvisc: expected others")
-    _ADDED[format] = given, read
+    _ADDED[format] = tuple(suffix.lower().removeprefix(".") for suffix in suffixes), read
 
 
 def suffixes() -> dict[str, tuple[str, ...]]:
@@ -155,8 +146,8 @@ def suffixes() -> dict[str, tuple[str, ...]]:
 
     theirs = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
     theirs["di"] = (*theirs["di"], "di", "000 to 999")
-    own = {name: suffixes for name, (suffixes, _) in (_OWN | _ADDED).items() if suffixes or name not in theirs}
-    return {**theirs, **own, "card": ("toml",)}
+    own = {name: suffixes for name, (suffixes, _) in _OWN.items() if suffixes or name not in theirs}
+    return theirs | own | {name: suffixes for name, (suffixes, _) in _ADDED.items()} | {"card": ("toml",)}
 
 
 def _formats_of(path: Path) -> tuple[str, ...]:
