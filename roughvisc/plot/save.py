@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import multiprocessing
 import textwrap
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -146,7 +146,7 @@ def save_figures(
 
 
 def save_figures_of_files(
-    paths: Sequence[Path], folder: Path | None, *, every: bool = True, processes: int = 1, label: str = "drawing"
+    paths: Sequence[Path], folder: Path | None, *, every: bool = True, processes: int = 1
 ) -> list[Path]:
     """Write the figures of result files, in parallel and with a progress bar.
 
@@ -160,8 +160,6 @@ def save_figures_of_files(
         False: only the default figures of each result.
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
-    label : str
-        Text of the progress bar.
     """
     from roughvisc.study.storage.netcdf import open_result  # slow to import
 
@@ -175,7 +173,7 @@ def save_figures_of_files(
         (path, folder or path.parent, stems.get(path.stem, path.stem), case_words(cases.get(path.stem, {})), every)
         for path in paths
     ]
-    return [one for written in in_parallel(_save_file, jobs, processes, label) for one in written]
+    return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
 
 
 def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
@@ -186,29 +184,25 @@ def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
         return save_figures(dataset, folder, stem, title=title, every=every)
 
 
-def in_parallel(work: Callable[[Any], _Result], jobs: Iterable[Any], processes: int, label: str) -> list[_Result]:
+def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: int, label: str) -> list[_Result]:
     """Return the results of a function of some jobs, in order; several processes compute, with a progress bar."""
     from roughvisc.progress import reporting  # slow to import
 
-    jobs = list(jobs)
-    with reporting(True, label, at=lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
-        if min(processes, len(jobs)) < 2:
-            results = []
-            for job in jobs:
-                results.append(work(job))
-                report(len(results), len(jobs))
-            return results
-        # a process that is forked while threads run may hang; a fork server starts before any work
-        method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-        context = multiprocessing.get_context(method)
-        if method == "forkserver":
-            context.set_forkserver_preload([__name__])
-        with ProcessPoolExecutor(min(processes, len(jobs)), mp_context=context) as pool:
-            futures = [pool.submit(work, job) for job in jobs]
-            for count, done in enumerate(as_completed(futures), 1):
-                done.result()
-                report(count, len(jobs))
-            return [future.result() for future in futures]
+    processes = min(processes, len(jobs))
+    # a process that is forked while threads run may hang; a fork server starts before any work
+    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+    context = multiprocessing.get_context(method)
+    if method == "forkserver":
+        context.set_forkserver_preload([__name__])
+    with (
+        reporting(True, label, at=lambda done, count: f"{done:.0f} of {count:.0f} cases") as report,
+        ProcessPoolExecutor(max(processes, 1), mp_context=context) as pool,
+    ):
+        results = []
+        for found in pool.map(work, jobs) if processes > 1 else map(work, jobs):
+            results.append(found)
+            report(len(results), len(jobs))
+        return results
 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
@@ -246,5 +240,6 @@ def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png"
     InputError
         If the Dataset does not hold several cases.
     """
-    drawn = sweep_figures(results)
-    return [write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in drawn]
+    return [
+        write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in sweep_figures(results)
+    ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -26,6 +25,7 @@ from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
+from roughvisc.study.storage.failures import recorded_failure
 from roughvisc.study.storage.folder import atomic_write, no_results, result_files
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result
@@ -33,7 +33,7 @@ from roughvisc.study.storage.results_table import realisations_table
 from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of
+from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of, variables_in_table
 
 #: Largest numbers of cases with figures and audit, of cases for which every figure is drawn, and of cases with their
 #: studies. The shown cases are evenly spread.
@@ -47,23 +47,15 @@ _SETTINGS = (
 )
 #: Surface parameters shown.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
-#: Heading -> variable that the table of cases shows at the last row, or at the row of the largest friction.
-_AT_END = {"Approach": "approach", "Area": "contact_area", "Contact fraction": "contact_fraction"}
-#: Heading -> variable whose largest value the table of cases shows.
-_LARGEST = {"Force": "force", "Nominal pressure": "nominal_pressure"}
-#: Heading -> relative error whose largest value the table of cases shows.
-_ERRORS = {"Stated error": "stated_error", "Time steps": "time_error", "Contact solver": "residual"}
 
 
-def report(
-    results: str | Path | xr.Dataset | Sequence[xr.Dataset], out: str | Path | None = None, *, processes: int = 1
-) -> Path:
+def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, processes: int = 1) -> Path:
     """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
     Parameters
     ----------
-    results : path, xarray.Dataset, or sequence of path or xarray.Dataset
-        A result file, a folder of result files, one case's result, or several results.
+    results : path or xarray.Dataset
+        A result file, a folder of result files, or one case's result.
     out : path, optional
         File to write. Default: ``report.html`` in the folder of results, or ``STEM-report.html`` next to a result file.
     processes : int
@@ -77,32 +69,27 @@ def report(
     Raises
     ------
     InputError
-        If there are zero results, or Datasets come without `out`.
+        If there are zero results, or a Dataset comes without `out`.
     """
     page: dict[str, Any] = {"failures": [], "figures": [], "realisations": ([], [], [])}
     numbers: dict[str, int] = {}
-    if isinstance(results, str | Path):
-        source = Path(results)
-        sources: list[Any] = result_files(source) if source.is_dir() else [source]
-        if source.is_dir():
-            page["failures"] = _failures(source)
-            if not sources and not page["failures"]:
-                raise no_results(source)
-            cases = read_sweep(source)
-            numbers = number_by_key(cases)
-            sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
-            page["realisations"] = realisation_rows(realisations_table(index_of(source), cases))
-            swept = results_of_sweep(source) if len(sources) > 1 else None
-            if swept is not None:
-                page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
-        out = out or (source / "report.html" if source.is_dir() else source.with_name(f"{source.stem}-report.html"))
+    sources: list[Any] = [results]
+    if isinstance(results, xr.Dataset):
+        if out is None:
+            raise InputError("out is None: expected the name of the page, if a Dataset is given")
+    elif (folder := Path(results)).is_dir():
+        out = out or folder / "report.html"
+        sources, cases = result_files(folder), read_sweep(folder)
+        page["failures"] = _failures(folder)
+        if not sources and not page["failures"]:
+            raise no_results(folder)
+        numbers = number_by_key(cases)
+        sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
+        page["realisations"] = realisation_rows(realisations_table(index_of(folder), cases))
+        if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:
+            page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
     else:
-        sources = [results] if isinstance(results, xr.Dataset) else list(results)
-        processes = 1
-    if out is None:
-        raise InputError("out is None: expected the name of the page, if Datasets are given")
-    if not sources and not page["failures"]:
-        raise InputError("found no results: expected at least one")
+        out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
     pictured, stated = _evenly(len(sources), _PICTURED), _evenly(len(sources), _STATED)
     drawn = set(FIGURES if len(sources) <= _DRAWN else DEFAULT) - {"surface"}
     surfaces: dict[str, int] = {}
@@ -122,7 +109,7 @@ def report(
     text = environment.get_template("report.html.jinja").render(
         page, version=metadata.version("roughvisc"), written=written
     )
-    with atomic_write(Path(out)) as temporary:
+    with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Path(out)
 
@@ -136,15 +123,11 @@ def _failures(folder: Path) -> list[dict[str, str]]:
     """Return the failed cases, from their records."""
     found = []
     for path in sorted(folder.glob("*.failed.json")):
-        one = {"key": path.name.partition(".")[0], "title": "", "message": "the record cannot be read"}
-        try:
-            record = json.loads(path.read_text())
-            case = record.get("case", {})
-            title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
-            one |= {"title": title, "message": record["message"]}
-        except (OSError, ValueError, KeyError, AttributeError):
-            pass
-        found.append(one)
+        key = path.name.partition(".")[0]
+        record = recorded_failure(folder, key)
+        case = record.get("case", {})
+        title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
+        found.append({"key": key, "title": title, "message": record.get("message", "the record cannot be read")})
     return found
 
 
@@ -225,27 +208,19 @@ def _text(value: xr.DataArray) -> str:
 def _cells(dataset: xr.Dataset) -> dict[str, str]:
     """Return heading -> cell of one case in the table of cases."""
     axis = AXES[axis_of(dataset)]
-    last = dataset.isel({axis.name: axis.telling_row(dataset)})
+    telling = dataset.isel({axis.name: axis.telling_row(dataset)})
     cells = {
         "Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
         axis.rows.capitalize(): str(dataset[axis.name].size),
     }
-    if axis.telling in dataset:
-        at = axis.place(float(last[axis.name]), 3).partition(" = ")[2]
-        cells[f"Largest {VARIABLES[axis.telling].label.lower()}"] = f"{_text(last[axis.telling])} at {at}"
-    cells |= {heading: _text(dataset[name].max().rename(name)) for heading, name in _LARGEST.items() if name in dataset}
-    cells |= {heading: _text(last[name]) for heading, name in _AT_END.items() if name in last}
-    for heading, name in _ERRORS.items():
-        if name in dataset and np.isfinite(dataset[name]).any():
-            cells[heading] = f"{float(dataset[name].max()):.2g}"
-    tolerance = dataset.attrs.get("tolerance")
-    if tolerance is not None and float(cells.get("Stated error", 0)) > tolerance:
-        cells["Stated error"] += f", above the tolerance of {tolerance:g}"
+    cells |= {VARIABLES[name].label: _text(telling[name]) for name in variables_in_table("last") if name in telling}
+    if "stated_error" in dataset and dataset["stated_error"].notnull().any():
+        worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
+        above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
+        cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
     if "status" in dataset:
         bad = int((dataset["status"].values == NOT_CONVERGED).sum())
         cells["Status"] = f"{bad} of {dataset['status'].size} {axis.rows} not converged" if bad else "converged"
-    if "convolutions" in dataset:
-        cells["Convolutions"] = str(int(dataset["convolutions"].sum()))
     if "wall_time" in dataset:
         cells["Wall time"] = _text(dataset["wall_time"].max().rename("wall_time"))
     return cells

@@ -99,7 +99,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
     assert ("<td>0.003</td>" in text) == within
     assert "do not record the whole study" in text
     with pytest.raises(InputError, match="out is None"):
-        report([ds])
+        report(ds)
 
 
 @pytest.mark.thorough
