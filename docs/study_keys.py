@@ -135,7 +135,10 @@ TABLES = {
     },
     "material: any": ("material", _of(stiffened, modulus_factor="factor")),
     **{
-        f"material: {name}": ("material", _all(one, "note", "stands_for"))
+        f"material: {name}": (
+            "material",
+            _all(one, "note", "stands_for", "longest", "warning", "misfit"),
+        )
         for name, one in MODELS.items()
     },
     "material: temperature": (

@@ -37,7 +37,11 @@ def test_page__has_every_table_and_every_model(study_keys):
 
 def keys_of(function, skipped=0):
     """Keys of the table of a function; notes are not on the page."""
-    return {name for name in arguments(function, skipped) if name not in ("note", "stands_for")}
+    return {
+        name
+        for name in arguments(function, skipped)
+        if name not in ("note", "stands_for", "longest", "warning", "misfit")
+    }
 
 
 #: tables of the page that belong together -> keys that a study may have there

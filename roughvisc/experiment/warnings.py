@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.materials.creep import Creep, Material
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.memory_choice import Choice
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
@@ -151,8 +151,7 @@ def speeds_warning(dataset: xr.Dataset) -> str:
 
 def table_warning(materials: Sequence[Material]) -> str:
     """Return the warnings of creep tables, such as rows more than a decade apart, else ''."""
-    found = [one.warning for one in materials if isinstance(one, Creep)]
-    return " ".join(dict.fromkeys(filter(None, found)))
+    return " ".join(dict.fromkeys(filter(None, (one.warning for one in materials))))
 
 
 def border_warning(height: xr.DataArray, dataset: xr.Dataset) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,7 +89,7 @@ def choose_memory(
     if not body.separates:
         return _of_layers(body, duration, tolerance, shortest, grid)
     material = body.material
-    if isinstance(material, Prony):
+    if isinstance(material, Prony) and material.longest == math.inf:
         memory = Memory(material, duration, keeps_pressure)
         return Choice(memory, 0.0, "; ".join(filter(None, (in_words(material), material.note))))
     if duration == 0:
@@ -128,7 +129,7 @@ def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, g
             f"{count} exponential{'' if count == 1 else 's'}{' and a fluidity' if waves.flows else ''} that all waves "
             f"share, each with compliances of its own, within {error:.1e} of them from {shortest:.1g} s on"
         )
-    misfit = max(one.misfit if isinstance(one, Creep) else 0.0 for one in given)
+    misfit = max(one.misfit for one in given)
     notes = "; ".join(filter(None, (note, *(one.note for one in given))))
     return Choice(LayerMemory(waves, duration, grid), error, notes, misfit)
 

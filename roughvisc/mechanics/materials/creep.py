@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number, check_poisson
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.prony import Prony, known_times
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -48,9 +48,9 @@ class Creep:
     note : str
         Origin of the material.
     warning : str
-        Warning about the measurements, for the result.
+        Warning about measurements, of a pair with a measured body.
     misfit : float
-        Largest relative deviation from the rows of a table, zero if it is within their noise.
+        Largest deviation from measurements, of a pair with a measured body.
     stands_for : str
         Name of the bodies if the function is not one body with this Poisson ratio; otherwise empty.
     """
@@ -71,14 +71,8 @@ class Creep:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
-        t = np.asarray(t, dtype=float)
-        end = self.longest * self.time_factor
-        if t.size and not np.max(t) <= end * (1 + 1e-12):  # beyond rounding of a sum of steps
-            raise InputError(
-                f"creep is requested at {np.max(t):g} s, and the table ends at {end:g} s: expected a table as long as "
-                "the program; creep data are not extrapolated"
-            )
-        found = self.function(np.minimum(t, end) / self.time_factor, *self.parameters)
+        t = known_times(t, self.longest * self.time_factor)
+        found = self.function(t / self.time_factor, *self.parameters)
         return np.asarray(found, dtype=float) / self.modulus_factor
 
     def contact_compliance(self, t: ArrayLike) -> Array:
@@ -185,11 +179,6 @@ def power_creep(t: Array, glassy: float, coefficient: float, exponent: float, ti
     return np.asarray(glassy + coefficient * (t / time_scale) ** exponent)
 
 
-def series_creep(t: Array, series: Prony) -> Array:
-    """Return the creep compliance of the series fitted to measured creep. [1/Pa]"""
-    return series.creep_compliance(t)
-
-
 def pair_creep(t: Array, a: Material, b: Material) -> Array:
     """Return the creep compliance of an incompressible body with the contact compliance of two bodies. [1/Pa]"""
     return 4 * (a.contact_compliance(t) + b.contact_compliance(t))
@@ -215,21 +204,24 @@ def pair(a: Material, b: Material) -> Material:
     1.175e-06
     """
     bodies = check_material(a), check_material(b)
-    note = "; ".join(f"{name}: {body.note}" for name, body in zip("ab", bodies, strict=True) if body.note)
-    named: dict[str, Any] = {"note": note, "stands_for": "a pair of bodies"}
-    if isinstance(a, Prony) and isinstance(b, Prony):
-        glassy, fluidity = 0.0, 0.0
-        compliances: dict[float, float] = {}
-        for body in (a, b):
-            share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body
-            glassy += share * body.glassy
-            fluidity += share * body.fluidity
-            for compliance, time in zip(body.compliances, body.times, strict=True):
-                compliances[time] = compliances.get(time, 0.0) + share * compliance
-        return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), **named)
-    measured = [body for body in bodies if isinstance(body, Creep)]
-    warning = " ".join(filter(None, (body.warning for body in measured)))
-    return Creep(pair_creep, bodies, warning=warning, misfit=max(body.misfit for body in measured), **named)
+    about: dict[str, Any] = {
+        "note": "; ".join(f"{name}: {body.note}" for name, body in zip("ab", bodies, strict=True) if body.note),
+        "stands_for": "a pair of bodies",
+        "warning": " ".join(filter(None, (body.warning for body in bodies))),
+        "misfit": max(body.misfit for body in bodies),
+    }
+    if not (isinstance(a, Prony) and isinstance(b, Prony)):
+        return Creep(pair_creep, bodies, **about)
+    glassy, fluidity = 0.0, 0.0
+    compliances: dict[float, float] = {}
+    for body in (a, b):
+        share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body
+        glassy += share * body.glassy
+        fluidity += share * body.fluidity
+        for compliance, time in zip(body.compliances, body.times, strict=True):
+            compliances[time] = compliances.get(time, 0.0) + share * compliance
+    longest = min(a.longest, b.longest)
+    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), longest=longest, **about)
 
 
 def shift(material: Material, factor: float) -> Material:
@@ -327,12 +319,12 @@ def check_material(material: Any) -> Material:
     return material
 
 
-def check_creep(material: Creep, times: Array) -> Array:
+def check_creep(material: Material, times: Array) -> Array:
     """Return the creep compliance at some times [1/Pa], after a check that it is not negative and does not decrease.
 
     Parameters
     ----------
-    material : Creep
+    material : Prony or Creep
         Material to check.
     times : ndarray
         Times, positive and ascending. [s]

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import (
-    Material,
-    check_material,
-    pair,
-    pair_creep,
-    power_creep,
-    series_creep,
-)
+from roughvisc.mechanics.materials.creep import Creep, Material, check_material, pair, pair_creep, power_creep
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
 
@@ -109,17 +103,16 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
         See :func:`complex_compliance`.
     """
     material = check_material(material)
-    if isinstance(material, Prony) or material.function is power_creep:
-        return material
-    if material.function is pair_creep:
+    if isinstance(material, Creep) and material.function is pair_creep:
         return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
+    if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
+        return material
     size = np.abs(np.asarray(frequency, dtype=float))
     size = size[size > 0]
     if not size.size:
         raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
-    if material.function is not series_creep:
+    if isinstance(material, Creep):
         return series(material, shortest, longest, tolerance)[0]
     material.creep_compliance(longest)  # refuses a table that ends earlier
-    fitted: Prony = material.parameters[0]
-    return fitted.scaled(material.time_factor, material.modulus_factor)
+    return replace(material, longest=math.inf)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -37,6 +38,12 @@ class Prony:
         Origin of a fitted series: number of terms, misfit. Ignored in comparisons.
     stands_for : str
         Name of the bodies if the series is not one body with this Poisson ratio; otherwise empty.
+    longest : float
+        Time of the last row of a creep table, up to which the series is known. [s]
+    warning : str
+        Warning about the measurements, for the result.
+    misfit : float
+        Largest relative deviation from the rows of a creep table, zero if it is within their noise.
 
     Raises
     ------
@@ -52,6 +59,9 @@ class Prony:
     poisson: float = 0.5
     note: str = field(default="", compare=False, repr=False)
     stands_for: str = field(default="", compare=False, repr=False)
+    longest: float = field(default=math.inf, repr=False)
+    warning: str = field(default="", compare=False, repr=False)
+    misfit: float = field(default=0.0, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(float(c) for c in self.compliances))
@@ -70,8 +80,8 @@ class Prony:
             raise InputError(key="glassy", found=self.glassy, expected=expected)
 
     def creep_compliance(self, t: ArrayLike) -> Array:
-        """Return the shear creep compliance ``J(t)``. [1/Pa]"""
-        t = np.asarray(t, dtype=float)
+        """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
+        t = known_times(t, self.longest)
         retarded = np.add.reduce(self._terms[0] * -np.expm1(-t[..., None] / self._terms[1]), axis=-1)
         flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
@@ -82,7 +92,7 @@ class Prony:
 
     def contact_integral(self, t: ArrayLike) -> Array:
         """Return the integral ``int_0^t C``. [s/Pa]"""
-        t = np.asarray(t, dtype=float)
+        t = known_times(t, self.longest)
         compliances, times = self._terms
         crept = np.add.reduce(compliances * one_less_mean_decay(t[..., None] / times), axis=-1) * t
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
@@ -95,6 +105,7 @@ class Prony:
             fluidity=self.fluidity / (time_factor * modulus_factor),
             compliances=tuple(one / modulus_factor for one in self.compliances),
             times=tuple(time_factor * one for one in self.times),
+            longest=time_factor * self.longest,
             note="; ".join(filter(None, (self.note, note))),
         )
 
@@ -138,6 +149,17 @@ class Prony:
         if self.fluidity:
             return np.append(self.fluidity, weights * rates), np.append(0.0, rates)
         return weights * rates, rates
+
+
+def known_times(t: ArrayLike, longest: float) -> Array:
+    """Return times up to the longest one, beyond which a material is not known. [s]"""
+    t = np.asarray(t, dtype=float)
+    if t.size and not np.max(t) <= longest * (1 + 1e-12):  # beyond rounding of a sum of steps
+        raise InputError(
+            f"creep is requested at {np.max(t):g} s, and the table ends at {longest:g} s: expected a table as long as "
+            "the program; creep data are not extrapolated"
+        )
+    return np.minimum(t, longest)
 
 
 # (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding

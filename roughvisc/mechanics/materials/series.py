@@ -22,7 +22,6 @@ from roughvisc.mechanics.materials.creep import (
     check_material,
     pair,
     pair_creep,
-    series_creep,
 )
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -48,7 +47,8 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     Parameters
     ----------
     material : Material
-        Any material. A Prony series is returned unchanged.
+        Any material. A Prony series is returned unchanged, unless it was fitted to a creep table with more terms than
+        the tolerance needs.
     shortest, longest : float
         Range of times. [s]
     tolerance : float
@@ -83,25 +83,22 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     if not 0 < tolerance < math.inf:
         raise InputError(f"tolerance is {tolerance!r}: expected a positive number")
     material = check_material(material)
-    if isinstance(material, Prony):
+    if isinstance(material, Prony) and material.longest == math.inf:
         return material, 0.0
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
-    if material.function is pair_creep:
+    if isinstance(material, Creep) and material.function is pair_creep:
         joined = pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters))
         assert isinstance(joined, Prony)
         return joined, _error(joined, instants, compliance)
     fits = _fits(material, instants, compliance, tolerance)
     error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
-    if material.function is series_creep:
-        terms: Prony = material.parameters[0].scaled(material.time_factor, material.modulus_factor)
-        exact = replace(terms, poisson=material.poisson)  # the terms of a table have the default Poisson ratio
-        if error > tolerance or len(found.times) >= len(exact.times):
-            return exact, 0.0
+    if isinstance(material, Prony) and (error > tolerance or len(found.times) >= len(material.times)):
+        return replace(material, longest=math.inf), 0.0
     return found, error
 
 
-def _fits(material: Creep, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
+def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
     """Yield series and their errors, from ever denser lattices of retardation times."""
     shortest, longest = float(instants[0]), float(instants[-1])
     glassy = float(material.creep_compliance(0.0))

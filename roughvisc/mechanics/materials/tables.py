@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, check_number, checked_rows, tensile_to_shear
-from roughvisc.mechanics.materials.creep import Creep, series_creep
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import relaxation_series
 from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
@@ -53,7 +52,7 @@ def creep_table(
     kind: Kind = "shear",
     noise: float = 0.0,
     poisson: float = 0.5,
-) -> Creep:
+) -> Prony:
     """Material from a creep test: ``J(t)`` in shear, or ``D(t)`` in tension with ``J = 2 (1 + nu) D``.
 
     Parameters
@@ -72,7 +71,7 @@ def creep_table(
 
     Returns
     -------
-    Creep
+    Prony
         A positive series of exponentials fitted to the rows, up to the last row and not beyond. Its ``note`` states
         the number of terms and the misfit.
 
@@ -113,10 +112,18 @@ def creep_table(
     note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
-    fitted = Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:].tolist()), tuple(tau.tolist()))
     largest = float(np.abs(misfit).max())
-    off = largest if largest > noise else 0.0
-    return Creep(series_creep, (fitted,), poisson, float(t[-1]), note=note, warning=_gap("creep", rows), misfit=off)
+    return Prony(
+        glassy,
+        float(weights[0] / rows[-1]),
+        tuple(weights[1:].tolist()),
+        tuple(tau.tolist()),
+        poisson,
+        note,
+        longest=float(t[-1]),
+        warning=_gap("creep", rows),
+        misfit=largest if largest > noise else 0.0,
+    )
 
 
 @quantities(times="s", moduli="Pa")

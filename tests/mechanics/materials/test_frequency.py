@@ -49,6 +49,12 @@ def test_table_and_own_material__come_near_the_series_that_they_sample():
     np.testing.assert_allclose(complex_compliance(own, w), complex_compliance(exact, w), rtol=2e-3)
 
 
+def test_table__has_its_own_poisson_ratio():
+    t = np.geomspace(1e-4, 1e4, 40)
+    half, third = (complex_compliance(rv.creep_table(t, 1 + t**0.3, poisson=nu), [0.1, 2.0]) for nu in (0.5, 0.3))
+    np.testing.assert_allclose(third, half * 0.7 / 0.5, rtol=1e-12)
+
+
 def test_pair__adds_both():
     a, b = rv.power_law(0.5, 2.0, 0.3), rv.zener(1.0, 1.0, 1.0)
     np.testing.assert_allclose(
