@@ -49,12 +49,6 @@ def of_program(path):
 SCAN = 1e-6 * np.array(HEIGHTS, float).T  # [m]
 #: name -> suffix, rows, what reads them, and the numbers that come out
 READERS = {
-    "columns by name": (
-        "csv",
-        table("time [s]", "load [N]"),
-        lambda path: np.array([*read_table(path, LOAD | TIME)[0].values()]),
-        np.array([VALUES, TIMES], float),
-    ),
     "history of a machine": ("txt", table("t[s]", "F[N]"), of_program, np.array(VALUES[1:], float)),
     **{
         f"matrix in {suffix}": (
@@ -89,9 +83,6 @@ def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_pa
         path.write_bytes(text.encode("utf-16-le"))  # without its mark
         with pytest.raises(InputError, match=r"numbers\.\w+: .*zero bytes"):
             read(path)
-
-
-_ELASTIC, _LOAD = 'model = "elastic"\nshear_modulus = "1 MPa"', 'load = "1 mN"\nover = 0'
 
 
 @pytest.mark.parametrize("rows", ['0;0;a\n1;2;"b\n2;3;c\n3;4;d\n', '0;0;\n1;"2\n2;3;"\n3;4;\n'])

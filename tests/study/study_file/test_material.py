@@ -1,0 +1,178 @@
+"""``[material]``: every model, columns of files, pairs, layers and temperatures; what is refused, and at which key."""
+
+import pytest
+from samples import RUBBER
+from support import refused
+
+import roughvisc as rv
+from roughvisc.mechanics.materials.models import MODELS
+from roughvisc.study.case import Case, vary
+from roughvisc.study.si_tables import unit_of
+
+HEADING = "time [s], compliance [1/Pa]\n"
+#: Coating on rubber.
+COAT = {"model": "elastic", "shear_modulus": "1 GPa", "poisson": 0.35, "thickness": "20 um"}
+ZENER = {"model": "zener", "shear_modulus": "3 MPa", "kelvin_modulus": "1 MPa", "kelvin_viscosity": "0.1 MPa s"}
+STIFF, SOFT = {"model": "elastic", "shear_modulus": 8e10}, {"model": "maxwell", "shear_modulus": 1e6, "viscosity": 1e6}
+WLF = {"temperature": "30 degC", "reference_temperature": 293.15, "wlf_c1": 8.0, "wlf_c2": "90 K"}
+ARRHENIUS = {"temperature": 303.15, "reference_temperature": "20 °C", "activation_energy": "80 kJ/mol"}
+
+
+@pytest.mark.parametrize(
+    ("model", "stated"),
+    [
+        ("elastic", {"shear_modulus": 1e6}),
+        ("maxwell", {"shear_modulus": 1e6, "viscosity": "2 kPa s", "poisson": 0.3}),
+        ("kelvin_voigt", {"shear_modulus": 1e6, "viscosity": 1}),
+        ("zener", {"shear_modulus": "3 MPa", "kelvin_modulus": 1e6, "kelvin_viscosity": "1 kPa s"}),
+        ("from_relaxation", {"equilibrium": 0, "moduli": ["1 MPa", 2e6], "times": ["1 ms", 1]}),
+        ("from_relaxation", {"instantaneous": "3 kPa", "ratios": [0.5], "times": [1], "bulk_modulus": "2 kPa"}),
+        ("prony", {"glassy": "1 GPa^-1", "compliances": [1e-6], "times": [1]}),
+        ("prony", {"glassy": 1e-9}),
+        ("power_law", {"glassy": 0, "coefficient": "1 MPa^-1", "exponent": 0.4, "time_scale": "2 h"}),
+        ("creep_table", {"times": [0, "2 min"], "compliances": [1, 2], "noise": 0.01, "kind": "tensile"}),
+        ("relaxation_table", {"times": [0, 1, 2], "moduli": ["3 MPa", 2e6, 1.5e6], "poisson": 0.3}),
+        ("dynamic_table", {"frequency_unit": "Hz", "frequencies": [1, 10], "storage": [2, 3], "loss": [1, "1 Pa"]}),
+    ],
+)
+def test_model__is_that_of_its_function(read_one, model, stated):
+    assert read_one(material={"model": model, **stated}).material == MODELS[model](**stated)
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        (f"{HEADING}0, 1e-7\n60, 2e-7\n3600, 5e-7\n", {}),
+        ("time, compliance\n0, 0.1\n1, 0.2\n60, 0.5", {"time_unit": "min", "compliance_unit": "1/MPa"}),
+        ("# rheometer\ncompliance (1/MPa),time\n0.1,0\n0.2,1\n0.5,60", {"time_unit": "min"}),
+        ("time [min], compliance [1/MPa]\n0, 0.1\n1, 0.2\n60, 0.5", {"time_unit": "min"}),
+    ],
+)
+def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows, keys):
+    (tmp_path / "creep.csv").write_text(rows)
+    case = read_one(material={"model": "creep_table", "file": "creep.csv", **keys})
+    listed = read_one(
+        material={"model": "creep_table", "times": [0, 60, 3600], "compliances": [1e-7, 2e-7, 5e-7]},
+    )
+    assert case.material == listed.material == rv.creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7))
+    assert case.key == listed.key, "the content counts, not the path or the units"
+    (tmp_path / "creep.csv").unlink()
+    again = Case.from_json(case.to_json())
+    assert again == case, "a stored case needs its CSV file no longer"
+    assert vary(again, {"material.noise": 0.1}).tables["material"]["noise"] == 0.1
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys"),
+    [
+        ("frequency [Hz], storage [MPa], loss [MPa]\n1, 3, 1\n10, 5, 2", {}),
+        ("storage, frequency, loss\n3, 1, 1\n5, 10, 2", {"modulus_unit": "MPa"}),
+        ("frequency, storage, loss, shift_factor\n2, 3, 1, 0.5\n2, 5, 2, 5", {"modulus_unit": "MPa"}),
+    ],
+)
+def test_dynamic_table__from_a_file(read_one, tmp_path, rows, keys):
+    (tmp_path / "dma.csv").write_text(rows)
+    table = {"model": "dynamic_table", "file": "dma.csv", **keys}
+    material = read_one(material=table | {"frequency_unit": "Hz"}).material
+    assert material == rv.dynamic_table((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
+    if "[Hz]" not in rows:
+        assert read_one(material=table | {"frequency_unit": "rad/s"}).material != material
+
+
+def test_pair__is_varied_within(read_one, tmp_path):
+    (tmp_path / "creep.csv").write_text(f"{HEADING}0, 1\n1, 2")
+    bodies = {"a": {"model": "elastic", "shear_modulus": 1}, "b": {"model": "creep_table", "file": "creep.csv"}}
+    case = read_one(material={"model": "pair", **bodies})
+    assert Case.from_json(case.to_json()).key == case.key
+    changed = vary(case, {"material.a.shear_modulus": "2 Pa"})
+    assert changed.key != case.key
+    assert changed.material == rv.pair(rv.elastic(2.0), rv.creep_table((0, 1), (1, 2)))
+
+
+def test_on__makes_a_layer_and_nests(read_one):
+    coating = rv.elastic(1e9, poisson=0.35)
+    layer = read_one(material=COAT | {"on": ZENER})
+    assert layer.body == rv.layer(coating, 2e-5, on=RUBBER)
+    steel = {"model": "elastic", "shear_modulus": "80 GPa", "poisson": 0.3}
+    nested = read_one(material=COAT | {"on": ZENER | {"thickness": "1 mm", "on": steel}})
+    assert nested.body == rv.layer(coating, 2e-5, on=rv.layer(RUBBER, 1e-3, on=rv.elastic(80e9, poisson=0.3)))
+    assert vary(layer, {"material.thickness": float("inf")}).body == rv.Body(coating)
+    assert vary(layer, {"material.on.shear_modulus": "3e6 Pa"}).key == layer.key
+    assert vary(layer, {"material.on.shear_modulus": "4 MPa"}).key != layer.key
+
+
+def test_on__is_swept(read):
+    sweep = {"material.on.shear_modulus": ["1 MPa", "2 MPa"], "material.thickness": ["10 um", float("inf")]}
+    bases = [one.body.materials[1] for one in read(material=COAT | {"on": ZENER}, sweep=sweep)[::2]]
+    assert [float(base.creep_compliance(0.0)) for base in bases] == pytest.approx([1e-6, 5e-7])
+    assert (unit_of("material.on.shear_modulus"), unit_of("material.on.on.thickness")) == ("Pa", "m")
+
+
+def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(read_one):
+    # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
+    case, warm = read_one(), read_one(material=ZENER | WLF)
+    assert warm.material.times == pytest.approx((0.1 * 10**-0.8,))
+    assert read_one(material=ZENER | {"shift_factor": 10**-0.8}).material.times == pytest.approx(warm.material.times)
+    assert warm.key != case.key
+    arrhenius = read_one(material=ZENER | ARRHENIUS).material
+    assert arrhenius.times == pytest.approx((0.1 * rv.arrhenius(303.15, 293.15, 8e4),))
+    again = Case.from_json(warm.to_json())
+    assert (again.key, again.material) == (warm.key, warm.material)
+    assert read_one(material=ZENER | WLF | {"temperature": "20 degC"}).material == case.material
+    assert read_one(material=ZENER | {"shift_factor": 1}).material == case.material
+
+
+def test_temperature__both_bodies_of_a_pair_or_one(read_one):
+    two = read_one(material={"model": "pair", "a": STIFF, "b": SOFT})
+    both = read_one(material={"model": "pair", "a": STIFF, "b": SOFT, **WLF})
+    one = read_one(material={"model": "pair", "a": STIFF, "b": SOFT | WLF})
+    assert both.material == one.material != two.material
+    assert both.material.fluidity == pytest.approx(two.material.fluidity * 10**0.8)
+
+
+def test_temperature__sweeps_and_its_axis_has_a_unit(read, read_one):
+    sweep = {"material.temperature": ["0 degC", "20 degC", "40 degC"]}
+    law = {"reference_temperature": "20 degC", "activation_energy": "80 kJ/mol"}
+    cold, room, hot = read(material=ZENER | law, sweep=sweep)
+    assert [one.varied["material.temperature"] for one in (cold, room, hot)] == [273.15, 293.15, 313.15]
+    assert cold.material.times > room.material.times > hot.material.times
+    assert room.material == read_one().material
+    assert unit_of("material.temperature") == "K"
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        ({"model": "creep_table", "file": "gone.csv"}, "material.file"),
+        ({"model": "creep_table", "file": "creep.csv", "times": [0, 1]}, "material.file"),
+        ({"model": "creep_table", "times": [0, 1]}, "material.compliances"),
+        ({"model": "creep_table", "file": "creep.csv", "time_unit": "mm"}, "material.file"),
+        ({"model": "creep_table", "file": "falling.csv", "noise": "1 %"}, "material"),
+        ({"model": "dynamic_table", "file": "creep.csv"}, "material.frequency_unit"),
+        ({"model": "power_law", "glassy": 0, "coefficient": 1, "exponent": 1}, "material.exponent"),
+        ({"model": "pair", "a": STIFF | {"shear_modulus": -1}, "b": {"model": "pair"}}, "material.a.shear_modulus"),
+        (COAT | {"on": ZENER, "thickness": None}, "material.thickness"),
+        (COAT | {"on": ZENER, "base": "bonded"}, "material.base"),
+        (COAT | {"on": ZENER | {"model": "zenner"}}, "material.on.model"),
+        (COAT | {"on": ZENER | {"model": "pair"}}, "material.on.shear_modulus"),
+        (COAT | {"on": ZENER | {"thickness": "1 mm"}}, "material.on"),
+        (COAT | {"on": ZENER | {"poisson": -0.2}}, "material.on"),
+        (COAT | {"on": ZENER, "poisson": -0.1}, "material"),
+        (COAT | {"on": ZENER | {"viscosity": "1 Pa s"}}, "material.on.viscosity"),
+        (ZENER | {"temperature": 300}, "material.reference_temperature"),
+        (ZENER | {"wlf_c1": 3}, "material.temperature"),
+        (ZENER | {"temperature": 300, "reference_temperature": 290}, "material.wlf_c1"),
+        (ZENER | WLF | {"wlf_c2": "90 degC"}, "material.wlf_c2"),
+        (ZENER | WLF | {"activation_energy": 8e4}, "material.activation_energy"),
+        (ZENER | WLF | {"temperature": "-75 degC"}, "material.temperature"),
+        (ZENER | ARRHENIUS | {"temperature": 25}, "material.temperature"),
+        (ZENER | ARRHENIUS | {"shift_factor": 2}, "material.shift_factor"),
+        (ZENER | {"shift_factor": -2}, "material.shift_factor"),
+        (ZENER | {"temperatur": 300}, "material.temperatur"),
+    ],
+)
+def test_material__is_refused_at_the_key(read, tmp_path, table, key):
+    (tmp_path / "creep.csv").write_text(f"{HEADING}0, 1\n1, 2")
+    (tmp_path / "falling.csv").write_text(f"{HEADING}0, 2\n1, 1")
+    with refused(key):
+        read(material={name: value for name, value in table.items() if value is not None})
