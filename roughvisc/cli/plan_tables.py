@@ -30,10 +30,12 @@ def plan_tables(costs: xr.Dataset) -> Group:
     total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
     whole = [
         ("Cases", f"{total}, {attrs['processes']} in parallel, threads on large grids: {attrs['threads']} each"),
-        ("Boundary", _distinct(costs["boundary"].values)),
-        ("Memory of the material", _distinct(costs["memory_model"].values)),
+        ("Model", _distinct(costs["model"].values)),
         ("Program", _distinct(costs["note"].values)),
-        ("Grid", _distinct(_grid(costs.isel(case=i)) for i in range(total))),
+        (
+            "Grid",
+            _distinct(f"{x} x {y} cells" for x, y in zip(costs.cells_x.values, costs.cells_y.values, strict=True)),
+        ),
         ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa")),
         ("Contact", _span(100 * costs["contact_fraction"], "", " % of the area")),
         ("Steps per case", _span(costs["steps"], "")),
@@ -61,13 +63,6 @@ def _distinct(texts: Any) -> str:
     """Return the first three distinct texts, and the number of further texts."""
     found = [one for one in dict.fromkeys(str(text).rstrip(".") for text in texts) if one]
     return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
-
-
-def _grid(row: xr.Dataset) -> str:
-    """Return the numbers of cells of a case, and of its solved part."""
-    whole, part = ((int(row[f"{name}cells_x"]), int(row[f"{name}cells_y"])) for name in ("", "solved_"))
-    solved = f", solved on {part[0]} x {part[1]} of them" if part not in ((0, 0), whole) else ""
-    return f"{whole[0]} x {whole[1]} cells{solved}"
 
 
 def _span(values: xr.DataArray, unit: str, after: str = "") -> str:

@@ -11,7 +11,7 @@ import math
 import shutil
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -27,7 +27,7 @@ from scipy.special import erf, erfinv
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Problem, Rows
 from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
-from roughvisc.experiment.loading import Loading, LoadingRows
+from roughvisc.experiment.loading import LoadingRows
 from roughvisc.experiment.resources import (
     PART,
     PROCESS,
@@ -42,7 +42,7 @@ from roughvisc.experiment.resources import (
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.program import Program, Slide
+from roughvisc.mechanics.program import Program
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
@@ -56,12 +56,9 @@ from roughvisc.variables import STEPPED
 
 #: Variable of a plan -> unit and long name.
 COLUMNS = {
-    "boundary": ("", "boundary"),
-    "memory_model": ("", "model of the material's memory"),
+    "model": ("", "boundary, memory of the material, and part of the surface that is solved on"),
     "cells_x": ("1", "cells along x"),
     "cells_y": ("1", "cells along y"),
-    "solved_cells_x": ("1", "cells along x of the part that is solved on"),
-    "solved_cells_y": ("1", "cells along y of the part that is solved on"),
     "steps": ("1", "time steps, or speeds of a friction curve"),
     "rows": ("1", "kept times or speeds"),
     "contact_fraction": ("1", "largest contact fraction, if the case had a coarse run"),
@@ -75,8 +72,6 @@ COLUMNS = {
     "warning": ("", "expected full contact, or contact at the border, which ends a run; empty if none"),
     "refusal": ("", "why it cannot run; empty if it can"),
 }
-#: Columns that count cells.
-_CELLS = ("cells_x", "cells_y", "solved_cells_x", "solved_cells_y")
 #: Longest side of the grid of a coarse run, of a loading and of a friction curve. [cells]
 _COARSE, _COARSE_CURVE = 128, 48
 #: Exponents with which steps, and convolutions of loadings and of friction curves, grow with the number of cells a
@@ -87,10 +82,9 @@ _STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
 _MOST_CONVOLUTIONS, _MOST_STEPS = 2500, 500
 #: Largest number of speeds of a coarse friction curve, spread evenly over the speeds of the case.
 _FEW_SPEEDS = 7
-#: Largest length of a slide on the coarse grid. [cells]
-_MOST_SLID = 32
-#: First step of a hold over the length of the hold. Later steps grow in proportion to the time.
-_FIRST_STEP = 0.005
+#: Steps of a ramp, of a hold and of an eighth of a cycle, for comparison with the steps of a slide, one per cell; first
+#: step of a hold over the length of the hold, after which steps grow in proportion to the time.
+_SEGMENT, _FIRST_STEP = 30.0, 0.005
 #: Iterations of a timed solve.
 _ITERATIONS = 3
 #: Time for the coarse runs of a sweep: this time, or this part of the expected time of all cases. [s, 1]
@@ -103,9 +97,6 @@ _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
 _GRID_ERROR, _COMPARE = 0.3, 3e-7
 #: Time to write a file without fields, and each byte of a field. [s]
 _FILE, _WRITE = 0.05, 3e-9
-#: Surfaces of fewer cells are made a second time, because the first includes imports. For larger surfaces the time of
-#: imports is negligible. [cells]
-_QUICK = 512**2
 #: Contact fraction that counts as full contact.
 _FULL = 0.95
 #: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
@@ -157,21 +148,21 @@ def plan(
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
-    surfaces, runs, rows = dict[str, tuple[xr.DataArray, float]](), dict[int, CoarseRun](), list[dict[str, Any]]()
-    order, began, expected = _spread(len(cases)), time.thread_time(), 0.0
-    for number in order:
+    surfaces, runs, rows = (
+        dict[str, tuple[xr.DataArray, float]](),
+        dict[int, CoarseRun](),
+        [dict[str, Any]()] * len(cases),
+    )
+    began, expected = time.thread_time(), 0.0
+    for number in sorted(range(len(cases)), key=lambda one: f"{one:b}"[::-1]):  # spread over the sweep: 0, 4, 2, 1, 3
         case, is_own = cases[number], not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)
-        row: dict[str, Any] = {name: np.nan if unit else "" for name, (unit, _) in COLUMNS.items()}
-        row |= {"boundary": case.settings.boundary, "marched": is_own} | dict.fromkeys(_CELLS, 0)
-        rows.append(row)
+        row = {name: np.nan if unit else "" for name, (unit, _) in COLUMNS.items()} | {"marched": is_own}
         # surfaces that differ only in their seed have equal costs
         surface = json.dumps({**stated[number]["surface"], "seed": None}, sort_keys=True)
         try:
             if surface not in surfaces:
-                height, ready = case.height(), time.thread_time()
-                if height.size < _QUICK:  # a second time, because the first includes imports
-                    case.height()
-                surfaces[surface] = height, time.thread_time() - ready
+                ready = time.thread_time()
+                surfaces[surface] = case.height(), time.thread_time() - ready
             height, seconds = surfaces[surface]
             ready = time.thread_time()
             problem = Problem(height, case.body, case.settings).resolved(case.experiment)
@@ -180,21 +171,23 @@ def plan(
             if is_own:
                 runs[number] = coarse_run(own, case)
                 expected = len(cases) * float(np.mean([one.seconds for one in runs.values()]))
-            similar = min(runs, key=lambda other: _distance(number, other, parameters))
-            row |= _costs(case, own, runs[similar], seconds, there)
+            differing = {
+                other: (sum(values[other] != values[number] for values in parameters.values()), abs(other - number))
+                for other in runs
+            }
+            row |= _costs(case, own, runs[min(runs, key=differing.__getitem__)], seconds, there)
         except (InputError, ConvergenceError) as error:
             row["refusal"] = str(error)
         if not is_own:
             row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
-    in_order = [rows[place] for place in np.argsort(order)]
-    dataset = xr.Dataset({name: ("case", np.array([row[name] for row in in_order])) for name in COLUMNS})
+        rows[number] = row
+    dataset = xr.Dataset({name: ("case", np.array([rows[i][name] for i in range(len(cases))])) for name in COLUMNS})
     for name, (units, long_name) in COLUMNS.items():
         dataset[name].attrs = {"long_name": long_name} | ({"units": units} if units else {})
     labels = labels_of(parameters, stated[0], ("case",)).values()
     dataset = dataset.assign_coords(case_key=("case", np.array([case.key for case in cases])))
     dataset = dataset.assign_coords(dict(zip(parameters, labels, strict=True)))
-    dataset.attrs = {"title": cases[0].title} | totals(dataset, folder, workers, there)
-    return dataset
+    return dataset.assign_attrs({"title": cases[0].title} | totals(dataset, folder, workers, there))
 
 
 # ------------------------------------------------------------------------------------------------------ the coarse run
@@ -210,9 +203,7 @@ class CoarseRun(NamedTuple):
     kept : float
         Kept part of the steps. [-]
     contact : ndarray
-        Part of the cells in contact, of each kept row and each row in a slide. [-]
-    fraction : float
-        Largest contact fraction. [-]
+        Contact fraction in each kept row and each row in a slide; last the largest of all rows. [-]
     force : float
         Largest force. [N]
     seconds : float
@@ -225,7 +216,6 @@ class CoarseRun(NamedTuple):
     convolutions: float
     kept: float
     contact: NDArray[np.float64]
-    fraction: float
     force: float
     seconds: float
     cells: int
@@ -244,65 +234,61 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         The case.
     """
     settings, experiment = replace(case.settings, fields=(), grid_error=False), case.experiment
-    few, height, share, cells, program = coarse_surface(own), solved(own), 1.0, 0, None
+    few, height, share, program = coarse_surface(own), solved(own), 1.0, None
     if isinstance(own, LoadingRows):
-        program, stated = with_coarse_slides(own.scene.program, spacing(few)), own.scene.program.segments
-        cells = sum(one.slide.cells(spacing(height)) for one in stated if one.slide is not None)
-        settings = replace(settings, edge="accept", missing="absent")
-        if cells:  # shorter slides end the program earlier, perhaps before kept times
-            settings = replace(settings, times=settings.times and len(program.corners))
-        experiment = Loading(program)
+        program, settings = own.scene.program, replace(settings, edge="accept", missing="absent")
     elif isinstance(experiment, SteadySliding):
         speeds = np.sort(experiment.speeds)
         chosen = np.unique(np.linspace(0, speeds.size - 1, min(_FEW_SPEEDS, speeds.size)).astype(int))
         experiment, share = replace(experiment, speeds=speeds[chosen]), chosen.size / speeds.size
 
-    tally, kept, contact = np.zeros((2, 2)), 0, list[float]()  # steps and convolutions, outside of slides and in them
-    fraction = force = before = 0.0
+    still, moving = np.zeros(2), np.zeros(2)  # steps and convolutions, outside of slides and in them
+    kept, contact, largest, force, before = 0, list[float](), 0.0, 0.0, 0.0
     with fft.set_workers(1):
         rows = experiment.rows(Problem(few, case.body, settings))
         began = time.thread_time()
         for row in rows:
-            total, slides = before, False  # inside a pair of steps: its convolutions are counted at its end
+            tally, total = still, before  # inside a pair of steps: its convolutions are counted at its end
             if program is None:
                 total += row.values["convolutions"]
             else:
-                slides = program.segments[max(bisect_left(program.corners, row.at) - 1, 0)].slide is not None
-                total = before if row.state is None else row.state.march.convolutions
-            tally[int(slides)] += 1.0, total - before
+                if program.segments[max(bisect_left(program.corners, row.at) - 1, 0)].slide is not None:
+                    tally = moving
+                if row.state is not None:
+                    total = row.state.march.convolutions
+            tally += 1.0, total - before
             before, kept = total, kept + bool(row.values and row.kept)
             if row.values:
-                fraction = float(np.fmax(fraction, row.values["contact_fraction"]))
-                force = float(np.fmax(force, row.values["force"]))
-                if row.kept or slides:  # corners alone do not represent the kept times of a slide
-                    contact.append(float(np.nan_to_num(row.values["contact_area_counted"])) / nominal_area(few))
-            if program is not None and (total > _MOST_CONVOLUTIONS or tally[:, 0].sum() > _MOST_STEPS):
-                share = _part_done(program, row.at)
-                compliance = case.body.material.contact_compliance
-                now, end = (float(compliance(one)) for one in (row.at, program.duration))
-                if force * now > 0:  # further loading and creep after the end of the coarse run
-                    fraction = scaled_contact(fraction, max(program.largest_load * end / (force * now), 1.0))
+                fraction = float(np.nan_to_num(row.values["contact_fraction"]))
+                largest, force = max(largest, fraction), float(np.fmax(force, row.values["force"]))
+                if row.kept or tally is moving:  # corners alone do not represent the kept times of a slide
                     contact.append(fraction)
+            if program is not None and (total > _MOST_CONVOLUTIONS or still[0] + moving[0] > _MOST_STEPS):
+                share = _part_done(program, row.at, spacing(few))
+                rest = sum(one.duration for one in program.segments if one.slide is None)
+                compliance = case.body.material.contact_compliance
+                now, end = (float(compliance(one)) for one in (min(row.at, rest), rest))
+                if force * now > 0:  # further loading, and creep except in slides
+                    largest = scaled_contact(largest, max(program.largest_load * end / (force * now), 1.0))
                 break
-        seconds = (time.thread_time() - began) / max(before, 1.0)
-        beyond, touching = 0.0, float(np.mean(contact or [0.0]))
+        seconds, beyond = (time.thread_time() - began) / max(before, 1.0), 0.0
         if height.size > few.size:
+            touching = float(np.mean([*contact, largest]))
             beyond = max(timed_convolution(own, touching) - timed_convolution(rows, touching), 0.0)
 
-    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(tally[:, 0].sum(), 1.0)
-    tally[0] /= share
+    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(still[0] + moving[0], 1.0)
+    still, moving = still / share, moving / share
     if isinstance(own, LoadingRows):
         growth = np.array([0.0 if own.scene.time_step else _STEPS_GROW, _WORK_GROWS])
-        tally[1] *= cells / max(tally[1, 0], 1.0)
-        steps, work = (tally[0] * 2.0 ** (octaves * growth) + tally[1]).tolist()
+        steps, work = (still * 2.0 ** (octaves * growth) + moving * 2.0**octaves).tolist()
         dearer = work + steps * (_STEP + _EXPONENTIAL * own.scene.memory.times.size)
     else:
-        steps, work = tally[0, 0], tally[0, 1] * 2 ** (_CURVE_GROWS * octaves)
+        steps, work = still[0], still[1] * 2 ** (_CURVE_GROWS * octaves)
         dearer = work * _CURVE_CONVOLUTION
     slope = rms_slope(height)
-    touched = scaled_contact(fraction, rms_slope(few) / slope) if slope > 0 else fraction
-    scaled = np.array(contact or [0.0]) * (touched / fraction if fraction > 0 else 1.0)
-    return CoarseRun(steps, work, kept_part, scaled, touched, force, work * seconds + dearer * beyond, height.size)
+    touched = scaled_contact(largest, rms_slope(few) / slope) if slope > 0 else largest
+    scaled = np.array([*contact, largest]) * (touched / largest if largest > 0 else 1.0)
+    return CoarseRun(steps, work, kept_part, scaled, force, work * seconds + dearer * beyond, height.size)
 
 
 def scaled_contact(fraction: float, times: float) -> float:
@@ -352,34 +338,20 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
     return height.isel(x=slice(stride // 2, None, stride), y=slice(stride // 2, None, stride))
 
 
-def with_coarse_slides(program: Program, sides: tuple[float, float]) -> Program:
-    """Return the program with the length of slides limited to 1 to `_MOST_SLID` coarse cells, at unchanged speed."""
-    segments = []
-    for segment in program.segments:
-        if segment.slide is not None:
-            side = sides[segment.slide.axis]
-            way = float(np.clip(segment.slide.distance, side, _MOST_SLID * side))
-            duration = segment.duration * way / segment.slide.distance
-            segment = replace(segment, duration=duration, slide=Slide(way, segment.slide.direction))
-        segments.append(segment)
-    return replace(program, segments=tuple(segments))
-
-
-def _part_done(program: Program, now: float) -> float:
-    """Return the part of the steps before a time [s] over all steps of a program, without slides. [-]
-
-    The steps of a hold are shorter at its start, and a cycle has eight ramps per period.
-    """
+def _part_done(program: Program, now: float, sides: tuple[float, float]) -> float:
+    """Return the part of the steps before a time [s] over all steps of a program, on cells with these sides [m]. [-]"""
     done = total = 0.0
     for began, segment in zip(program.corners, program.segments, strict=False):
-        if segment.slide is not None or segment.duration == 0:
+        if segment.duration == 0:
             continue
-        part, weight = min(max(now - began, 0.0) / segment.duration, 1.0), 1.0
-        if segment.amplitude:
-            weight = 8 * segment.duration / segment.period
+        part, steps = min(max(now - began, 0.0) / segment.duration, 1.0), _SEGMENT
+        if segment.slide is not None:
+            steps = segment.slide.distance / sides[segment.slide.axis]
+        elif segment.amplitude:
+            steps *= 8 * segment.duration / segment.period
         elif segment.holds:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
-        done, total = done + part * weight, total + weight
+        done, total = done + part * steps, total + steps
     return max(done / total, 1e-6) if total else 1.0
 
 
@@ -434,40 +406,51 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         Available memory.
     """
     whole, height, settings = own.problem.height, solved(own), case.settings
-    (nx, ny), part, force, note = whole.shape, height.size / whole.size, run.force, ""
-    kind, model, area, rows = "curve", "steady sliding", nominal_area(whole), run.steps
+    part, force, rows = height.size / whole.size, run.force, run.steps
+    kind, model, area, note = "curve", "steady sliding", nominal_area(whole), ""
     arrays: Callable[[float], float] = partial(curve_bytes, settings)
     if isinstance(own, LoadingRows):
         scene, program, model, area = own.scene, own.scene.program, own.choice.note, own.area
         kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.program.note
         rows = run.kept * run.steps if scene.kept is None else float(len(scene.kept))
-        touching = float(run.contact.max())
-        arrays = partial(march_bytes, settings, scene.memory, contact=touching, rows=rows, part=part)
+        arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), rows=rows, part=part)
 
     def needed(cells: float) -> float:
         return PROCESS + arrays(cells)
 
+    model = f"{settings.boundary}, {model}"
+    if part < 1:
+        model += ", solved on {} x {} cells".format(*height.shape)
     if late := case.late_times:
         texts, end = ", ".join(unit_for(late, "s").text(one) for one in late), case.program.duration
         note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
     seconds += run.seconds * _work(height.size) / _work(run.cells)
     if own.problem.settings.grid_error:
-        seconds += _GRID_ERROR * seconds + (rows * whole.size * _COMPARE if isinstance(own, LoadingRows) else 0.0)
-    memory = needed(whole.size)
+        seconds += _GRID_ERROR * seconds + (rows * whole.size * _COMPARE if kind != "curve" else 0.0)
+    fraction, warning = float(run.contact[-1]) * part, ""
+    if isinstance(own, LoadingRows) and own.reaches_border:
+        warning = (
+            "Contact is expected to reach the border of the free-space domain of {} x {} cells, which ends a run: use "
+            "boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = 'accept' to "
+            "treat the scan outline as a punch."
+        ).format(*own.scene.gap.shape)
+    elif fraction >= _FULL:
+        warning = f"Full contact is expected: {100 * fraction:.0f} % of the area."
     return {
-        "memory_model": model,
-        **dict(zip(_CELLS, (nx, ny, *height.shape), strict=True)),
+        "model": model,
+        "cells_x": whole.shape[0],
+        "cells_y": whole.shape[1],
         "steps": run.steps,
         "rows": rows,
-        "contact_fraction": run.fraction * part,
+        "contact_fraction": fraction,
         "nominal_pressure": force / area,
         "convolutions": run.convolutions,
         "wall_time": seconds + _FILE + rows * whole.size * 8 * len(settings.fields) * _WRITE,
-        "memory": memory,
+        "memory": needed(whole.size),
         "disk": _VARIABLES[kind] + disk(case, whole.size, rows, run.steps, part * float(run.contact.mean())),
         "note": note.strip(),
-        "warning": _warning(own, run.fraction * part),
-        "refusal": too_large((nx, ny), needed, there),
+        "warning": warning,
+        "refusal": too_large(whole.shape, needed, there),
     }
 
 
@@ -494,39 +477,9 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
 
 
-def _warning(own: Rows, fraction: float) -> str:
-    """Return the warning of expected full contact, or of contact at the border; empty if none is expected."""
-    if isinstance(own, LoadingRows) and own.reaches_border:
-        rows, columns = own.scene.gap.shape
-        return (
-            f"Contact is expected to reach the border of the free-space domain of {rows} x {columns} cells, which ends "
-            "a run: use boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = "
-            "'accept' to treat the scan outline as a punch."
-        )
-    return f"Full contact is expected: {100 * fraction:.0f} % of the area." if fraction >= _FULL else ""
-
-
 def _work(cells: float) -> float:
     """Return the work of a transform, in an arbitrary unit."""
     return cells * math.log2(cells + 2)
-
-
-# -------------------------------------------------------------------------------------------------------------- sweeps
-
-
-def _spread(count: int) -> list[int]:
-    """Return the integers below a count in an order that spreads them: both ends, then halves, quarters and so on."""
-    order = dict.fromkeys([0, count - 1])
-    pieces = 2
-    while len(order) < count:
-        order |= dict.fromkeys(i * (count - 1) // pieces for i in range(1, pieces))
-        pieces *= 2
-    return list(order)
-
-
-def _distance(number: int, other: int, parameters: Mapping[str, Any]) -> tuple[int, int]:
-    """Return the number of different parameters of two cases, and the difference of their numbers in the sweep."""
-    return sum(values[other] != values[number] for values in parameters.values()), abs(other - number)
 
 
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:
@@ -535,11 +488,9 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    processes = min(workers or cores(), total)
-    if workers is None:
-        processes = processes_that_fit(largest, processes, there.size)
-    together = float(np.sum(largest[:processes]))
-    size = float(np.nansum(dataset["disk"].values))
+    processes = workers or processes_that_fit(largest, cores(), there.size)
+    processes = min(processes, total)
+    together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]
     several = f"{len(refusals)} of {total} cases: " if total > 1 else ""
     reasons = [several + "; ".join([*dict.fromkeys(refusals)][:3])] if refusals else []
@@ -547,14 +498,12 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
         needed = f"{processes} processes need {amount(together)} of memory, and {amount(there.size)} are {there.words}"
         reasons.append(f"{needed}: use --workers {processes_that_fit(largest, processes, there.size)}")
     if size > PART * free_disk:
-        reasons.append(
-            f"the results need {size:.3g} bytes of disk, {free_disk:.3g} are free in {place}: keep fewer times or "
-            "fields, or use another folder"
-        )
+        needed = f"the results need {amount(size)} of disk, and {amount(free_disk)} are free in {place}"
+        reasons.append(f"{needed}: keep fewer times or fields, or use another folder")
     return {
         "processes": processes,
         "threads": threads_each(processes),
-        "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds, initial=0.0))),
+        "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds))),
         "memory": together,
         "free_memory": there.size,
         "disk": size,
