@@ -75,9 +75,8 @@ def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) 
     InputError
         If a number is not positive and finite.
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("viscosity", viscosity, "Pa s")
-    return Prony(1 / shear_modulus, fluidity=1 / viscosity, poisson=poisson)
+    glassy = 1 / check_number("shear_modulus", shear_modulus, "Pa")
+    return Prony(glassy, 1 / check_number("viscosity", viscosity, "Pa s"), poisson=poisson)
 
 
 @quantities(shear_modulus="Pa", viscosity="Pa s")
@@ -102,9 +101,8 @@ def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 
     InputError
         If a number is not positive and finite.
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("viscosity", viscosity, "Pa s")
-    return Prony(0.0, 0.0, (1 / shear_modulus,), (viscosity / shear_modulus,), poisson)
+    retarded = 1 / check_number("shear_modulus", shear_modulus, "Pa")
+    return Prony(0.0, 0.0, (retarded,), (check_number("viscosity", viscosity, "Pa s") / shear_modulus,), poisson)
 
 
 @quantities(shear_modulus="Pa", kelvin_modulus="Pa", kelvin_viscosity="Pa s")
@@ -138,10 +136,10 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     >>> zener("4 MPa", "2 MPa", "0.1 MPa s")
     Prony(glassy=2.5e-07, fluidity=0.0, compliances=(5e-07,), times=(0.05,), poisson=0.5)
     """
-    check_number("shear_modulus", shear_modulus, "Pa")
-    check_number("kelvin_modulus", kelvin_modulus, "Pa")
-    check_number("kelvin_viscosity", kelvin_viscosity, "Pa s")
-    return Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,), poisson)
+    glassy = 1 / check_number("shear_modulus", shear_modulus, "Pa")
+    retarded = 1 / check_number("kelvin_modulus", kelvin_modulus, "Pa")
+    time = check_number("kelvin_viscosity", kelvin_viscosity, "Pa s") / kelvin_modulus
+    return Prony(glassy, 0.0, (retarded,), (time,), poisson)
 
 
 #: Function of each model of a material that a study may name; its arguments are the keys of the table.

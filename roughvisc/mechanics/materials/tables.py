@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -108,7 +107,7 @@ def creep_table(
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau, misfit = _Rows(columns, rows, measured, measured - glassy, measured).fitted(*_CREEP)
+    weights, tau, misfit = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
     note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
@@ -168,8 +167,8 @@ def relaxation_table(
     def columns(theta: Array) -> Array:
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
-    rows = _Rows(columns, t[later], shear[later], shear, shear)
-    return _relaxing(rows, poisson, t.size, f"times {t[0]:g} to {t[-1]:g} s", "relaxation")
+    fit = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
+    return _relaxing(fit, poisson, t.size, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -245,70 +244,68 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    rows = _Rows(columns, 1 / omega, size, target, scale)
-    return _relaxing(rows, poisson, omega.size, f"frequencies {omega.min():g} to {omega.max():g} rad/s", "dynamic")
+    fit = _fitted(columns, 1 / omega, size, target, scale, _MODULI)
+    span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
+    return _relaxing(fit, poisson, omega.size, span, _gap("dynamic", np.unique(1 / omega)))
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Rows of a table and the terms that may be fitted to them.
+def _fitted(
+    columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, most: tuple[float, float]
+) -> tuple[Array, Array, Array]:
+    """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows of a table.
 
-    Attributes
+    Parameters
     ----------
     columns : callable
-        Function of the times of the terms; the first of its columns has no time. It is fitted to `target`, relative to
-        `scale`.
+        Function of the times of the terms; the first of its columns has no time.
     at, course : ndarray
         Times of the measurements [s] and their values, by which the size of a term is judged.
     target, scale : ndarray
+        Target of the sum of the columns, and scale of the misfit of each row.
+    most : tuple of float
+        See :data:`_MODULI`.
+
+    Notes
+    -----
+    The fit with the fewest terms among those with about the smallest misfit. If the rows are too few to determine the
+    spectrum, neighbouring terms are fitted to differ little.
     """
-
-    columns: Callable[[Array], Array]
-    at: Array
-    course: Array
-    target: Array
-    scale: Array
-
-    def fitted(self, faster: float, accurate: float) -> tuple[Array, Array, Array]:
-        """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows.
-
-        Notes
-        -----
-        The fit with the fewest terms among those with about the smallest misfit; see :data:`_MODULI` for the arguments.
-        If the rows are too few to determine the spectrum, neighbouring terms are fitted to differ little.
-        """
-        order = np.argsort(self.at)
-        at, course = self.at[order], self.course[order]
-        fits = []
-        sparse = self.target.size - 1 < _FEW * np.log10(at[-1] / at[0])
-        for per_decade in (_SMOOTH,) if sparse else _OFFERED:
-            times = lattice(float(at[0]) / faster, float(at[-1]) * _SLOWER, per_decade)
-            rows, wanted = self.columns(times) / self.scale[:, None], self.target / self.scale
-            if sparse:
-                sizes = np.interp(np.log(times), np.log(at), course)
-                smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
-                rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
-            weights = nonnegative(rows, wanted, np.ones(len(rows)))
-            misfit = (self.columns(times) @ weights - self.target) / self.scale
-            used = np.flatnonzero(weights[1:])
-            rms = float(np.sqrt(np.mean(misfit**2)))
-            fits.append((rms, np.append(weights[0], weights[1:][used]), times[used], misfit))
-        enough = max(_FEWER * min(fit[0] for fit in fits), accurate)
-        return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
+    order = np.argsort(at)
+    at, course = at[order], course[order]
+    fits = []
+    sparse = target.size - 1 < _FEW * np.log10(at[-1] / at[0])
+    for per_decade in (_SMOOTH,) if sparse else _OFFERED:
+        times = lattice(float(at[0]) / most[0], float(at[-1]) * _SLOWER, per_decade)
+        rows, wanted = columns(times) / scale[:, None], target / scale
+        if sparse:
+            sizes = np.interp(np.log(times), np.log(at), course)
+            smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
+            rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
+        weights = nonnegative(rows, wanted, np.ones(len(rows)))
+        misfit = (columns(times) @ weights - target) / scale
+        used = np.flatnonzero(weights[1:])
+        fits.append((_rms(misfit), np.append(weights[0], weights[1:][used]), times[used], misfit))
+    enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
+    return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
 
 
-def _relaxing(table: _Rows, poisson: float, rows: int, span: str, kind: str) -> Prony:
-    """Return the material of a table of moduli, with a note of the last three arguments."""
-    weights, theta, misfit = table.fitted(*_MODULI)
-    note = "; ".join(filter(None, (_note(theta.size + 1, rows, misfit, span), _gap(kind, np.unique(table.at)))))
+def _relaxing(fit: tuple[Array, Array, Array], poisson: float, rows: int, span: str, warning: str) -> Prony:
+    """Return the material of a fit to a table of moduli."""
+    weights, theta, misfit = fit
     found = relaxation_series(float(weights[0]), weights[1:].tolist(), theta.tolist())
-    return dataclasses.replace(found, poisson=poisson, note=note)
+    note = _note(theta.size + 1, rows, misfit, span)
+    return dataclasses.replace(found, poisson=poisson, note=note, warning=warning)
+
+
+def _rms(misfit: Array) -> float:
+    return float(np.sqrt(np.mean(misfit**2)))
 
 
 def _note(terms: int, rows: int, misfit: Array, span: str) -> str:
-    rms = float(np.sqrt(np.mean(misfit**2)))
     largest = np.abs(misfit).max()
-    return f"{terms} terms fitted to {rows} rows, largest misfit {largest:.2g}, rms {rms:.2g} (relative), {span}"
+    return (
+        f"{terms} terms fitted to {rows} rows, largest misfit {largest:.2g}, rms {_rms(misfit):.2g} (relative), {span}"
+    )
 
 
 def _gap(kind: str, times: Array) -> str:
