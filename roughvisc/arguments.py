@@ -174,8 +174,11 @@ def a_table(where: str, value: Any) -> dict[str, Any]:
 
 def split(table: Mapping[str, Any], *names: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the entries of a table under some keys, and all others."""
-    chosen = {key: value for key, value in table.items() if key in names}
-    return chosen, {key: value for key, value in table.items() if key not in names}
+    chosen: dict[str, Any] = {}
+    rest: dict[str, Any] = {}
+    for key, value in table.items():
+        (chosen if key in names else rest)[key] = value
+    return chosen, rest
 
 
 def located(error: InputError, where: str) -> InputError:

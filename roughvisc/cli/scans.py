@@ -156,8 +156,7 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
       roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
     from roughvisc.cli.tables import findings_table
-    from roughvisc.study.first_pressure import first_pressure
-    from roughvisc.study.first_study import starter_study
+    from roughvisc.study.first_study import first_pressure, starter_study
     from roughvisc.study.storage.folder import write_text
     from roughvisc.topography.example import EXAMPLE
     from roughvisc.units import number

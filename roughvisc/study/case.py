@@ -284,7 +284,7 @@ def read_cases(path: str | Path) -> list[Case]:
         raise InputError(f"{path}: does not exist: expected a study file (TOML)")
     data = read_toml(path, "valid TOML")
     try:
-        changes = sweep_changes(data.pop("sweep", {}), data, path.parent)
+        changes = sweep_changes(data.pop("sweep"), data, path.parent) if "sweep" in data else [({}, {})]
     except InputError as error:
         raise error.prefixed(str(path)) from error
     cases = []

@@ -136,11 +136,11 @@ def default_of(key: str, case: Mapping[str, Any]) -> Any:
     table, _, name = key.partition(".")
     if table == "surface" and name in STEPS:
         return False
-    functions = {
-        "surface": RECIPES.get(case["surface"].get("generate")),
-        "material": MODELS.get(case["material"]["model"]),
+    functions: dict[str, Callable[..., Any]] = {
+        "surface": RECIPES.get(case["surface"].get("generate"), open_scan),
+        "material": MODELS[case["material"]["model"]],
         "friction": SteadySliding,
     }
-    function = Settings if name in arguments(Settings) else functions.get(table)
-    default = arguments(function)[name][1] if function and name in arguments(function) else None
+    function = Settings if name in arguments(Settings) else functions.get(table, Settings)
+    _, default = arguments(function).get(name, (None, None))
     return None if default is Parameter.empty else default

@@ -6,8 +6,8 @@ import pytest
 import roughvisc as rv
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.study import first_pressure as first_module
-from roughvisc.study.first_pressure import first_pressure
+from roughvisc.study import first_study as first_module
+from roughvisc.study.first_study import first_pressure
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.inspection import inspect
 
