@@ -13,6 +13,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.labels import ISSUED, warnings_of
 from roughvisc.mechanics.body import Body, body_of
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
@@ -236,9 +237,8 @@ def _stated(numerics: Numerics) -> dict[str, Any]:
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
     """Issue a Python warning for missed tolerances, unsolved speeds and sparse tables, and return the result."""
-    for line in dataset.attrs.get("warnings", "").splitlines():
-        subject, _, text = line.partition(": ")
-        if subject in ("tolerance", "speeds", "material"):
+    for subject, text in warnings_of(dataset.attrs).items():
+        if subject in ISSUED:
             warnings.warn(text, UserWarning, level)
     return dataset
 

@@ -25,6 +25,8 @@ _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
 #: Group of the steps in a result's file, and its title.
 STEPS, TITLE = "steps", "histories of every accepted step"
 _CARRIED = "roughvisc_steps"
+#: Subjects of the warnings that :func:`roughvisc.simulate` and others issue as Python warnings; the others are logged.
+ISSUED = ("tolerance", "speeds", "material")
 
 
 def heading(name: str, unit: str) -> str:

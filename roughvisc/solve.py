@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +20,7 @@ from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
-from roughvisc.labels import TITLE, label, with_steps
+from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
@@ -156,34 +155,21 @@ def solve(
                 doing = "pressing" if experiment.axis == "time" else "sliding"
                 report = bar.enter_context(reporting(True, doing, at=experiment.progress))
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
+        for subject, text in warnings_of(dataset.attrs).items():
+            if subject not in (*ISSUED, "accuracy"):
+                log.warning("%s", text)
         if settings.grid_error and isinstance(experiment, Loading):
             # coarser grids may have another area: convert nominal pressures to loads on the given area
             loads = Loading(experiment.program.on_area(nominal_area(height)))
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
-                with _without_log():
-                    found = solve_on_grid(coarse, loads, Recorder())
+                found = solve_on_grid(coarse, loads, Recorder())
                 apart = np.abs(found["time"].values[:, None] - times)  # in a slide times differ by half a coarser cell
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
     return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
-
-
-@contextmanager
-def _without_log() -> Iterator[None]:
-    """Drop the log messages of this thread: a solve on a coarser grid repeats the warnings of the first solve."""
-    here = threading.get_ident()
-
-    def is_of_another_thread(record: logging.LogRecord) -> bool:
-        return record.thread != here
-
-    log.addFilter(is_of_another_thread)
-    try:
-        yield
-    finally:
-        log.removeFilter(is_of_another_thread)
 
 
 def solve_on_grid(

@@ -302,7 +302,7 @@ class LoadingRows(Rows):
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result with the cost of each row, the nominal pressure and the attributes.
 
-        The attributes state the memory model, numbers for an audit, and warnings, which are logged too.
+        The attributes state the memory model, numbers for an audit, and warnings.
         """
         scene, choice, body = self.scene, self.choice, self.problem.body
         dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
@@ -311,9 +311,6 @@ class LoadingRows(Rows):
         warnings = loading_warnings(
             scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border
         )
-        for subject, text in warnings.items():
-            if text and subject not in ("accuracy", "tolerance", "material"):
-                log.warning("%s", text)
         attributes = body.facts(self.end) | {"time_scale": scene.program.time_scale}
         if body.separates:  # of the series that was solved; for layers the values of the top layer remain
             attributes["compliance_at_once"] = scene.memory.compliance(0.0)

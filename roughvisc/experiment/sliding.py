@@ -288,7 +288,7 @@ class SlidingRows(Rows):
         return row, fields
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result with the direction, numbers for an audit, and warnings, which are logged too."""
+        """Return the result with the direction, numbers for an audit, and warnings."""
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         longest = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
@@ -297,8 +297,6 @@ class SlidingRows(Rows):
             "border": border_warning(height, xr.Dataset()),
             "wake": wake_warning(left, self._grids[0].period),
         }
-        for note in filter(None, warnings.values()):
-            log.warning("%s", note)
         stated = {"speeds": speeds_warning(dataset), "material": table_warning(self._body.materials)}
         attributes = self.problem.body.facts(longest / min(self._curve.speeds))
         attributes |= {"time_scale": math.inf, "direction": self._curve.direction}
