@@ -163,8 +163,9 @@ def test_index__is_not_seen_in_heights(tmp_path):
 # -- numbers for missing points, and scales ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [-9999.0, 32767.0, -1e6, 1.7e38])
-@pytest.mark.parametrize("kind", ["csv", "npy", "x3p"])
+@pytest.mark.parametrize(
+    ("number", "kind"), [(-9999.0, "csv"), (32767.0, "x3p"), (-1e6, "csv"), (-1.8e302, "npy"), (np.inf, "npy")]
+)
 def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
     z = ROUGH.copy()
     z[3:5, 4:9] = number
@@ -180,9 +181,10 @@ def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
     with pytest.warns(UserWarning, match=f"10 points have the height {number:g}".replace("+", r"\+")):
         h = open_scan(path, **options)
     np.testing.assert_allclose(h, 1e-6 * np.where(z == number, np.nan, z).T, rtol=1e-12)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
+    if np.isfinite(number):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
 
 
 def test_no_data__is_not_seen_in_flat_tops_and_pits(tmp_path):

@@ -2,8 +2,6 @@
 
 import random
 import re
-import resource
-import sys
 import zipfile
 
 import numpy as np
@@ -26,19 +24,6 @@ def write_xyz(path, heights=None, shuffled=True):
         random.Random(3).shuffle(lines)
     path.write_text("\n".join(lines) + "\n")
     return path
-
-
-def rewritten(source, target, pattern, replacement):
-    """An X3P archive whose main.xml is changed."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            content = old.read(name)
-            if name == "main.xml":
-                changed = re.sub(pattern, replacement, content, count=1, flags=re.DOTALL)
-                assert changed != content
-                content = changed
-            new.writestr(name, content)
-    return target
 
 
 # -- separated values, heights of metres -----------------------------------------------------------------------------
@@ -207,7 +192,12 @@ def test_matrix__of_which_a_row_is_missing_as_a_whole_keeps_it(tmp_path):
 
 def test_axes__on_no_regular_grid_are_refused(tmp_path):
     good = write_x3p(tmp_path / "good.x3p")
-    refusal(rewritten(good, tmp_path / "bad.x3p", rb"(<CX>.*?<AxisType>)I", rb"\1A"))
+    with zipfile.ZipFile(good) as old, zipfile.ZipFile(tmp_path / "bad.x3p", "w") as new:
+        for name in old.namelist():
+            content = re.sub(rb"(<CX>.*?<AxisType>)I", rb"\1A", old.read(name), flags=re.DOTALL)
+            places = np.geomspace(1e-6, 1e-5, 117).tobytes() if name.endswith("data.bin") else b""
+            new.writestr(name, places + content)
+    assert "absolute axes" in refusal(tmp_path / "bad.x3p")
 
 
 @pytest.mark.parametrize("width", [2.0, 1e3])
@@ -226,57 +216,33 @@ def test_too_wide__is_refused_and_spacing_mends_it(kind, width, tmp_path):
 # -- profiles, damage -------------------------------------------------------------------------------------------------
 
 
-def write_sdf_text(path):
-    return write_sdf(path, format=pytest.importorskip("sdfio").FileFormat.ASCII)
-
-
-def write_nc(path):
-    from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", encoding={"height": {"zlib": True}})
+def write_nc(path, h=None, **options):
+    h = from_array(tilted(), CELL) if h is None else h
+    h.to_netcdf(path, engine="netcdf4", **options)
     return path
 
 
-def write_nc3(path):
-    from_array(tilted(), CELL).to_netcdf(path, engine="netcdf4", format="NETCDF3_CLASSIC")
-    return path
+PROFILES = {
+    "x3p": lambda path: pytest.importorskip("x3pio").write(path, tilted()[:, 0], x_scale=1e-6),
+    "sdf": lambda path: write_sdf(path, tilted()[:, :1]),
+    "txt": lambda path: path.write_text("0 1\n1 2\n2 5\n3 2\n"),
+    "nc": lambda path: write_nc(path, from_array(tilted(), CELL).isel(y=[0])),
+}
 
 
-def write_npy(path):
-    np.save(path, tilted())
-    return path
-
-
-def write_x3p_profile(path):
-    pytest.importorskip("x3pio").write(path, tilted()[:, 0], x_scale=1e-6)
-    return path
-
-
-def write_sdf_profile(path):
-    return write_sdf(path, tilted()[:, :1])
-
-
-def write_text_profile(path):
-    path.write_text("0 1\n1 2\n2 5\n3 2\n")
-    return path
-
-
-def write_nc_profile(path):
-    from_array(tilted(), CELL).isel(y=[0]).to_netcdf(path)
-    return path
-
-
-@pytest.mark.parametrize("write", [write_x3p_profile, write_sdf_profile, write_text_profile, write_nc_profile])
-def test_profile__is_refused(write, tmp_path):
-    suffix = {"text": "txt"}.get(write.__name__.split("_")[1], write.__name__.split("_")[1])
-    refusal(write(tmp_path / f"profile.{suffix}"), **({"unit": "um"} if suffix == "txt" else {}))
+@pytest.mark.parametrize("kind", PROFILES)
+def test_profile__is_refused(kind, tmp_path):
+    PROFILES[kind](tmp_path / f"profile.{kind}")
+    refusal(tmp_path / f"profile.{kind}", **({"unit": "um"} if kind == "txt" else {}))
 
 
 WRITERS = {
     "x3p": write_x3p,
     "sdf": write_sdf,
-    "sdf text": write_sdf_text,
-    "nc": write_nc,
-    "nc classic": write_nc3,
-    "npy": write_npy,
+    "sdf text": lambda path: write_sdf(path, format=pytest.importorskip("sdfio").FileFormat.ASCII),
+    "nc": lambda path: write_nc(path, encoding={"height": {"zlib": True}}),
+    "nc classic": lambda path: write_nc(path, format="NETCDF3_CLASSIC"),
+    "npy": lambda path: np.save(path, tilted()),
     "txt": write_text,
     "asc": write_text,
     "xyz": write_xyz,
@@ -287,50 +253,9 @@ OPTIONS = {"npy": {"unit": "m", "spacing": CELL}, "xyz": {"unit": "m"}, "csv": {
 
 @pytest.mark.parametrize("kind", WRITERS)
 def test_damaged_file__gives_heights_or_is_refused(kind, tmp_path):
-    path = WRITERS[kind](tmp_path / f"scan.{kind.split()[0]}")
+    path = tmp_path / f"scan.{kind.split()[0]}"
+    WRITERS[kind](path)
     survive(path, path.read_bytes(), **OPTIONS.get(kind, {}))
-
-
-def forged_x3p(tmp_path):
-    return rewritten(write_x3p(tmp_path / "good.x3p"), tmp_path / "forged.x3p", rb"<SizeY>9<", rb"<SizeY>900000000<")
-
-
-def forged_sdf(tmp_path):
-    sdfio = pytest.importorskip("sdfio")
-    path = write_sdf(tmp_path / "forged.sdf", format=sdfio.FileFormat.ASCII)
-    content = path.read_bytes()
-    changed = re.sub(
-        rb"(NumPoints\s*=\s*)13", rb"\g<1>60000", re.sub(rb"(NumProfiles\s*=\s*)9", rb"\g<1>60000", content)
-    )
-    assert changed != content
-    path.write_bytes(changed)
-    return path
-
-
-def forged_nc(tmp_path):
-    """A variable of which nothing was written: a file of 10 kB that claims 80 GB."""
-    netcdf4 = pytest.importorskip("netCDF4")
-    with netcdf4.Dataset(tmp_path / "forged.nc", "w") as file:
-        for axis in "xy":
-            file.createDimension(axis, 100_000)
-        variable = file.createVariable("height", "f8", ("x", "y"), chunksizes=(1000, 1000), zlib=True)
-        variable.units = "m"
-    return tmp_path / "forged.nc"
-
-
-def forged_npy(tmp_path):
-    path = write_npy(tmp_path / "forged.npy")
-    path.write_bytes(path.read_bytes().replace(b"(13, 9), }" + b" " * 12, b"(9999999, 9999999), } "))
-    return path
-
-
-@pytest.mark.parametrize("forge", [forged_x3p, forged_sdf, forged_nc, forged_npy])
-def test_forged_header__allocates_nothing(forge, tmp_path):
-    path = forge(tmp_path)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    refusal(path, **{"forged.nc": {"spacing": CELL}, "forged.npy": OPTIONS["npy"]}.get(path.name, {}))
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    assert grown * (1 if sys.platform == "darwin" else 1024) < 3e8
 
 
 # -- Zarr --------------------------------------------------------------------------------------------------------------

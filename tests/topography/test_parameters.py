@@ -42,17 +42,6 @@ def test_parameters__of_waves_are_the_closed_forms(waves):
     assert float(found["Sdr"]) == pytest.approx(slope**2 / 2, rel=0.01)  # small slopes
 
 
-@pytest.mark.parametrize("name", ["Sdq", "rms_curvature"])
-def test_parameters__differences_converge_at_second_order(name):
-    q = 2 * np.pi / 1e-4
-    exact = {"Sdq": 1e-6 * q / np.sqrt(2), "rms_curvature": 1e-6 * q**2 / 2}[name]
-    errors = [
-        abs(float(parameters(wavy(1e-6, 1e-4, SIZE, (3 * n, 2 * n + 2)), periodic=True)[name]) / exact - 1)
-        for n in (25, 51)
-    ]
-    assert np.log(errors[0] / errors[1]) / np.log(51 / 25) == pytest.approx(2, abs=0.1)
-
-
 def test_rms_slope__of_what_is_near_the_highest_point():
     """A roof of slope 0.1 on walls of slope 2, at the top of a plane."""
     x = np.arange(40) * 1.0
@@ -120,14 +109,6 @@ def test_psd__is_the_two_dimensional_density():
     assert float((spectrum["psd"] * spectrum["modes"]).sum() / (ring["psd"] * ring["modes"])) == pytest.approx(
         1, rel=1e-9
     )
-
-
-def test_psd__agrees_with_surface_topography():
-    spectrum = psd(ROUGH)
-    step = 2 * np.pi / min(SIZE)
-    edges = (np.arange(1, 12) + 0.5) * step
-    _, expected = theirs(ROUGH, True).power_spectrum_from_area(collocation=edges)
-    np.testing.assert_allclose(spectrum["psd"][1:11], expected, rtol=1e-9, atol=1e-40)
 
 
 def test_psd__window_keeps_the_level_of_noise_and_stops_leakage():

@@ -143,21 +143,6 @@ def test_refusal__all_points_are_missing(tmp_path):
     assert "all 117 points are missing" in refusal(tmp_path / "scan.nc")
 
 
-@pytest.mark.parametrize("number", [1.8e302, -3.4e38, np.inf])
-def test_heights__that_are_none_are_missing_if_many_and_refused_if_few(number, tmp_path):
-    many, few = (np.where(tilted() > limit, number, tilted()) for limit in (1.2e-5, 1.35e-5))
-    missing = int((np.isnan(tilted()) | (tilted() > 1.2e-5)).sum())
-    from_array(tilted(), CELL).copy(data=many).to_netcdf(tmp_path / "many.nc")
-    with pytest.warns(UserWarning, match="points have the height"):
-        assert int(np.isnan(open_scan(tmp_path / "many.nc")).sum()) == missing
-    if np.isfinite(number):
-        assert int(np.isnan(open_scan(tmp_path / "many.nc", no_data=number)).sum()) == missing
-    from_array(tilted(), CELL).copy(data=few).to_netcdf(tmp_path / "few.nc")
-    assert "no_data" in refusal(tmp_path / "few.nc")
-    with pytest.raises(InputError):
-        from_array(many, CELL)
-
-
 def test_supported_formats__names_those_of_all_libraries():
     formats = supported_formats()
     assert {"x3p", "sdf", "nc", "card", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(formats)
