@@ -90,15 +90,6 @@ def _error(source: xr.Dataset) -> str:
     return shown if shown == "0" else {1: "+", -1: "-"}.get(side, "±") + shown
 
 
-#: Headings of quantities that differ from their names.
-_HEADINGS = {
-    "leak_rate": "leak",
-    "thermal_conductance": "conductance",
-    "incremental_stiffness": "stiffness",
-    "friction_coefficient": "friction",
-    "contact_area": "area",
-    "mean_gap": "gap",
-}
 #: Number of error columns that fit into 80 characters.
 _COLUMNS = 4
 
@@ -119,40 +110,34 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column()
     table.add_column("setting", min_width=18)
-    for heading in ("time", "transf.", *(_HEADINGS.get(name, name) for name in shown)):
+    for heading in ("time", "transf.", *(name.replace("_", "\n") for name in shown)):
         table.add_column(heading, justify="right", no_wrap=True)
     best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
-    for i in np.flatnonzero(np.isfinite(dataset["run_time"])):
+    for i in np.flatnonzero(dataset["note"] == ""):
         row = dataset.isel(setting=i)
-        errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         mark = (">" if i == chosen else "") + ("*" if best[i] else "")
         spent, transforms = f"{float(row['run_time']):.2g} s", f"{float(row['transforms']):.0f}"
+        errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
         table.add_row(mark, name, spent, transforms, *errors, style="bold" if i == chosen else "")
     words, wanted = VARIABLES[quantity].label.lower(), f"{_percent(target)} %"
-    marks = f"* Pareto-optimal for {words}. > Cheapest for {wanted}."
-    parts = [table, Text(f"Errors in %, worst of all {dataset.attrs['rows']}. {marks}", style="italic"), Text()]
-    parts += [
-        Text(f"Not run: {name}: {why}")
-        for name, why in zip(dataset["setting"].values, dataset["note"].values, strict=True)
-        if why
-    ]
-    unsure = (float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity)) for part in ("time", "grid"))
-    by_steps, by_grid = (f"{_percent(one)} %" if np.isfinite(one) else "unknown" for one in unsure)
-    reference = f"Reference: {dataset.attrs['reference']}. Its error of the {words}: by steps {by_steps}"
-    if dataset.attrs["grid_is_data"]:
-        parts += [Text(f"{reference}."), Text(f"By the spacing of the points of the scan: {by_grid}.")]
-    else:
-        parts.append(Text(f"{reference}, by the grid {by_grid}."))
+    lines = ["", f"Errors in %, worst of all {dataset.attrs['rows']}."]
+    lines.append(f"* Pareto-optimal for {words}. > Cheapest for {wanted}.")
+    lines += [f"Not run: {name}: {why}" for name, why in np.c_[dataset["setting"], dataset["note"]] if why]
+    by_steps, by_grid = (
+        _percent(float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity))) for part in ("time", "grid")
+    )
+    grid = "spacing of the points of the scan" if dataset.attrs["grid_is_data"] else "grid"
+    lines.append(f"Reference: {dataset.attrs['reference']}.")
+    lines.append(f"Its error of the {words}: {by_steps} % by steps, {by_grid} % by the {grid}.")
     if chosen is None:
-        parts.append(Text(f"No setting is known to have an error of at most {wanted}."))
+        lines.append(f"No setting is known to have an error of at most {wanted}.")
     else:
-        parts.append(Text(f"For {wanted} on {words}: {dataset['setting'].values[chosen]}."))
-    return titled(dataset.attrs["title"], *parts)
+        lines.append(f"For {wanted} on {words}: {dataset['setting'].values[chosen]}.")
+    return titled(dataset.attrs["title"], table, *map(Text, lines))
 
 
 def _percent(part: float) -> str:
     if not np.isfinite(part):
         return "-"
-    shown = 100 * part
-    return f"{shown:.2g}" if shown >= 1e-3 or shown == 0 else "<0.001"
+    return f"{100 * part:.2g}" if part >= 1e-5 or part == 0 else "<0.001"

@@ -123,8 +123,8 @@ def run(
             from roughvisc.study.target import choose, parse_targets
 
             watch, tell = partial(Display, not quiet, console, summary=False), partial(say, console)
-            computing = {"client": client, "workers": settings["workers"], "threads": threads}
-            case, reasons, budgets = choose(case, parse_targets(targets), folder, watch=watch, tell=tell, **computing)
+            computing = {"watch": watch, "client": client, "workers": settings["workers"] or 0, "threads": threads}
+            case, reasons, budgets = choose(case, parse_targets(targets), folder, tell, **computing)
             tell("\n  ".join(["Chosen", *reasons]))
         problem = _run_one(case, folder, study.stem, console, not no_plots, threads)
         for name, one in budgets.items():

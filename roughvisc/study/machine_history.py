@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 #: Negative loads count as zero up to this part of the largest load.
 _NOISE = 0.01
-#: Number of segments above which a note proposes a larger `thin`, if they exceed a tenth of the rows.
-_MANY = 300
 
 
 class History(NamedTuple):
@@ -122,35 +120,27 @@ def read_history(
     _check_times(path, found["time"], lines)
     start = float(found["time"][0])
     times, values = _less(found["time"], start), _less(found[control], offset) * scale
-    said = [f"{start:g} s in the file is time zero"] if start else []
+    notes = [f"{start:g} s in the file is time zero"] if start else []
     if control in PUSHING:
-        said += _noise_note(path, control, found["time"], values)
+        notes += _noise_note(path, control, found["time"], values)
         values = np.maximum(values, 0.0)
     largest = float(np.max(np.abs(values)))
     tolerance = limit * largest if is_part else limit
     if abs(values[0]) <= tolerance:
         values[0] = 0.0
     kept = thinned(times, values, tolerance)
-    segments = len(kept) - (values[0] == 0)
-    lead = f"{Path(path).name}: {len(times):,} rows became {segments:,} segments"
+    lead = f"{Path(path).name}: {len(times):,} rows became {len(kept) - (values[0] == 0):,} segments"
     if tolerance:
-        part = f", {100 * tolerance / largest:.2g} % of the largest {control}" if largest else ""
-        lead += f", which pass every row within {tolerance:.3g} {unit}{part}"
-    if segments > max(_MANY, len(times) / 10):
-        said.append("the rows scatter by more than that: a larger `thin` leaves fewer segments")
-    return History(control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *said]) + ".")
+        lead += f", which pass every row within {tolerance:.3g} {unit}"
+    return History(control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *notes]) + ".")
 
 
 def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
-    falls = np.flatnonzero(np.diff(times) < 0)
-    if falls.size:
-        at = int(falls[0]) + 1
+    for at in np.flatnonzero(np.diff(times) < 0)[:1] + 1:
         raise InputError(
             f"{path}, line {lines[at]}: time {times[at]:g} s after {times[at - 1]:g} s: expected increasing times"
         )
-    crowded = np.flatnonzero(times[2:] == times[:-2])
-    if crowded.size:
-        at = int(crowded[0])
+    for at in np.flatnonzero(times[2:] == times[:-2])[:1]:
         raise InputError(
             f"{path}, lines {lines[at]} to {lines[at + 2]}: three rows at {times[at]:g} s: expected at most two, which "
             "are a jump; export the times with more digits"

@@ -92,9 +92,8 @@ _BUDGET, _SHARE = 1.2, 0.05
 #: Time of the rest of a step, and of each exponential in a step, over the time of a convolution. Time per convolution
 #: of a friction curve over the time of a convolution of a contact problem, at 256 and 1024 cells a side.
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
-#: Work of the runs on coarser grids for the grid error, over the work of the run, and time to compare a kept pressure
-#: with the coarser grid, per cell. [-], [s]
-_GRID_ERROR, _COMPARE = 0.3, 3e-7
+#: Work of the run on a coarser grid for the grid error, over the work of the run. [-]
+_GRID_ERROR = 0.3
 #: Time to write a file without fields, and each byte of a field. [s]
 _FILE, _WRITE = 0.05, 3e-9
 #: Contact fraction that counts as full contact.
@@ -426,7 +425,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
     seconds += run.seconds * _work(height.size) / _work(run.cells)
     if own.problem.settings.grid_error:
-        seconds += _GRID_ERROR * seconds + (rows * whole.size * _COMPARE if kind != "curve" else 0.0)
+        seconds *= 1 + _GRID_ERROR
     fraction, warning = float(run.contact[-1]) * part, ""
     if isinstance(own, LoadingRows) and own.reaches_border:
         warning = (

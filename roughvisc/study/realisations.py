@@ -13,17 +13,6 @@ from roughvisc.errors import InputError
 from roughvisc.study.sweep_table import ITSELF, REALISATION
 
 Array = NDArray[np.float64]
-_MEANINGS = {
-    "mean": "mean",
-    "standard_deviation": "standard deviation",
-    "lower": "lower bound of the mean at 95 %",
-    "upper": "upper bound of the mean at 95 %",
-    "patch_lower": "lower bound of one more patch at 95 %",
-    "patch_upper": "upper bound of one more patch at 95 %",
-    "count": "number of known values",
-    "itself": "value of the measured surface itself",
-    "ratio": "ratio of the measured surface to the mean",
-}
 
 
 def over_realisations(values: xr.DataArray) -> xr.Dataset:
@@ -87,7 +76,7 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     units, name = values.attrs.get("units"), str(values.attrs.get("long_name", values.name or "values"))
     variables = {}
     for one, array in found.items():
-        attributes: dict[str, Any] = {"long_name": f"{_MEANINGS[one]}: {name}"}
+        attributes: dict[str, Any] = {"long_name": f"{one.replace('_', ' ')}: {name}"}
         if one in ("count", "ratio") or units is not None:
             attributes["units"] = "1" if one in ("count", "ratio") else units
         variables[one] = (values.dims[1:], array, attributes)

@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -48,9 +48,6 @@ from roughvisc.study.storage.folder import atomic_write, require_writable, resul
 from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.topography.grid import spacing
 from roughvisc.units import is_quantity, number
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 log = logging.getLogger("roughvisc")
 #: First and smallest tolerance over the target; largest and smallest tolerance of all.
@@ -124,25 +121,15 @@ def run(
 ) -> xr.Dataset:
     """Choose grid and tolerance for wanted errors and return the result; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
-    watch = partial(Display, progress, summary=False)
-    chosen, reasons, budgets = choose(
-        case, want, folder, watch=watch, tell=log.info, client=default_client(), threads=threads
-    )
+    computing = {"watch": partial(Display, progress, summary=False), "client": default_client(), "threads": threads}
+    chosen, reasons, budgets = choose(case, want, folder, log.info, **computing)
     for name, one in budgets.items():
         write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
     return run_stated(chosen, out, progress=False, threads=threads).assign_attrs(choice="\n".join(reasons))
 
 
 def choose(
-    case: Case,
-    want: Mapping[str, Any],
-    folder: Path,
-    *,
-    watch: Callable[[], Display],
-    tell: Callable[[str], None],
-    client: Client | None = None,
-    workers: int | None = 0,
-    threads: int | None = None,
+    case: Case, want: Mapping[str, Any], folder: Path, tell: Callable[[str], None], **computing: Any
 ) -> tuple[Case, list[str], dict[str, xr.Dataset]]:
     """Choose grid and tolerance for wanted errors, and write the result of the chosen case.
 
@@ -155,13 +142,10 @@ def choose(
         :func:`roughvisc.budget`.
     folder : Path
         Folder of the results. The solves are stored in its folder ``budget``, and are not computed again.
-    watch : callable
-        Makes the display of a sweep.
     tell : callable
         Called with the error on each grid, as a sentence.
-    client, workers, threads
-        As in :func:`roughvisc.sweep`. Default without a client: this process, because most solves depend on a coarser
-        solve.
+    **computing
+        Arguments of :func:`~roughvisc.study.neighbours.solve`.
 
     Returns
     -------
@@ -182,7 +166,7 @@ def choose(
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
-    solved = partial(solve, folder=folder / FOLDER, watch=watch, client=client, workers=workers or 0, threads=threads)
+    solved = partial(solve, folder=folder / FOLDER, **computing)
     height, smallest = case.height(), min(targets.values())
     base = with_rows(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
