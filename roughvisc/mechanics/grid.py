@@ -155,10 +155,10 @@ class Grid:
         if boundary == "free":
             fast = scipy.fft.next_fast_len
             self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
-        if symbol is None:
-            symbol = self.symbol_of(kernel) if boundary == "free" else periodic_symbol(kernel, self.period, spacing)
-        if boundary == "mirror":  # the shortest wave along each axis is zero at the cells
-            symbol = np.ascontiguousarray(symbol[: shape[0], : shape[1]])
+        if symbol is None and boundary == "free":
+            symbol = self.symbol_of(kernel)
+        elif symbol is None:  # without the shortest waves of a mirrored surface, which are zero at the cells
+            symbol = np.ascontiguousarray(periodic_symbol(kernel, self.period, spacing)[: shape[0], : shape[1]])
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.convolutions = 0

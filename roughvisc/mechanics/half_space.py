@@ -69,7 +69,8 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         ring = (distance > start) & (distance <= end)
         if ring.any():
             rows, columns = np.nonzero(ring)
-            kernel[ring] = _gauss_sum(x[rows, 0], y[0, columns], dx, dy, points)
+            mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
+            kernel[ring] = mean * (dx * dy)
     return kernel * (longer / math.pi)
 
 
@@ -126,16 +127,6 @@ def cell_mean(
 
 
 _gauss_rule = cache(np.polynomial.legendre.leggauss)
-
-
-def _gauss_sum(x: Array, y: Array, dx: float, dy: float, points: int) -> Array:
-    nodes, weights = _gauss_rule(points)
-    total = np.zeros_like(x)
-    for node_x, weight_x in zip(nodes, weights, strict=True):
-        x_squared = (x - node_x * dx / 2) ** 2
-        for node_y, weight_y in zip(nodes, weights, strict=True):
-            total += weight_x * weight_y / np.sqrt(x_squared + (y - node_y * dy / 2) ** 2)
-    return total * (dx * dy / 4)
 
 
 def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:

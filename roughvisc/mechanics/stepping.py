@@ -74,6 +74,8 @@ NEARLY_NOTHING = 0.02
 SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
 #: Least number of pairs in a period of a cycle.
 PAIRS_OF_A_CYCLE = 8
+#: Least part of a pair that each step takes where force and approach are parabolas over the pair.
+LEAST_PART = 0.1
 #: A pair of steps is soft if less than this part of its compliance is instantaneous.
 SOFT = 0.1
 #: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step.
@@ -763,36 +765,37 @@ def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
 def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
     """Return the work of the normal force in the first step of a pair, and in both. [J]
 
-    Force and approach are parabolas through the three points. After a jump the load is constant.
+    Force and approach are parabolas over time. If contact is lost in the second step, the force is a parabola over the
+    approach instead, and vanishes at the approach of last contact. After a jump the load is constant.
     """
-    first, last = middle.time - start.time, end.time - start.time
-    if not 0 < first < last or min(middle.force, end.force) == 0:  # equal times up to rounding, or contact is lost
-        early = trapezoid(scene, start, middle)
-        return early, early + trapezoid(scene, middle, end)
     force = middle.force if start.is_late else start.force
-    begin = np.array([force, start.approach])
-    early, mean = np.array([middle.force, middle.approach]) - begin, np.array([end.force, end.approach]) - begin
+    begin = np.array([force, touch(scene, start)])
+    early = np.array([middle.force, touch(scene, middle)]) - begin
+    mean = np.array([end.force, touch(scene, end)]) - begin
+    t = np.array([middle.time, end.time]) - start.time if end.force > 0 else np.array([early[1], mean[1]])
+    first, last = t.tolist()
+    if middle.force == 0 or not LEAST_PART * last**2 < first * last < (1 - LEAST_PART) * last**2:
+        of_first = trapezoid(scene, start, middle)
+        return of_first, of_first + trapezoid(scene, middle, end)
     bends = (mean / last - early / first) / (last - first)
     (rise, rate), (bend, turn) = (early / first - bends * first).tolist(), bends.tolist()
-    t = np.array([first, last])
     terms = force * turn + rise * rate / 2, (2 * rise * turn + bend * rate) / 3, bend * turn / 2
     of_first, of_both = (t * (force * rate + t * terms[0] + t**2 * terms[1] + t**3 * terms[2])).tolist()
     return of_first, of_both
 
 
 def trapezoid(scene: Scene, before: Point, after: Point) -> float:
-    """Return the work of the normal force between two points. [J]
-
-    If contact is lost between the points, the force vanishes at the approach of last contact.
-    """
+    """Return the work of a force that is linear over the approach between two points. [J]"""
     if before.force == 0 == after.force:
         return 0.0
-    begin, end = before.approach, after.approach
-    if before.force == 0:
-        begin = max(begin, scene.lowest(scene.gap + scene.memory.displacement(before.history)[0]))
-    if after.force == 0:
-        end = max(end, scene.lowest(scene.gap + scene.memory.displacement(after.history)[0]))
-    return 0.5 * (before.force + after.force) * (end - begin)
+    return 0.5 * (before.force + after.force) * (touch(scene, after) - touch(scene, before))
+
+
+def touch(scene: Scene, point: Point) -> float:
+    """Return the approach of a point; while the surfaces are apart, the approach at which they last touch. [m]"""
+    if point.force > 0:
+        return point.approach
+    return max(point.approach, scene.lowest(scene.gap + scene.memory.displacement(point.history)[0]))
 
 
 def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
