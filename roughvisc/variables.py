@@ -226,13 +226,12 @@ VARIABLES: dict[str, Variable] = {
         "volume of fluid through the gap in unit time, by the pressure drop",
         in_table="last",
     ),
-    "leak_rate_solver_lower": Variable(_SERIES, "m^3/s", "lower bound on this grid's leak rate", _SOLVER),
-    "leak_rate_solver_upper": Variable(_SERIES, "m^3/s", "upper bound on this grid's leak rate", _SOLVER),
+    "leak_rate_error": Variable(_SERIES, "m^3/s", "stated error of the leak rate", _SOLVER),
     "leak_status": Variable(
         _SERIES,
         "",
         "whether fluid flows",
-        "closed: no path of cells with common sides; not_certified: bounds more than 1e-6 of the leak rate apart",
+        "closed: no path of cells with common sides; not_certified: error above 1e-6 of the leak rate",
         dtype="int8",
         meanings=LEAK_MEANINGS,
     ),
@@ -288,12 +287,7 @@ GRID_ERROR = {
 }
 #: Variable -> variables that may state its error.
 ERRORS = {
-    name: tuple(
-        one
-        for one in (f"{name}_error", f"{name}_solver_lower", f"{name}_solver_upper", GRID_ERROR.get(name, ""))
-        if one in VARIABLES
-    )
-    for name in VARIABLES
+    name: tuple(one for one in (f"{name}_error", GRID_ERROR.get(name, "")) if one in VARIABLES) for name in VARIABLES
 }
 
 

@@ -16,7 +16,7 @@ from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import LEAK_MEANINGS
 
-#: Relative distance of the bounds up to which a leak rate counts as known.
+#: Relative error up to which a leak rate counts as known.
 _CERTIFIED = 1e-6
 
 
@@ -54,10 +54,9 @@ def leakage(
     Returns
     -------
     xarray.Dataset
-        Over time ``leak_rate``, ``leak_rate_solver_lower`` and ``leak_rate_solver_upper`` [m3/s]; ``leak_status``, one
-        of its ``flag_values``; ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which are independent of the
-        fluid; with `flow` also ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate``
-        state the arguments.
+        Over time ``leak_rate`` and ``leak_rate_error`` [m3/s]; ``leak_status``, one of its ``flag_values``;
+        ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which are independent of the fluid; with `flow` also
+        ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` state the arguments.
 
     Raises
     ------
@@ -73,7 +72,7 @@ def leakage(
 
     .. math:: T = \frac{Q \eta L}{\Delta P \, W}, \qquad h = (12 T)^{1/3}.
 
-    The bounds enclose the exact solution of the equations on this grid.
+    The error is the error of the solution of the equations on this grid, without the errors of the grid and of the gap.
 
     Examples
     --------
@@ -96,27 +95,26 @@ def leakage(
     def measure(field: np.ndarray) -> tuple[np.ndarray, ...]:
         missing = int(np.count_nonzero(np.isnan(field)))
         if missing == field.size:  # after the last row of a case of a sweep
-            return (np.array([np.nan, np.nan, np.nan, 0]), field, field)[: len(outputs)]
+            return (np.array([np.nan, np.nan, 0]), field, field)[: len(outputs)]
         if missing:
             raise InputError(
                 f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: the "
                 "flow through these cells is unknown: expected a surface that is cropped, or filled"
             )
         found = flow_through(field, sides_of_cell, wrap=wrap)
-        known = found.upper - found.lower <= _CERTIFIED * found.upper
+        known = found.error <= _CERTIFIED * found.conductance
         status = LEAK_MEANINGS.index("closed" if found.is_closed else "flows" if known else "not_certified")
-        numbers = np.array([found.conductance, found.lower, found.upper, status])
+        numbers = np.array([found.conductance, found.error, status])
         return (numbers, *fluxes(field, sides_of_cell, found.pressure, wrap=wrap)) if flow else (numbers,)
 
     outputs = [["number"], [along, across], [along, across]] if flow else [["number"]]
-    numbers, *fields = frame_by_frame(measure, gap, outputs=outputs, sizes={"number": 4}, over=(along, across))
-    conductance, lower, upper, status = (numbers.isel(number=place) for place in range(4))
+    numbers, *fields = frame_by_frame(measure, gap, outputs=outputs, sizes={"number": 3}, over=(along, across))
+    conductance, error, status = (numbers.isel(number=place) for place in range(3))
     transmissivity = conductance * (cells[along] * gap.sizes[along] / (cells[across] * gap.sizes[across]))
     drop = pressure_drop / viscosity
     variables = {
         "leak_rate": conductance * drop,
-        "leak_rate_solver_lower": lower * drop,
-        "leak_rate_solver_upper": upper * drop,
+        "leak_rate_error": error * drop,
         "leak_status": status.astype("int8"),
         "transmissivity": transmissivity,
         "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
@@ -124,13 +122,7 @@ def leakage(
     for axis, one in zip((along, across), fields, strict=False):
         variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
-    for name in (
-        "transmissivity",
-        "hydraulic_aperture",
-        "leak_rate",
-        "leak_rate_solver_lower",
-        "leak_rate_solver_upper",
-    ):
+    for name in ("transmissivity", "hydraulic_aperture", "leak_rate", "leak_rate_error"):
         described[name].attrs |= {"along": along, "sides": "periodic" if wrap else "closed"}
         if name.startswith("leak"):
             described[name].attrs |= {"viscosity": viscosity, "pressure_drop": pressure_drop}

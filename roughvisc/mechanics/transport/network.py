@@ -159,3 +159,17 @@ def factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
     options = {"SymmetricMode": True}
     found = splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     return lambda source: scale * found.solve(scale * source)
+
+
+def imbalance(network: Network, pressure: Array) -> Array:
+    """Return inflow less outflow of each cell for given pressures of the cells. [-]"""
+    flux = network.conductance * (pressure[network.first] - pressure[network.second])
+    into, out = (np.bincount(cells, flux, len(pressure)) for cells in (network.second, network.first))
+    return network.entrance * (1.0 - pressure) - network.exit * pressure + into - out
+
+
+def dissipation(network: Network, pressure: Array) -> float:
+    """Return the sum of conductance times squared jump over all faces: the conductance, for the exact pressures. [-]"""
+    jump = pressure[network.first] - pressure[network.second]
+    at_sides = network.entrance @ (1.0 - pressure) ** 2 + network.exit @ pressure**2
+    return float(network.conductance @ jump**2 + at_sides)

@@ -12,6 +12,8 @@ slow the iterations down, as it does with an algebraic multigrid of many levels.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 
@@ -23,14 +25,17 @@ _BLOCK = 4
 _STRONG = 0.02
 #: Relaxation factor of the Jacobi steps in prolongation and iterations; eigenvalues of ``D^-1 A`` lie below two.
 _RELAXATION = 3 / 4
-#: Relative error of the energy at which the iteration ends, and the largest number of iterations.
-_ENOUGH, _MOST = 1e-17, 100
+#: Largest number of iterations.
+_MOST = 100
 #: Shift of the diagonal of the coarse equations, relative to the diagonal of the cells.
 _SHIFT = 1e-14
 
 
-def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array:
-    """Return the pressures of the cells for a source in each cell, by preconditioned conjugate gradients.
+def solver_on_two_grids(network: Network, width: int) -> Callable[[Array, float], Array]:
+    """Return a solver by preconditioned conjugate gradients: from a source in each cell to the pressures of the cells.
+
+    The solver also takes the relative error of the energy at which the iteration ends. If it does not converge, it
+    returns its last iterate.
 
     Parameters
     ----------
@@ -38,13 +43,6 @@ def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array
         Cells and faces.
     width : int
         Number of the map's cells across the flow.
-    source : ndarray, shape (n,)
-        Inflow into each cell.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Pressures; the last iterate if the iteration does not converge.
     """
     matrix = equations(network)
     diagonal = matrix.diagonal()
@@ -61,22 +59,25 @@ def pressures_on_two_grids(network: Network, width: int, source: Array) -> Array
         found += weight * (left - matrix @ found)
         return found
 
-    pressure, left = np.zeros_like(source), source.copy()
-    direction, before, energy = np.zeros_like(source), 1.0, 0.0
-    for _ in range(_MOST):
-        better = precondition(left)
-        product = float(left @ better)
-        direction *= product / before
-        direction += better
-        through = matrix @ direction
-        dissipation = float(direction @ through)
-        if not (product > _ENOUGH * energy and dissipation > 0):
-            break
-        length = product / dissipation
-        pressure += length * direction
-        left -= length * through
-        before, energy = product, energy + length * product
-    return pressure
+    def solve(source: Array, enough: float) -> Array:
+        pressure, left = np.zeros_like(source), source.copy()
+        direction, before, energy = np.zeros_like(source), 1.0, 0.0
+        for _ in range(_MOST):
+            better = precondition(left)
+            product = float(left @ better)
+            direction *= product / before
+            direction += better
+            through = matrix @ direction
+            power = float(direction @ through)
+            if not (product > enough * energy and power > 0):
+                break
+            length = product / power
+            pressure += length * direction
+            left -= length * through
+            before, energy = product, energy + length * product
+        return pressure
+
+    return solve
 
 
 def _prolongation(network: Network, width: int, matrix: sparse.csr_array, diagonal: Array) -> sparse.csr_array:
