@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 os.environ["ROUGHVISC_TRANSFORMS"] = "scipy"
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers of pytest-xdist share the cores
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # a shell's background job, from which all runs would inherit it
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
