@@ -28,7 +28,7 @@ from roughvisc.mechanics.half_space import cell_mean, check_grid, corner_sum, lo
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
+from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]

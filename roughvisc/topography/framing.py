@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Sequence
+from numbers import Real
+from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -51,28 +53,23 @@ def crop(
     InputError
         If limits are not a pair, or fewer than two cells lie within them along an axis.
     """
-    chosen = {axis: _ascending(axis, limits) for axis, limits in (("x", x), ("y", y)) if limits is not None}
+    chosen = {}
+    for axis, limits in (("x", x), ("y", y)):
+        if limits is not None:
+            low, high = limits if isinstance(limits, Sequence | np.ndarray) and len(limits) == 2 else (np.nan, np.nan)
+            if not (isinstance(low, Real) and isinstance(high, Real) and low < high):
+                raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
+            chosen[axis] = (float(low), float(high))
     h = checked(h, "crop")
     whole = h.shape
     for axis, (low, high) in chosen.items():
-        inside = (h[axis].values >= low) & (h[axis].values <= high)
-        if inside.sum() < 2:
+        part = h.sel({axis: slice(low, high)})
+        if part.sizes[axis] < 2:
             held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
             raise InputError(key=axis, found=(low, high), expected=f"limits that hold at least two cells of {held} m")
-        h = h.isel({axis: inside})
+        h = part
     line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
     return noted(h, line, **({} if h.shape == whole else {"period": None}))
-
-
-def _ascending(axis: str, limits: Any) -> tuple[float, float]:
-    """Return the limits of a coordinate, the lower first. [m]"""
-    try:
-        low, high = (float(limit) for limit in limits)
-    except (TypeError, ValueError):
-        low = high = np.nan
-    if not low < high:
-        raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
-    return low, high
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
@@ -277,24 +274,15 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
         Twice as many points along each axis. [m]
     """
     h = checked(h, "mirror")
-    axes = {}
-    for axis, d in zip(("x", "y"), spacing(h), strict=True):
-        axes[axis] = (axis, float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d, h[axis].attrs)
-    maps = {
-        name: (("x", "y"), with_images(one.transpose("x", "y").values), one.attrs)
-        for name, one in h.coords.items()
-        if set(one.dims) == {"x", "y"}
+    there_and_back = {axis: np.r_[0:n, n - 1 : -1 : -1] for axis, n in h.sizes.items()}
+    axes = {
+        axis: (axis, float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d, h[axis].attrs)
+        for axis, d in zip(("x", "y"), spacing(h), strict=True)
     }
-    alone = {name: one.variable for name, one in h.coords.items() if not one.dims}
-    doubled = xr.DataArray(with_images(h.values), {**alone, **axes, **maps}, ("x", "y"), h.name, h.attrs)
+    doubled = h.isel(there_and_back).assign_coords(axes)
     return noted(doubled, MIRRORED, period=period_of(doubled))
 
 
 def with_images(values: np.ndarray) -> np.ndarray:
     """Return one period: a map with its mirror images."""
-    nx, ny = values.shape
-    whole = np.empty((2 * nx, 2 * ny), values.dtype)
-    whole[:nx, :ny] = values
-    whole[:nx, ny:] = values[:, ::-1]
-    whole[nx:] = whole[nx - 1 :: -1]
-    return whole
+    return np.pad(values, [(0, n) for n in values.shape], mode="symmetric")

@@ -192,17 +192,18 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
         return np.where(np.isclose(values, no_data, rtol=1e-6, atol=0.0), np.nan, values)
     if values.size < _FEWEST:
         return values
-    extremes = {float(np.fmin.reduce(values, axis=None)), float(np.fmax.reduce(values, axis=None))}
-    repeated = {one: int((values == one).sum()) for one in extremes if abs(one) >= _NO_DATA}
-    repeated = {one: count for one, count in sorted(repeated.items()) if count >= _REPEATED}
-    rest = values[np.isfinite(values) & ~np.isin(values, list(repeated))] if repeated else values[:0]
+    extremes = sorted({float(np.nanmin(values)), float(np.nanmax(values))})
+    extremes = [one for one in extremes if abs(one) >= _NO_DATA and np.count_nonzero(values == one) >= _REPEATED]
+    rest = values[np.isfinite(values) & ~np.isin(values, extremes)] if extremes else values[:0]
     spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-    for one, count in repeated.items():
+    for one in extremes:
         if spread > 0 and np.abs(rest - one).min() > _FAR * spread:
-            values = np.where(values == one, np.nan, values)
+            here = values == one
+            values = np.where(here, np.nan, values)
             complaints.append(
-                f"{count} points have the height {one:g} and all others lie within {rest.min():g} to {rest.max():g}: "
-                f"taken as missing; no_data = {one:g} confirms this, any other number keeps these heights"
+                f"{here.sum()} points have the height {one:g} and all others lie within {rest.min():g} to "
+                f"{rest.max():g}: taken as missing; no_data = {one:g} confirms this, any other number keeps these "
+                "heights"
             )
     return values
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, check_number, tensile_to_shear
-from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.secular import merged, secular_roots
+from roughvisc.mechanics.materials.prony import Prony, merged, secular_roots
 from roughvisc.units import Quantity, quantities
 
 #: A sum of ratios that differs from one by at most this counts as one: a fluid.

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
@@ -24,7 +25,6 @@ from roughvisc.mechanics.materials.creep import (
     pair_creep,
 )
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,10 @@ _FASTER, _SLOWER = (3.0, 10.0), 3.0
 _LEVELLINGS = 6
 #: Number of successive trials without a smaller error after which the fit ends.
 _IDLE = 3
+#: Terms whose part of the target is below this in all rows are left out.
+_UNSEEN = 1e-10
+#: Number of rows above which they are first reduced to a triangular factor.
+_MANY = 1000
 
 
 def series(material: Material, shortest: float, longest: float, tolerance: float) -> tuple[Prony, float]:
@@ -133,3 +137,33 @@ def _instants(shortest: float, longest: float, per_decade: int) -> Array:
 def _error(found: Prony, instants: Array, compliance: Array) -> float:
     """Return the largest relative error of the creep compliance at some instants."""
     return float(np.abs(found.creep_compliance(instants) / compliance - 1).max())
+
+
+def lattice(shortest: float, longest: float, per_decade: float) -> Array:
+    """Return times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
+    count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
+    return np.geomspace(shortest, longest, count)
+
+
+def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
+    """Return non-negative weights of columns, mostly zeros, whose weighted sum fits a target in least squares.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (rows, terms)
+        Columns to combine.
+    target : ndarray, shape (rows,)
+        Target of the sum.
+    scale : ndarray, shape (rows,)
+        Positive scale of the misfit of each row.
+    """
+    scaled = columns / scale[:, None]
+    norms = np.sqrt(np.sum(scaled**2, axis=0))
+    norms[norms == 0] = 1.0
+    matrix, wanted = scaled / norms, target / scale
+    if wanted.size > _MANY:  # the triangular factor has the same squared misfit up to a constant
+        factor: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, wanted]), mode="r"))
+        matrix, wanted = factor[:, :-1], factor[:, -1]
+    weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
+    seen = np.abs(scaled / norms).max(axis=0) * weights
+    return np.where(seen > _UNSEEN, weights / norms, 0.0)

@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, check_number, checked_rows, tensile_to_shear
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import relaxation_series
-from roughvisc.mechanics.materials.spectrum import lattice, nonnegative
+from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]

@@ -29,8 +29,8 @@ _OWN: dict[str, tuple[tuple[str, ...], str]] = {
     "keyence": ((), "text.read_headed"),
     "wyko": ((), "text.read_headed"),
     "esri": ((), "text.read_headed"),
-    "tmd": (("tmd",), "truemap.read_truemap"),
-    "sur": (("sur",), "digital_surf.read_digital_surf"),
+    "tmd": (("tmd",), "makers.read_truemap"),
+    "sur": (("sur",), "makers.read_digital_surf"),
 }
 _TEXT = ("xyz", "asc")
 #: Formats to try, in this order, for suffixes that several formats share.

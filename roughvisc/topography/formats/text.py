@@ -15,7 +15,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.tables import read_text
-from roughvisc.topography.formats import headed
+from roughvisc.topography.formats import makers
 from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import Channel, ScanFile
 from roughvisc.topography.formats.separated_values import separated_by_blanks
@@ -23,10 +23,10 @@ from roughvisc.units import is_quantity
 
 #: First line of a file -> its reader.
 _HEADED: dict[str, Callable[[str], ScanFile]] = {
-    "Zygo XYZ Data File": headed.read_zygo_xyz,
-    "Zygo ASCII Data File": headed.read_zygo_ascii,
-    "Wyko ASCII Data File": headed.read_wyko,
-    "ncols": headed.read_esri,
+    "Zygo XYZ Data File": makers.read_zygo_xyz,
+    "Zygo ASCII Data File": makers.read_zygo_ascii,
+    "Wyko ASCII Data File": makers.read_wyko,
+    "ncols": makers.read_esri,
 }
 #: A text without a header is a table, not a map, if it has fewer columns than the first number, and more lines than the
 #: second number times the columns.
@@ -89,7 +89,7 @@ def _of_a_maker(text: str) -> ScanFile | None:
         if begins.lower().startswith(words.lower()):
             return read(text)
     head = text[:4000]
-    return headed.read_keyence(text) if "XY Calibration" in head and "Horizontal" in head else None
+    return makers.read_keyence(text) if "XY Calibration" in head and "Horizontal" in head else None
 
 
 def _points(text: str) -> ScanFile | None:

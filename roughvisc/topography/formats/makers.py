@@ -1,22 +1,32 @@
-"""Text formats of instrument makers, recognised by their first line.
+"""Formats of instrument makers that no library reads.
 
-Each function takes the text of a file. Rows run along x and the first row is y = 0, unless the format states
-otherwise.
+A text format is recognised by the first line, and its function takes the text of a file. Rows run along x and the first
+row is y = 0, unless the format states otherwise.
 """
 
 from __future__ import annotations
 
 import csv
 import re
+import struct
+import zlib
+from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.tables import decimal_mark, plain_number
+from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import Channel, ScanFile
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING = {0: 4096, 1: 32768, 2: 131072}, 2147483640
+#: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
+_TRUEMAP = b"Binary TrueMap Data File v2.0"
+_DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
+#: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
+_HEADER, _SIZES = 512, 334
 
 
 def read_zygo_xyz(text: str) -> ScanFile:
@@ -107,3 +117,41 @@ def _one(
     format: str, heights: np.ndarray, unit: str | None, lateral: str | None, sides: tuple[float, float] | None
 ) -> ScanFile:
     return ScanFile(format, [Channel("height", heights.shape, lambda: heights, unit, lateral, sides)])
+
+
+def read_truemap(path: Path) -> ScanFile:
+    """Read a TrueMap or GelSight file of version 2: a comment, then the grid in millimetres, top line first."""
+    content = path.read_bytes()
+    if not content.startswith(_TRUEMAP):
+        raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
+    comment = content.index(b"\0") + 1
+    at = content.index(b"\0", comment) + 1
+    columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
+    if not (min(columns, rows) > 1 and width > 0 and height > 0):
+        raise InputError(f"found {columns} x {rows} points over {width:g} x {height:g} mm: the file is damaged")
+    heights = np.frombuffer(content, "<f4", columns * rows, at + 24).reshape(rows, columns).T.astype(float)
+    sides = (width / columns, height / rows)
+    instrument = content[comment : at - 1].decode("latin-1").strip()
+    return ScanFile("tmd", [Channel("Default", (columns, rows), lambda: heights, "mm", "mm", sides)], 0, instrument)
+
+
+def read_digital_surf(path: Path) -> ScanFile:
+    """Read a Digital Surf file, compressed or not; SurfaceTopography reads the expanded heights.
+
+    A compressed file holds, after the comment and the private zone: the number of streams, the raw and the compressed
+    size of each stream, and the zlib streams.
+    """
+    with path.open("rb") as stream:
+        if stream.read(len(_COMPRESSED)) != _COMPRESSED:
+            return read_with_surface_topography(path, "sur")
+    content = path.read_bytes()
+    begin = _HEADER + sum(struct.unpack_from("<2H", content, _SIZES))
+    (count,) = struct.unpack_from("<I", content, begin)
+    sizes = [struct.unpack_from("<2I", content, begin + 4 + 8 * i) for i in range(count)]
+    heights, at = b"", begin + 4 + 8 * count
+    for raw, packed in sizes:
+        heights += zlib.decompressobj().decompress(content[at : at + packed], raw)
+        at += packed
+    return read_with_surface_topography(
+        path, "sur", BytesIO(_DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin] + heights)
+    )
