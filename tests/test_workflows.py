@@ -5,8 +5,7 @@ import pathlib
 
 import numpy as np
 import pytest
-from references import OnSheet
-from references.indenters import Paraboloid
+from references import OnSheet, Paraboloid
 
 from roughvisc.api import run
 from roughvisc.mechanics.sheet import Sheet

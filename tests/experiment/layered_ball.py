@@ -6,8 +6,7 @@
 import math
 import sys
 
-from references import ElasticLayer, OnSheet
-from references.indenters import Paraboloid
+from references import ElasticLayer, OnSheet, Paraboloid
 
 import roughvisc as rv
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references.indenters import Cone, Paraboloid
+from references import Cone, Paraboloid
 from samples import UNIT
 
 import roughvisc as rv

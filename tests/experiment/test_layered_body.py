@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 from layered_ball import POISSONS, errors
-from references import ElasticLayer, OnSheet, PunchOnSheet
-from references.growing_contact import StepLoad
-from references.indenters import Cone, Paraboloid
+from references import Cone, ElasticLayer, OnSheet, Paraboloid, PunchOnSheet, StepLoad
 from support import refused
 
 import roughvisc as rv

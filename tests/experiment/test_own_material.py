@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from references.indenters import Paraboloid
-from references.reduction import reduced_contact
+from references import Paraboloid, reduced_contact
 from scipy.special import gammainc
 from support import refused
 
@@ -93,8 +92,7 @@ def test_a_cycle__is_that_of_all_past_forces_without_a_series(curve):
     """The method of dimensionality reduction, with the material's own compliance and integral."""
     material, program = of(curve), rv.Program().load(1e-3, over=0.2).load(3e-4, over=0.2).hold(0.4)
     times = [0.1, 0.2, 0.4, 0.8]
-    exact = reduced_contact(Paraboloid(RADIUS), material, program, times, steps=60, elements=2000)
-    assert exact.error < 1e-5
+    exact = reduced_contact(Paraboloid(RADIUS), material, program, times)
     ds = pressed(material, program, times=times)
     # a tolerance, and the grid: about 4 % of the square of a cell over the contact radius, which is ten cells
     assert ds.approach.values == pytest.approx(exact.approach, rel=2e-3)

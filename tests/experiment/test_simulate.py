@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from references.growing_contact import lee_radok_step
+from references import lee_radok_step
 
 import roughvisc as rv
 from roughvisc.experiment import profile as domain

@@ -5,8 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from references import OnSheet
-from references.indenters import Paraboloid
+from references import OnSheet, Paraboloid
 from support import refused
 
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol

@@ -1,31 +1,35 @@
 """Closed forms and independent solutions that only the tests compare the solver with."""
 
-from references.cylinder import SlidingCylinder, sliding_cylinder
-from references.fixed_contact import (
+from references.cylinder import sliding_cylinder
+from references.half_space import (
+    Cone,
+    Paraboloid,
+    StepLoad,
     full_contact_wave,
+    lee_radok_step,
+    pressure_of_springs,
     punch_approach,
     punch_dissipation,
     punch_force,
+    reduced_contact,
     sticking_stiffness,
 )
-from references.layer import ElasticLayer
-from references.reduction import ContactHistory, reduced_contact
-from references.sheet import OnSheet, PunchOnSheet
-from references.single_maximum import SingleMaximum, ting
+from references.layered import ElasticLayer, OnSheet, PunchOnSheet
 
 __all__ = [
-    "ContactHistory",
+    "Cone",
     "ElasticLayer",
     "OnSheet",
+    "Paraboloid",
     "PunchOnSheet",
-    "SingleMaximum",
-    "SlidingCylinder",
+    "StepLoad",
     "full_contact_wave",
+    "lee_radok_step",
+    "pressure_of_springs",
     "punch_approach",
     "punch_dissipation",
     "punch_force",
     "reduced_contact",
     "sliding_cylinder",
     "sticking_stiffness",
-    "ting",
 ]

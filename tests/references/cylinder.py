@@ -14,8 +14,6 @@ with Chebyshev polynomials. Two conditions give ``c0`` and ``e``: no pressure at
 surface at the front edge, which comes to the contact from the undeformed surface ahead.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -24,29 +22,13 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ive, kve
 
-from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number as positive
-from roughvisc.mechanics.materials.prony import Prony
-
 # exp of minus that is nothing.
 _NEGLIGIBLE = 40.0
 
 
 @dataclass(frozen=True)
 class SlidingCylinder:
-    """Steady contact of a cylinder that slides or rolls.
-
-    Attributes
-    ----------
-    half_width : float
-        Of the contact. [m]
-    offset : float
-        Of the middle of the contact, ahead of the axis of the cylinder. [m]
-    load : float
-        Per length of the cylinder. [N/m]
-    friction_coefficient : float
-        Friction of the pressure on the inclined surface, over the load. [-]
-    """
+    """Half-width [m], offset of its middle ahead of the axis of the cylinder [m], load [N/m], friction coefficient."""
 
     half_width: float
     offset: float
@@ -54,60 +36,20 @@ class SlidingCylinder:
     friction_coefficient: float
 
 
-def sliding_cylinder(radius: float, material: Prony, load: float, speed: float) -> SlidingCylinder:
-    r"""Steady sliding or rolling of a rigid cylinder, without shear.
+def sliding_cylinder(radius, material, load, speed):
+    r"""Return steady sliding or rolling, without shear, on a solid with one retardation time.
 
-    Parameters
-    ----------
-    radius : float
-        Of the cylinder. [m]
-    material : Prony
-        A solid with one retardation time and an instantaneous compliance.
-    load : float
-        Per length of the cylinder. [N/m]
-    speed : float
-        [m/s]
-
-    Returns
-    -------
-    SlidingCylinder
-
-    Raises
-    ------
-    InputError
-        If a number is not positive, or the material is another.
-
-    Notes
-    -----
-    Hunter's problem, by the equations of this module, which are a new derivation. Load and friction follow from moments
-    of :math:`f` over the contact:
+    Hunter's problem (J. Appl. Mech. 28 (1961) 611), by the equations of this module, which are a new derivation.
+    Load and friction follow from moments of :math:`f` over the contact:
 
     .. math:: W = \frac{\pi c_0}{C_0 + C_1}, \qquad
               \mu = \frac1R \left[ \frac{\pi a c_1 / 2 - C_0 V \tau W}{(C_0 + C_1) W} - e \right].
-
-    References
-    ----------
-    .. [1] S. C. Hunter, J. Appl. Mech. 28 (1961) 611.
-
-    Examples
-    --------
-    >>> from roughvisc.mechanics.materials.models import zener
-    >>> rubber = zener(1e6, 1e6, 1e3)
-    >>> slow, fast = (sliding_cylinder(1e-2, rubber, 100.0, speed) for speed in (1e-4, 1e6))
-    >>> f"{slow.half_width * 1e3:.3f} mm, {fast.half_width * 1e3:.3f} mm"  # Hertz, relaxed and at once
-    '0.798 mm, 0.564 mm'
-    >>> f"{slow.friction_coefficient:.3e}"  # V tau / 2R as the speed goes to zero
-    '5.000e-06'
     """
-    for name, value, unit in (("radius", radius, "m"), ("load", load, "N/m"), ("speed", speed, "m/s")):
-        positive(name, value, unit)
-    if material.fluidity or len(material.times) != 1 or not material.glassy > 0:
-        raise InputError(f"material is {material!r}: expected a solid of one retardation time, compliant at once")
     factor = (1 - material.poisson) / 2
     at_once, in_the_end = factor * material.glassy, factor * (material.glassy + material.compliances[0])
     trail = speed * material.times[0]
 
-    def contact(half_width: float) -> SlidingCylinder:
+    def contact(half_width):
         return _of_half_width(half_width, radius, at_once, in_the_end, trail)
 
     hertz = math.sqrt(4 * radius * load / math.pi)  # of unit compliance
@@ -115,7 +57,7 @@ def sliding_cylinder(radius: float, material: Prony, load: float, speed: float) 
     return contact(float(brentq(lambda a: contact(a).load / load - 1, least, most, xtol=1e-15 * most, rtol=1e-14)))
 
 
-def _of_half_width(a: float, radius: float, at_once: float, in_the_end: float, trail: float) -> SlidingCylinder:
+def _of_half_width(a, radius, at_once, in_the_end, trail):
     """The linear equations for ``c0`` and the offset of the axis."""
     z, decay = a / trail, in_the_end / at_once * a / trail
     c2 = -(a**2) / (4 * radius)
@@ -144,5 +86,5 @@ def _of_half_width(a: float, radius: float, at_once: float, in_the_end: float, t
     return SlidingCylinder(a, -float(axis), float(load), float((moment / load - axis) / radius))
 
 
-def _decaying(s: float, n: int, z: float) -> float:
+def _decaying(s, n, z):
     return math.exp(-n * s - z * (math.cosh(s) - 1))

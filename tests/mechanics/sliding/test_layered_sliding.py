@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from dense_sliding import PERIOD, dense_on_body, line_profiles, slid
-from layered import sliding_symbol
+from references.dense import PERIOD, dense_on_body, line_profiles, slid
+from references.layered import sliding_symbol
 
 import roughvisc as rv
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from dense_sliding import PERIOD, TIME, dense, line_profiles, rubber, slid, strong_errors
+from references.dense import PERIOD, TIME, dense, line_profiles, rubber, slid, strong_errors
 from support import refused
 
 import roughvisc as rv

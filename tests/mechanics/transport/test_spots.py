@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from references.sheet import PunchOnSheet
+from references import PunchOnSheet
 from support import rough_gap
 
 from roughvisc.mechanics.body import HALF_SPACE

@@ -5,8 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from references import OnSheet, sticking_stiffness
-from references.indenters import Paraboloid
+from references import OnSheet, Paraboloid, sticking_stiffness
 from scipy import special
 from scipy.integrate import quad
 from scipy.optimize import brentq

@@ -1,6 +1,6 @@
 """Steady sliding of line contacts by dense matrices and active sets: the oracle of the iterative solver.
 
-``python tests/mechanics/sliding/dense_sliding.py 256 512`` prints stated over true errors.
+``PYTHONPATH=tests python -m references.dense 256 512`` prints stated over true errors.
 """
 
 import sys
