@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.units import quantity
+from roughvisc.units import number
 
 #: Units of equal dimension that differ by 2 pi: never converted.
 FREQUENCY_UNITS = ("rad/s", "Hz")
@@ -201,10 +201,10 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     factors = {
         key: _factor(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
     }
-    for number, cells in below:
+    for row, cells in below:
         if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
             expected = f"{len(heading)}, one for each column"
-            raise InputError(f"{path}, line {number}: found {len(cells)} cells: expected {expected}")
+            raise InputError(f"{path}, line {row}: found {len(cells)} cells: expected {expected}")
     texts = {key: [cells[at] if at < len(cells) else "" for _, cells in below] for key, (at, *_) in places.items()}
     try:
         mark = decimal_mark((cell for column in texts.values() for cell in column), separator)
@@ -213,12 +213,12 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     columns = {}
     for key, column in texts.items():
         values = [float(plain_number(cell, mark) or "nan") for cell in column]
-        for (number, _), cell, value in zip(below, column, values, strict=True):
+        for (row, _), cell, value in zip(below, column, values, strict=True):
             if not math.isfinite(value):
-                where, expected = f"{path}, line {number}", f"a number for {key}"
+                where, expected = f"{path}, line {row}", f"a number for {key}"
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
         columns[key] = np.array([float(f"{value * factors[key]:.15g}") for value in values])
-    return columns, [number for number, _ in below]
+    return columns, [row for row, _ in below]
 
 
 def _rows(path: Path) -> tuple[str, list[_Row]]:
@@ -307,4 +307,4 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
     if one.unit in FREQUENCY_UNITS:
         text = f"{path}: unit of {key}: found {unit!r}: expected {one.unit!r}, as stated"
         raise InputError(text, found=unit, expected=one.unit)
-    return quantity(f"1 {unit}", one.unit, f"{path}: unit of {key}")
+    return number(f"1 {unit}", one.unit, f"{path}: unit of {key}")

@@ -10,6 +10,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, wraps
 from numbers import Real
@@ -55,65 +56,6 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def quantity(value: str | float, unit: str, key: str = "", *, difference: bool = False) -> float:
-    """Return a quantity as a number in a given unit.
-
-    Parameters
-    ----------
-    value : str or float
-        A number in `unit`, or text of a number and a unit, such as ``"10 um"``, ``"0.1 MPa s"`` or ``"3 N/m^2"``.
-    unit : str
-        Unit of the result, such as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
-    key : str, optional
-        Name of the quantity in messages: a key of a study file, or a parameter.
-    difference : bool
-        Whether the quantity is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are
-        refused.
-
-    Returns
-    -------
-    float
-        The value in `unit`, finite. Text is rounded to 15 significant digits, because conversions leave noise in the
-        last one (``"10 um"`` would be 9.999999999999999e-06 m).
-
-    Raises
-    ------
-    InputError
-        If the value is not a finite number or a quantity, or its unit is unknown or of another dimension.
-
-    Examples
-    --------
-    >>> quantity("10 um", "m"), quantity("0.1 MPa s", "Pa s"), quantity(2, "N")
-    (1e-05, 100000.0, 2.0)
-    >>> quantity("25 degC", "K"), quantity("25 °C", "K")
-    (298.15, 298.15)
-    >>> quantity("0.3 1/MPa", "1/Pa"), quantity("0.31/MPa", "1/Pa"), quantity("2 1/(kPa s)", "1/(Pa s)")
-    (3e-07, 3.1e-07, 0.002)
-    """
-    finite = problem = ""
-    result = math.nan
-    if isinstance(value, str):
-        try:
-            result = _parsed(value, unit, difference)
-        except ValueError as error:
-            problem = f", {error}"
-    elif isinstance(value, Real) and not isinstance(value, bool):
-        try:
-            result = float(value)
-        except OverflowError:  # an integer of hundreds of digits
-            result = math.inf
-        finite = ", finite"
-    if not math.isfinite(result):
-        named, expected = f"{key}: " if key else "", _expected(unit) + finite
-        message = f"{named}found {short_repr(value)}{problem}: expected {expected}"
-        raise InputError(message, key=key, found=value, expected=expected)
-    return result
-
-
-def _expected(unit: str) -> str:
-    return "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit"
-
-
 def number(
     value: Any,
     unit: str,
@@ -126,33 +68,45 @@ def number(
     difference: bool = False,
     instead: Mapping[str, str] | None = None,
 ) -> float:
-    """Return a quantity as a number in a given unit, and refuse it outside its bounds.
+    """Return a quantity as a number in a given unit.
 
     Parameters
     ----------
     value : str or float
-        As for :func:`quantity`; also a scalar of NumPy or xarray.
-    unit, key, difference
-        As for :func:`quantity`.
+        A number in `unit`, also a scalar of NumPy or xarray; or text of a number and a unit, such as ``"10 um"``,
+        ``"0.1 MPa s"`` or ``"3 N/m^2"``.
+    unit : str
+        Unit of the result, such as ``"m"``, ``"Pa s"`` or ``"1"`` for a pure number.
+    key : str, optional
+        Name of the quantity in messages: a key of a study file, or a parameter.
     above, least, most, below : float, optional
         Bounds, of which `above` and `below` are excluded. [unit]
+    difference : bool
+        Whether the quantity is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are
+        refused.
     instead : mapping of str to str, optional
         Key -> unit of quantities that may be meant if the value has their unit; the message suggests the key.
 
     Returns
     -------
     float
-        The value in `unit`.
+        The value in `unit`, finite. Text is rounded to 15 significant digits, because conversions leave noise in the
+        last one (``"10 um"`` would be 9.999999999999999e-06 m).
 
     Raises
     ------
     InputError
-        If the value is not a quantity of this unit, or outside the bounds.
+        If the value is not a finite number or a quantity, its unit is unknown or of another dimension, or it is outside
+        the bounds.
 
     Examples
     --------
-    >>> number("5 mN", "N", "load", above=0)
-    0.005
+    >>> number("10 um", "m"), number("0.1 MPa s", "Pa s"), number(2, "N")
+    (1e-05, 100000.0, 2.0)
+    >>> number("25 degC", "K"), number("25 °C", "K")
+    (298.15, 298.15)
+    >>> number("0.3 1/MPa", "1/Pa"), number("0.31/MPa", "1/Pa"), number("2 1/(kPa s)", "1/(Pa s)")
+    (3e-07, 3.1e-07, 0.002)
     >>> number("-5 mN", "N", "load", above=0)  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
     InputError: load: found '-5 mN': expected a number [N], or text with a unit, above 0
@@ -162,27 +116,36 @@ def number(
     """
     if getattr(value, "shape", None) == ():
         value = value.item()
-    try:
-        found = quantity(value, unit, key, difference=difference)
-    except InputError as error:
-        for other, its_unit in (instead or {}).items():
-            if is_quantity(value, its_unit):
-                hint = f"{error}; did you mean {other} = {value!r}?"
-                raise InputError(hint, key=key, found=value, expected=error.expected) from None
-        raise
+    found, problem = math.nan, ""
+    if isinstance(value, str):
+        try:
+            found = _parsed(value, unit, difference)
+        except ValueError as error:
+            problem = f", {error}"
+    elif isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # an integer of hundreds of digits
+            found = float(value)
     inside = (
-        (above is None or found > above)
+        math.isfinite(found)
+        and (above is None or found > above)
         and (above != 0 or found >= sys.float_info.min)  # otherwise the reciprocal overflows
         and (least is None or found >= least)
         and (most is None or found <= most)
         and (below is None or found < below)
     )
-    if not inside:
-        limits = {"above": above, "at least": least, "up to": most, "below": below}
-        words = " and ".join(f"{word} {limit:g}" for word, limit in limits.items() if limit is not None)
-        comma = "" if unit in ("", "1") else ","
-        raise InputError(key=key, found=value, expected=f"{_expected(unit)}{comma} {words}")
-    return found
+    if inside:
+        return found
+    limits = {"above": above, "at least": least, "up to": most, "below": below}
+    words = " and ".join(f"{word} {limit:g}" for word, limit in limits.items() if limit is not None)
+    words = words or "finite" * isinstance(value, float)
+    kind = "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit,"
+    expected = f"{kind} {words}" if words else kind.rstrip(",")
+    named = f"{key}: " if key else ""
+    message = f"{named}found {short_repr(value)}{problem}: expected {expected}"
+    for other, its_unit in (instead or {}).items() if problem else ():
+        if is_quantity(value, its_unit):
+            message += f"; did you mean {other} = {value!r}?"
+    raise InputError(message, key=key, found=value, expected=expected)
 
 
 def in_si(value: Any, unit: str, name: str) -> Any:
@@ -200,7 +163,7 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     Raises
     ------
     InputError
-        As for :func:`quantity`, for the first text that is not a quantity of this unit.
+        As for :func:`number`, for the first text that is not a quantity of this unit.
 
     Examples
     --------
@@ -208,12 +171,12 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     ((0.001, 2.0), None)
     """
     if isinstance(value, str):
-        return quantity(value, unit, name)
+        return number(value, unit, name)
     if isinstance(value, Mapping):
         return {key: in_si(one, unit, f"{name}[{key!r}]") for key, one in value.items()}
     if not isinstance(value, list | tuple) or {str, np.str_, list, tuple}.isdisjoint(map(type, value)):
         return value
-    return type(value)([in_si(one, unit, f"{name}[{number}]") for number, one in enumerate(value)])
+    return type(value)([in_si(one, unit, f"{name}[{place}]") for place, one in enumerate(value)])
 
 
 def quantities(**units: str) -> Callable[[_Taking], _Taking]:
@@ -224,7 +187,7 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     Parameters
     ----------
     **units : str
-        Name of the argument -> its unit, as for :func:`quantity`.
+        Name of the argument -> its unit, as for :func:`number`.
 
     Examples
     --------
@@ -267,21 +230,21 @@ def number_and_unit(text: str) -> tuple[float, str]:
     Parameters
     ----------
     text : str
-        Valid input of :func:`quantity`.
+        Valid input of :func:`number`.
 
     Examples
     --------
     >>> number_and_unit("0.1 MPa s"), number_and_unit("1e-3")
     ((0.1, 'MPa s'), (0.001, ''))
     """
-    number, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]
-    return float(number), unit or ""
+    digits, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]
+    return float(digits), unit or ""
 
 
 def is_quantity(value: Any, unit: str) -> bool:
     """Return whether a value is a number, or text that converts to this unit."""
     try:
-        quantity(value, unit)
+        number(value, unit)
     except InputError:
         return False
     return True

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.units import number, quantity, unit_for
+from roughvisc.units import number, unit_for
 
 PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
 
@@ -42,7 +42,7 @@ PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
     ],
 )
 def test_quantity__reads_number_and_unit(text, unit, expected):
-    assert quantity(text, unit) == pytest.approx(expected, rel=2e-15)
+    assert number(text, unit) == pytest.approx(expected, rel=2e-15)
 
 
 @given(
@@ -50,7 +50,7 @@ def test_quantity__reads_number_and_unit(text, unit, expected):
     st.sampled_from(sorted(PREFIXES)),
 )
 def test_quantity__is_the_float_that_a_person_would_write(number, unit):
-    assert quantity(f"{number} {unit}", "m") == float(f"{number}{PREFIXES[unit]}")
+    assert number(f"{number} {unit}", "m") == float(f"{number}{PREFIXES[unit]}")
 
 
 @given(
@@ -61,8 +61,8 @@ def test_quantity__is_the_float_that_a_person_would_write(number, unit):
 )
 def test_quantity__with_a_prefix_is_what_pint_makes_of_it(number, power, unit, prefix):
     text = f"{number}e{power} {prefix}{unit}"
-    by_pint = quantity(f"{number}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
-    assert quantity(text, unit) == by_pint
+    by_pint = number(f"{number}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
+    assert number(text, unit) == by_pint
 
 
 @pytest.mark.parametrize(
@@ -76,19 +76,19 @@ def test_quantity__with_a_prefix_is_what_pint_makes_of_it(number, power, unit, p
     ],
 )
 def test_quantity__with_what_is_no_plain_prefix_is_that_unit(text, unit, expected):
-    assert quantity(text, unit) == expected
+    assert number(text, unit) == expected
 
 
 @pytest.mark.parametrize("text", ["1 smm", "1 mkm", "1 Mkg", "1 mm/s", "1 k", "1 N"])
 def test_quantity__with_two_prefixes_or_another_unit_is_refused(text):
     with refused(found=text):
-        quantity(text, "m")
+        number(text, "m")
 
 
 @pytest.mark.parametrize("number", [3, 3.0, np.float64(3), np.int32(3)])
 def test_quantity__takes_plain_numbers_as_they_are(number):
-    assert quantity(number, "m") == 3.0
-    assert type(quantity(number, "m")) is float
+    assert number(number, "m") == 3.0
+    assert type(number(number, "m")) is float
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_quantity__takes_plain_numbers_as_they_are(number):
 )
 def test_quantity__of_another_kind_or_no_number_is_refused(value, unit):
     with refused("radius", value):
-        quantity(value, unit, "radius")
+        number(value, unit, "radius")
 
 
 @pytest.mark.timeout(60)
@@ -130,13 +130,13 @@ def test_quantity__of_another_kind_or_no_number_is_refused(value, unit):
 )
 def test_quantity__does_not_hang_on_hostile_text(text):
     with refused(found=text):
-        quantity(text, "m")
+        number(text, "m")
 
 
 @given(st.text(max_size=40))
 def test_quantity__any_text_gives_a_number_or_an_input_error(text):
     with contextlib.suppress(InputError):
-        assert math.isfinite(quantity(text, "m"))
+        assert math.isfinite(number(text, "m"))
 
 
 @pytest.mark.parametrize(

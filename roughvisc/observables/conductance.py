@@ -15,7 +15,7 @@ from roughvisc.mechanics.transport.spots import frozen_contact
 from roughvisc.observables.contact import contact
 from roughvisc.observables.frames import frame_by_frame
 from roughvisc.topography.grid import spacing
-from roughvisc.units import Quantity, is_quantity, number, quantity
+from roughvisc.units import Quantity, is_quantity, number
 
 #: Unit of each kind of resistivity.
 _UNITS: dict[str, str] = {"thermal": "K m/W", "electrical": "ohm m"}
@@ -69,7 +69,7 @@ def conductance(
     if kind is None:
         texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
         kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
-    both = [quantity(one, _UNITS[kind], "resistivity") for one in resistivity]
+    both = [number(one, _UNITS[kind], "resistivity") for one in resistivity]
     if min(both) < 0 or sum(both) == 0:
         raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
     stiffness, error = _frozen(dataset, HALF_SPACE)

@@ -23,7 +23,7 @@ from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.scans import open_scan
 from roughvisc.topography.synthesis import RECIPES
-from roughvisc.units import quantity
+from roughvisc.units import number
 
 
 def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
@@ -57,7 +57,7 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     unit = _unit(key, tables)
     if unit and isinstance(value, str):
         with suppress(InputError):
-            return quantity(value, unit, difference=key.endswith("wlf_c2"))
+            return number(value, unit, difference=key.endswith("wlf_c2"))
     if isinstance(value, int):
         if abs(value) > sys.float_info.max:
             raise InputError(key=key, found=value, expected="a number with fewer digits")

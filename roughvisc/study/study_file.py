@@ -31,7 +31,7 @@ from roughvisc.study.audit.audit import audit
 from roughvisc.study.machine_history import read_history
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.scans import check_surface, surface_boundary
-from roughvisc.units import number, quantity
+from roughvisc.units import number
 
 #: Tables of a study, without its sweep.
 TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep", "observe", "audit")
@@ -192,7 +192,7 @@ def speeds_of(where: str, stated: Any) -> list[float]:
     """Return speeds in increasing order, from one speed, a list, or ``from``, ``to`` and ``count``. [m/s]"""
     if not isinstance(stated, Mapping):
         listed = stated if isinstance(stated, list) else [stated]
-        return sorted({quantity(one, "m/s", where) for one in listed})
+        return sorted({number(one, "m/s", where) for one in listed})
     table = dict(stated)
     refuse_unknown(where, table, ("from", "to", "count"))
     for key in ("from", "to", "count"):

@@ -11,8 +11,8 @@ import xarray as xr
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import checked, like, noted, number, require_heights, spacing
-from roughvisc.units import Quantity, quantities
+from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
+from roughvisc.units import Quantity, number, quantities
 
 #: Half-width of a filter [points] up to which a sum is as fast as FFTs, whose library takes half a second to import.
 _SUMMED = 64
@@ -108,7 +108,7 @@ def gaussian_filter(
     ----------
     .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
     """
-    cutoff = number("cutoff", cutoff, "m")
+    cutoff = number(cutoff, "m", "cutoff", above=0)
     one_of("keep", keep, ("long", "short"))
     h = checked(h, "gaussian_filter")
     sides = spacing(h)

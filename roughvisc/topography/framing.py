@@ -17,14 +17,13 @@ from roughvisc.topography.grid import (
     filled_points,
     like,
     noted,
-    number,
     spacing,
     with_coordinates,
     with_filled_points,
 )
 from roughvisc.topography.missing_points import membrane
 from roughvisc.topography.resampling import resample
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 #: Largest shift of a cell border by rounding, relative to the cell.
 _ON_BORDER = 1e-9
@@ -169,7 +168,7 @@ def combine(
     one_of("align", align, ("grid", "centre"))
     if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
         raise InputError(key="offset", found=offset, expected="a pair of lengths, along x and along y [m]")
-    apart = [number("offset", d, "m", low=-np.inf) for d in offset]
+    apart = [number(d, "m", "offset") for d in offset]
     if align == "grid" and apart != [0.0, 0.0]:
         raise InputError(key="offset", found=offset, expected="none with align='grid'; align='centre' takes one")
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import xarray as xr
 
 from roughvisc.arguments import DataNeeded, NoData
 from roughvisc.errors import InputError, short_repr
-from roughvisc.units import quantity
+from roughvisc.units import number
 from roughvisc.variables import VARIABLES
 
 #: 16384 squared: a field of doubles takes 2 GB.
@@ -132,7 +132,7 @@ def unit_of(numbers: Any) -> str | None:
 def metres_in(unit: str, name: str) -> float:
     """Return the length of a unit in metres; raise :class:`InputError` if the unit of `name` is not a length."""
     try:
-        return quantity(f"1 {unit}", "m")
+        return number(f"1 {unit}", "m")
     except InputError as error:
         raise InputError(f"{name} has the unit {unit!r}: expected a length, such as 'm' or 'um'") from error
 
@@ -279,21 +279,12 @@ def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)"
         raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
 
 
-def number(name: str, value: Any, unit: str, *, low: float = 0.0, high: float = math.inf) -> float:
-    """Check that a value is a finite number above `low` and at most `high`; return it as float."""
-    right = isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-    if not (right and low < value <= high):
-        below = f" and at most {high:g}" if math.isfinite(high) else ""
-        raise InputError(key=name, found=value, expected=f"a finite number above {low:g}{below} [{unit}]")
-    return float(value)
-
-
 def pair(name: str, value: Any) -> tuple[float, float]:
     """Return two positive lengths; one length counts for both axes. [m]"""
     both = _both(value)
     if len(both) != 2:
         raise InputError(key=name, found=value, expected="one number or a pair (x, y) [m]")
-    return number(name, both[0], "m"), number(name, both[1], "m")
+    return number(both[0], "m", name, above=0), number(both[1], "m", name, above=0)
 
 
 def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:

@@ -16,8 +16,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import counts, labelled, noted, number, pair, spacing, with_coordinates
-from roughvisc.units import Quantity, quantities
+from roughvisc.topography.grid import counts, labelled, noted, pair, spacing, with_coordinates
+from roughvisc.units import Quantity, number, quantities
 
 
 @quantities(radius="m", size="m")
@@ -47,7 +47,7 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
     InputError
         If a parameter is not positive and finite.
     """
-    return _indenter("sphere", {"radius": number("radius", radius, "m"), "exact": bool(exact)}, size, shape)
+    return _indenter("sphere", {"radius": number(radius, "m", "radius", above=0), "exact": bool(exact)}, size, shape)
 
 
 @quantities(size="m")
@@ -73,7 +73,7 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     InputError
         If a parameter is not positive and finite.
     """
-    return _indenter("cone", {"slope": number("slope", slope, "-")}, size, shape)
+    return _indenter("cone", {"slope": number(slope, "1", "slope", above=0)}, size, shape)
 
 
 @quantities(radius="m", size="m")
@@ -99,7 +99,7 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     InputError
         If a parameter is not positive and finite, or no cell centre lies within the radius.
     """
-    return _indenter("flat_punch", {"radius": number("radius", radius, "m")}, size, shape)
+    return _indenter("flat_punch", {"radius": number(radius, "m", "radius", above=0)}, size, shape)
 
 
 def is_indenter(h: xr.DataArray) -> bool:

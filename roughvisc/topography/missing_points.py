@@ -15,11 +15,11 @@ from roughvisc.topography.grid import (
     filled_points,
     like,
     noted,
-    number,
     require_heights,
     spacing,
     with_filled_points,
 )
+from roughvisc.units import number
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
@@ -59,7 +59,7 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     """
     if not isinstance(window, int) or window < 3 or window % 2 == 0:
         raise InputError(key="window", found=window, expected="an odd whole number of at least 3")
-    threshold = number("threshold", threshold, "-")
+    threshold = number(threshold, "1", "threshold", above=0)
     h = checked(h, "mask_outliers")
     require_heights(h, "mask_outliers")
     off = np.abs(h.values - _local_median(h.values, window))

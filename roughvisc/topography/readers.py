@@ -21,11 +21,11 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.formats.registry import Channel, ScanFile, brief, forget, open_file, suffixes
-from roughvisc.topography.grid import checked, in_metres, labelled, noted, number, pair, with_coordinates
+from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.orientation import orientation, top_line_first
 from roughvisc.topography.points import gridded, lattice
-from roughvisc.units import Quantity, quantities, quantity
+from roughvisc.units import Quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
 #: of 76 mm too.
@@ -59,14 +59,14 @@ def read_file(
     how = Reading(**options)
     for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
         if unit is not None:
-            quantity(f"1 {unit}", "m", key)
+            number(f"1 {unit}", "m", key)
     for key, value, unit, low in (
-        ("no_data", how.no_data, "-", -math.inf),
-        ("height_scale", how.height_scale, "-", 0.0),
+        ("no_data", how.no_data, "1", None),
+        ("height_scale", how.height_scale, "1", 0.0),
         ("grid", how.grid, "m", 0.0),
     ):
         if value is not None:
-            number(key, value, unit, low=low)
+            number(value, unit, key, above=low)
     how = how._replace(spacing=None if how.spacing is None else pair("spacing", how.spacing))
     with _reading(path), closing(open_file(path, format)) as file:
         chosen = _chosen(file, channel)
@@ -128,9 +128,7 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
 def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
     stated = {
-        unit: quantity(f"1 {unit}", "m", "the unit in the file")
-        for unit in (channel.unit, channel.lateral_unit)
-        if unit
+        unit: number(f"1 {unit}", "m", "the unit in the file") for unit in (channel.unit, channel.lateral_unit) if unit
     }
     sized = channel.spacing is not None or channel.positions is not None or channel.kind == "points"
     open_xy = sized and channel.lateral_unit is None and how.spacing is None
@@ -140,8 +138,8 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
         ("height_unit", how.height_unit, open_z),
     ):
         for unit, metres in stated.items() if given is not None and not serves else ():
-            if not math.isclose(metres, quantity(f"1 {given}", "m")):
-                scale = f"{quantity(f'1 {given}', 'm') / metres:.6g}"
+            if not math.isclose(metres, number(f"1 {given}", "m")):
+                scale = f"{number(f'1 {given}', 'm') / metres:.6g}"
                 hint = f"; height_scale = {scale} if its numbers are in {given}" if channel.unit else ""
                 raise InputError(
                     f"it states its unit as {unit!r}: expected no {key}{hint}", key=key, found=given, expected="none"
@@ -157,8 +155,8 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
         text = f"it states no {' and no '.join(lacks)}: expected {', and '.join(expected)}"
         both = ", and height_unit if heights have another" if len(lacks) == 2 and sized else ""
         raise InputError(text + both, key=key, expected=f"{expected[0]}")
-    given = quantity(f"1 {how.unit}", "m") if how.unit else 1.0
-    z = stated[channel.unit] if channel.unit else quantity(f"1 {how.height_unit or how.unit}", "m")
+    given = number(f"1 {how.unit}", "m") if how.unit else 1.0
+    z = stated[channel.unit] if channel.unit else number(f"1 {how.height_unit or how.unit}", "m")
     return stated[channel.lateral_unit] if channel.lateral_unit else given, z
 
 

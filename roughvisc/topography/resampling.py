@@ -19,13 +19,12 @@ from roughvisc.topography.grid import (
     filled_points,
     like,
     noted,
-    number,
     require_complete,
     spacing,
     with_coordinates,
 )
 from roughvisc.topography.missing_points import membrane
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 #: Largest reduction of an overlap by rounding, relative to a cell.
 _ROUNDING = 1e-9
@@ -114,7 +113,7 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     InputError
         If points are missing or the length is out of its range.
     """
-    shortest = number("shortest", shortest, "m")
+    shortest = number(shortest, "m", "shortest", above=0)
     h = checked(h, "without_short_waves")
     sides = spacing(h)
     lengths = [n * d for n, d in zip(h.shape, sides, strict=True)]

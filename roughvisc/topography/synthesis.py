@@ -15,10 +15,10 @@ import xarray as xr
 
 from roughvisc.arguments import check_keys, located, one_of, units_of
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import counts, labelled, number, pair
+from roughvisc.topography.grid import counts, labelled, pair
 from roughvisc.topography.indenters import cell_of, cone, flat_punch, recipe_of, sphere
 from roughvisc.topography.spectrum import wavevectors
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 
 @quantities(amplitude="m", wavelength="m", size="m")
@@ -48,7 +48,7 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     InputError
         If a parameter is not positive and finite, `waves` is neither 1 nor 2, or the waves do not fit the domain.
     """
-    amplitude, wavelength = number("amplitude", amplitude, "m"), number("wavelength", wavelength, "m")
+    amplitude, wavelength = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
     size, shape = pair("size", size), counts("shape", shape, low=1)
     if waves not in (1, 2):
         raise InputError(key="waves", found=waves, expected="1 (along x) or 2 (along x and y)")
@@ -144,19 +144,22 @@ def self_affine(
     size, shape = pair("size", size), counts("shape", shape)
     if amplitudes not in ("fixed", "gaussian"):
         raise InputError(key="amplitudes", found=amplitudes, expected="'fixed' or 'gaussian'")
-    hurst = number("hurst", hurst, "-", high=1.0)
+    hurst = number(hurst, "1", "hurst", above=0, most=1.0)
     if (rms_slope is None) == (rms_height is None):
         raise InputError(
             f"rms_slope is {rms_slope!r} and rms_height is {rms_height!r}: expected exactly one of the two"
         )
-    target = number("rms_slope", rms_slope, "-") if rms_height is None else number("rms_height", rms_height, "m")
-    anisotropy = number("anisotropy", anisotropy, "-")
+    if rms_height is None:
+        target = number(rms_slope, "1", "rms_slope", above=0)
+    else:
+        target = number(rms_height, "m", "rms_height", above=0)
+    anisotropy = number(anisotropy, "1", "anisotropy", above=0)
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
     finest = 2 * max(d / s for d, s in zip(cell_of(size, shape), stretch, strict=True))
-    shortcut = finest if shortcut is None else number("shortcut", shortcut, "m")
+    shortcut = finest if shortcut is None else number(shortcut, "m", "shortcut", above=0)
     if shortcut < finest * (1 - 1e-12):
         raise InputError(f"shortcut is {shortcut!r}: expected at least two cells, {finest:.6g} [m]")
-    if rolloff is not None and number("rolloff", rolloff, "m") < shortcut:
+    if rolloff is not None and number(rolloff, "m", "rolloff", above=0) < shortcut:
         raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
     try:
@@ -259,6 +262,6 @@ def check_recipe(where: str, table: Mapping[str, Any]) -> None:
             elif key == "seed" and value < 0:
                 raise InputError(key=key, found=value, expected="a whole number, at least 0")
             elif key in units_of(recipe):
-                number(key, value, units_of(recipe)[key], high=1.0 if key == "hurst" else math.inf)
+                number(value, units_of(recipe)[key], key, above=0, most=1.0 if key == "hurst" else None)
     except InputError as error:
         raise located(error, where) from error

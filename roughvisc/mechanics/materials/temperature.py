@@ -9,7 +9,7 @@ from scipy.constants import R as GAS_CONSTANT
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import check_number
-from roughvisc.units import Quantity, quantities, quantity
+from roughvisc.units import Quantity, number, quantities
 
 
 @quantities(temperature="K", reference_temperature="K")
@@ -54,7 +54,7 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     check_number("temperature", temperature, "K")
     check_number("reference_temperature", reference_temperature, "K")
     check_number("wlf_c1", wlf_c1, "1")
-    c2 = quantity(wlf_c2, "K", "wlf_c2", difference=True)
+    c2 = number(wlf_c2, "K", "wlf_c2", difference=True)
     check_number("wlf_c2", c2, "K")
     above = temperature - reference_temperature
     if not c2 + above > 0:

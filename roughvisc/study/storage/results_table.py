@@ -20,7 +20,7 @@ from roughvisc.study.storage.folder import atomic_write, no_results
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
-from roughvisc.units import number_and_unit, quantity
+from roughvisc.units import number, number_and_unit
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, variables_in_table
 
 if TYPE_CHECKING:
@@ -143,9 +143,9 @@ def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         if values.dtype.kind in "if" and (si := unit_of(key, stated[0])):
             written = [text for case in stated if (text := case.get("written", {}).get(key))]
             unit = (number_and_unit(written[0])[1] if written else "") or si
-            for place, number in enumerate(numbers):
-                if math.isfinite(number):  # without the rounding error of the conversion
-                    numbers[place] = float(f"{quantity(f'{number!r} {si}', unit):.12g}")
+            for place, value in enumerate(numbers):
+                if math.isfinite(value):  # without the rounding error of the conversion
+                    numbers[place] = float(f"{number(f'{value!r} {si}', unit):.12g}")
         columns[heading(key, unit)] = numbers
     return columns
 
@@ -170,11 +170,11 @@ def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -
 
     parameters = _parameters([one.case for one in cases])
     groups: dict[int, list[int]] = {}
-    for place, (number, one) in enumerate(zip(numbers_of(cases), cases, strict=True)):
+    for place, (case, one) in enumerate(zip(numbers_of(cases), cases, strict=True)):
         if one.key in index and REALISATION in one.case.get("varied", {}):
-            groups.setdefault(number, []).append(place)
+            groups.setdefault(case, []).append(place)
     rows = []
-    for number, places in groups.items():
+    for case, places in groups.items():
         varied = {key: values[places[0]] for key, values in parameters.items() if key not in (REALISATION, *DRAWN)}
         numbers = [_telling(index[cases[place].key]) for place in places]
         axis = AXES[index[cases[places[0]].key].along]
@@ -186,6 +186,6 @@ def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -
                 continue
             drawn = [cases[place].case["varied"][REALISATION] for place in places]
             found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
-            what = {"case": number, **varied, "quantity": name, "unit": VARIABLES[name].units, "where": where}
+            what = {"case": case, **varied, "quantity": name, "unit": VARIABLES[name].units, "where": where}
             rows.append(what | {str(key): one.item() for key, one in found.data_vars.items()})
     return pd.DataFrame(rows)

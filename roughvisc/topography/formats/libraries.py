@@ -14,7 +14,7 @@ import numpy as np
 
 from roughvisc.errors import InputError
 from roughvisc.topography.formats.registry import Channel, ScanFile, brief, suffixes
-from roughvisc.units import quantity
+from roughvisc.units import number
 
 
 def read_x3p(path: Path) -> ScanFile:
@@ -122,5 +122,5 @@ def _channel(found: Any, load: Any) -> Channel:
         if unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
             lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
             if lateral is not None and other != lateral:
-                sides = (sides[0], sides[1] * quantity(f"1 {other}", lateral))
+                sides = (sides[0], sides[1] * number(f"1 {other}", lateral))
     return Channel(str(found.channel_id), shape, lambda: load(found, shape), unit, lateral, sides or None, kind=kind)
