@@ -45,18 +45,18 @@ def test_one_row__has_one_area_and_one_share_everywhere(folder):
         area = (np.count_nonzero(contact) - 0.088 * faces) * cell
         share = area / nominal_area(ds)
         assert area < np.count_nonzero(contact) * cell
-        assert float(told["contact_area [m^2]"]) == pytest.approx(area, rel=1e-6)
+        assert float(told["contact_area [m^2]"]) == pytest.approx(area, rel=1e-6, abs=0)
         assert float(told["contact_fraction"]) == pytest.approx(share, rel=1e-6)
         console = Console(width=200, record=True, file=StringIO())
         console.print(result_table(ds))
         line = next(line for line in console.export_text().splitlines() if "Contact area at the end" in line)
-        assert printed(line) == pytest.approx(area, rel=5e-3)
+        assert printed(line) == pytest.approx(area, rel=5e-3, abs=0)
         assert printed(line.partition(",")[2]) == pytest.approx(share, rel=5e-3)
         panel = next(ax for ax in rv.plot.history(ds).axes if ax.get_ylabel().startswith("Contact area"))
         drawn = panel.lines[0]
         unit = printed(f"1 {panel.get_ylabel().partition('[')[2]}")
-        assert drawn.get_ydata()[-1] * unit == pytest.approx(area, rel=1e-9)
+        assert drawn.get_ydata()[-1] * unit == pytest.approx(area, rel=1e-9, abs=0)
         across = rv.plot.sweep(swept, times=[-1]).axes[0]
         unit = printed(f"1 {across.get_ylabel().partition('[')[2]}")
-        assert np.asarray(across.lines[0].get_ydata())[number] * unit == pytest.approx(area, rel=1e-9)
+        assert np.asarray(across.lines[0].get_ydata())[number] * unit == pytest.approx(area, rel=1e-9, abs=0)
         assert math.isclose(float(swept.contact_area[number, -1]), area, rel_tol=1e-12)

@@ -147,5 +147,5 @@ def _solvers(network: Network, width: int) -> Iterator[Callable[[Array], Array]]
     """Yield the solver of each round: two grids for a large network, then direct factors."""
     if len(network.cells) >= _LARGE:
         solve = solver_on_two_grids(network, width)
-        yield from (functools.partial(solve, enough=enough) for enough in _ON_TWO_GRIDS)
+        yield from (functools.partial(solve, enough) for enough in _ON_TWO_GRIDS)
     yield from itertools.repeat(factors(equations(network)), _BY_FACTORS)

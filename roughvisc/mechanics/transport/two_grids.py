@@ -31,10 +31,10 @@ _MOST = 100
 _SHIFT = 1e-14
 
 
-def solver_on_two_grids(network: Network, width: int) -> Callable[[Array, float], Array]:
+def solver_on_two_grids(network: Network, width: int) -> Callable[[float, Array], Array]:
     """Return a solver by preconditioned conjugate gradients: from a source in each cell to the pressures of the cells.
 
-    The solver also takes the relative error of the energy at which the iteration ends. If it does not converge, it
+    Its first argument is the relative error of the energy at which the iteration ends. If it does not converge, it
     returns its last iterate.
 
     Parameters
@@ -59,7 +59,7 @@ def solver_on_two_grids(network: Network, width: int) -> Callable[[Array, float]
         found += weight * (left - matrix @ found)
         return found
 
-    def solve(source: Array, enough: float) -> Array:
+    def solve(enough: float, source: Array) -> Array:
         pressure, left = np.zeros_like(source), source.copy()
         direction, before, energy = np.zeros_like(source), 1.0, 0.0
         for _ in range(_MOST):
