@@ -3,80 +3,42 @@
 import numpy as np
 import pytest
 import xarray as xr
-from support import refused
+from support import STUDY, case_of, refused
 
 import roughvisc as rv
-from roughvisc.study.budget import budgets
 from roughvisc.study.case import Case
 from roughvisc.study.target import parse_targets
 
-BALL = """
-title = "Ball"
-[surface]
-generate = "sphere"
-radius = "1 mm"
-size = "0.2 mm"
-shape = [45, 43]
-[material]
-model = "elastic"
-shear_modulus = "1 MPa"
-[[program]]
-load = "0.2 mN"
-over = 0
-[[program]]
-hold = "1 s"
-[keep]
-times = [0.0, 1.0]
-"""
-ROUGH = """
-title = "Rough"
-[surface]
-generate = "self_affine"
-size = ["1 mm", "0.9 mm"]
-shape = [54, 50]
-hurst = 0.8
-rms_slope = 0.2
-rolloff = "0.3 mm"
-amplitudes = "gaussian"
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-pressure = "50 kPa"
-over = 0
-[[program]]
-hold = "1 s"
-[solve]
-boundary = "periodic"
-tolerance = 1e-2
-[keep]
-fields = []
-times = [0.01, 1.0]
-"""
+BALL = {
+    "surface": {"generate": "sphere", "radius": 1e-3, "size": 2e-4, "shape": [45, 43]},
+    "material": {"model": "elastic", "shear_modulus": 1e6},
+    "program": [{"load": 2e-4, "over": 0}, {"hold": 1.0}],
+    "keep": {"times": [0.0, 1.0]},
+}
+ROUGH_SURFACE = {"generate": "self_affine", "size": [1e-3, 9e-4], "shape": [54, 50], "hurst": 0.8, "rms_slope": 0.2}
+ROUGH = {
+    "surface": ROUGH_SURFACE | {"rolloff": 3e-4, "amplitudes": "gaussian", "seed": 1},
+    "material": {"model": "zener", "shear_modulus": 3e6, "kelvin_modulus": 1e6, "kelvin_viscosity": 1e5},
+    "program": [{"pressure": 5e4, "over": 0}, {"hold": 1.0}],
+    "solve": {"boundary": "periodic", "tolerance": 1e-2},
+    "keep": {"fields": [], "times": [0.01, 1.0]},
+}
 SMOOTH = {"surface.shape": [27, 25], "surface.shortcut": "150 um", "solve.tolerance": 1e-3}
 RADIUS = (3 * 2e-4 * 1e-3 / (4 * 4e6)) ** (1 / 3)  # of the contact of BALL: a^3 = 3 F R / (4 E*), with E* = 4 G
 OCTAVE = "next octave of waves"
 
 
-def case(text, tmp_path, **changes):
-    path = tmp_path / "study.toml"
-    path.write_text(text)
-    return rv.vary(rv.read_study(path), changes)
+def case(tables, tmp_path, **changes):
+    return rv.vary(case_of(tmp_path, **tables), changes)
 
 
 def stated(study, tmp_path, quantity="contact_area", **options):
-    return rv.budget(study, quantity, out=tmp_path / "budget", workers=0, progress=False, **options)
+    found = rv.budget(study, quantity, out=tmp_path / "budget", workers=0, progress=False, **options)
+    return found if isinstance(quantity, str) else {name: found.sel(quantity=name) for name in quantity}
 
 
 def width(found, source, row=-1):
     return float(found["half_width"].sel(source=source)[row])
-
-
-def states(found):
-    return dict(zip(found["source"].values.tolist(), found["state"].values.tolist(), strict=True))
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -85,7 +47,7 @@ def states(found):
 
 def test_interval__holds_hertz(tmp_path):
     exact = {"contact_area": np.pi * RADIUS**2, "approach": RADIUS**2 / 1e-3, "force": 2e-4}
-    found = budgets(case(BALL, tmp_path), list(exact), {}, out=tmp_path / "budget", workers=0, progress=False)
+    found = stated(case(BALL, tmp_path), tmp_path, list(exact))
     for name, true in exact.items():
         one = found[name]
         assert (one["lower"] <= true * (1 + 1e-12)).all(), name
@@ -122,10 +84,7 @@ def test_grid__holds_the_change_to_cells_half_as_long(tmp_path):
 def test_missing_waves__count_on_one_side(tmp_path):
     """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
     study, names = case(ROUGH, tmp_path), ["contact_area", "mean_gap"]
-    one, two = (
-        budgets(study, names, {"cutoff": cutoff}, out=tmp_path / "b", workers=0, progress=False)
-        for cutoff in ("18 um", "9 um")
-    )
+    one, two = (stated(study, tmp_path, names, cutoff=cutoff) for cutoff in ("18 um", "9 um"))
     for name, side in (("contact_area", -1), ("mean_gap", 1)):
         found = one[name]
         missed = found["half_width"].sel(source=OCTAVE)
@@ -170,7 +129,7 @@ def test_sample__is_the_scatter_of_other_patches(tmp_path):
 
 def test_indenter__has_no_sample_and_no_further_waves(tmp_path):
     found = stated(case(BALL, tmp_path), tmp_path, population="ensemble", cutoff=1e-6)
-    assert [states(found)[name] for name in ("sample", OCTAVE, "time scale")] == ["none"] * 3
+    assert (found["state"].sel(source=["sample", OCTAVE, "time scale"]) == "none").all()
     assert found.attrs["open"] == "modulus"
 
 
@@ -245,11 +204,6 @@ def got(study, tmp_path, want):
     return rv.run(study, tmp_path / "results", want=want, progress=False)
 
 
-def written(tmp_path, name):
-    with xr.open_dataset(tmp_path / "results" / "budget" / f"budget-{name}.nc") as found:
-        return found.load()
-
-
 @pytest.mark.thorough
 def test_ball__is_computed_on_the_coarsest_grid_that_gives_the_wanted_error(tmp_path):
     exact, cells = np.pi * RADIUS**2, []
@@ -257,7 +211,8 @@ def test_ball__is_computed_on_the_coarsest_grid_that_gives_the_wanted_error(tmp_
         found = got(case(BALL, tmp_path, **{"surface.shape": [51, 49]}), tmp_path, {"contact_area": part})
         cells.append(found.sizes["x"])
         assert float(found["contact_area"][-1]) == pytest.approx(exact, rel=part)
-        one = written(tmp_path, "contact_area")
+        with xr.open_dataset(tmp_path / "results" / "budget" / "budget-contact_area.nc") as file:
+            one = file.load()
         assert float(one["lower"][-1]) <= exact <= float(one["upper"][-1])
         assert float(one["upper"][-1] / one["value"][-1]) <= 1 + 1.005 * part
         assert found.attrs["tolerance"] == pytest.approx(min(part / 5, 0.01))
@@ -315,12 +270,12 @@ def test_want__that_is_none_is_refused(tmp_path, want, key):
 
 
 def test_command__says_what_it_chose_and_ends_with_the_budget(tmp_path, invoke):
-    (tmp_path / "study.toml").write_text(BALL)
+    (tmp_path / "study.toml").write_text(STUDY)
     status, said, complained = invoke("run", tmp_path / "study.toml", "--for", "10 % contact_area", "--no-plots")
     assert status == 0, complained
     assert said.index("Chosen\n  grid: ") < said.index("Result: ") < said.index(OCTAVE) < said.index("Budget: ")
     folder = tmp_path / "results" / "study"
     assert len(list(folder.glob("*.nc"))) == 1
     assert (folder / "budget" / "budget-contact_area.nc").exists()
-    (tmp_path / "study.toml").write_text(BALL + '[sweep]\n"surface.radius" = ["1 mm", "2 mm"]\n')
+    (tmp_path / "study.toml").write_text(STUDY + '[sweep]\n"surface.radius" = ["1 mm", "2 mm"]\n')
     assert invoke("run", tmp_path / "study.toml", "--for", "10 % contact_area")[0] == 2

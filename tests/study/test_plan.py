@@ -7,67 +7,37 @@ import tracemalloc
 import numpy as np
 import psutil
 import pytest
-from support import BALL, refused
+from support import STUDY, case_of, refused
 
 import roughvisc as rv
 from roughvisc.errors import EdgeContactError
 from roughvisc.experiment.resources import PROCESS
 from roughvisc.study import plan as plan_module
-from roughvisc.study.case import read_cases, vary
+from roughvisc.study.case import vary
 from roughvisc.study.execution.run import run_case
 
-ROUGH = """
-title = "Rough"
-[surface]
-generate = "self_affine"
-size = "1 mm"
-shape = [90, 108]
-hurst = 0.8
-rms_slope = 0.1
-rolloff = "0.5 mm"
-shortcut = "50 um"
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.5 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-load = "0.02 N"
-over = "10 ms"
-[[program]]
-hold = "0.5 s"
-[solve]
-boundary = "periodic"
-tolerance = 2e-3
-[keep]
-fields = ["pressure"]
-times = "all"
-"""
-SPHERE = """
-[surface]
-generate = "sphere"
-radius = "10 mm"
-size = "0.3 mm"
-shape = [25, 24]
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-load = "0.4 N"
-over = 0
-[[program]]
-hold = "0.95 s"
-[solve]
-tolerance = 1e-2
-[keep]
-times = 4
-fields = ["pressure"]
-"""
-CURVE = ROUGH[: ROUGH.index("[[program]]")] + '[friction]\npressure = "20 kPa"\nspeeds = ["5 mm/s", "0.2 m/s"]\n'
-CURVE += '[keep]\nfields = ["pressure"]\n'
+ZENER = {"model": "zener", "shear_modulus": 1e6, "kelvin_modulus": 5e5, "kelvin_viscosity": 1e5}
+ROUGH_SURFACE = {"generate": "self_affine", "size": 1e-3, "shape": [90, 108], "hurst": 0.8, "rms_slope": 0.1}
+ROUGH = {
+    "surface": ROUGH_SURFACE | {"rolloff": 5e-4, "shortcut": 5e-5, "seed": 1},
+    "material": ZENER,
+    "program": [{"load": 0.02, "over": 0.01}, {"hold": 0.5}],
+    "solve": {"boundary": "periodic", "tolerance": 2e-3},
+    "keep": {"fields": ["pressure"], "times": "all"},
+}
+SPHERE = {
+    "surface": {"generate": "sphere", "radius": 1e-2, "size": 3e-4, "shape": [25, 24]},
+    "material": ZENER | {"shear_modulus": 3e6, "kelvin_modulus": 1e6},
+    "program": [{"load": 0.4, "over": 0}, {"hold": 0.95}],
+    "solve": {"tolerance": 1e-2},
+    "keep": {"times": 4, "fields": ["pressure"]},
+}
+CURVE = {name: ROUGH[name] for name in ("surface", "material")} | {
+    "program": None,
+    "friction": {"pressure": 2e4, "speeds": [5e-3, 0.2]},
+    "keep": {"fields": ["pressure"]},
+}
+FEW = {"surface.shape": [16, 15], "surface.shortcut": 2e-4}
 RAMP = {"load": 0.02, "over": 0.01}
 CYCLE = {"program": [RAMP, {"cycle": {"mean": 0.02, "amplitude": 0.01, "period": 0.1, "cycles": 3}}]}
 SLIDE = {"program": [RAMP, {"slide": 2e-4, "over": 0.1, "direction": "x"}], "keep.times": 5}
@@ -89,20 +59,15 @@ QUICK = ("load", "slide", "rounded", "curve", "fine", "growing", "part")
 
 @pytest.fixture
 def study(tmp_path):
-    def write(text):
-        path = tmp_path / "study.toml"
-        path.write_text(text)
-        return read_cases(path)
-
-    return write
+    """Make a case of some tables, with changes."""
+    return lambda tables, changes=None: vary(case_of(tmp_path, **tables), changes or {})
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.thorough) for name in CASES]
 )
 def test_plan__is_as_near_to_the_run_as_it_says(study, name):
-    text, changes = CASES[name]
-    case = vary(study(text)[0], changes)
+    case = study(*CASES[name])
     planned, ds = rv.plan([case]).isel(case=0), rv.run(case, progress=False)
     assert str(planned.refusal.values) == ""
     assert 0.5 < float(planned.convolutions) / int(ds.convolutions.sum()) < 2
@@ -117,9 +82,8 @@ def test_plan__is_as_near_to_the_run_as_it_says(study, name):
 @pytest.mark.parametrize("name", ["load", "slide", "curve", "fine", "part"])
 def test_time__is_that_of_the_run_within_a_factor_of_two(study, tmp_path, name):
     """In time of the processor, which other programs change less, of a process that has imported what it needs."""
-    text, changes = CASES[name]
-    case = vary(study(text)[0], changes)
-    run_case(vary(case, {"surface.shape": [16, 15]} | ({"surface.shortcut": 2e-4} if text != SPHERE else {})), tmp_path)
+    case = study(*CASES[name])
+    run_case(study(SPHERE if name == "part" else ROUGH, FEW if name != "part" else {}), tmp_path)  # imports
     planned, began = float(rv.plan([case]).wall_time[0]), time.process_time()
     run_case(case, tmp_path, threads=1)
     assert 0.5 < planned / (time.process_time() - began) < 2
@@ -152,9 +116,9 @@ def test_time__is_that_of_the_run_within_a_factor_of_two(study, tmp_path, name):
     ids=["zener", "elastic", "three", "free"],
 )
 def test_memory__is_that_of_the_arrays_of_the_run(study, changes):
-    case = vary(study(ROUGH)[0], {"solve.tolerance": 2e-2, "keep.times": 3, "keep.fields": []} | changes)
+    case = study(ROUGH, {"solve.tolerance": 2e-2, "keep.times": 3, "keep.fields": []} | changes)
     planned = float(rv.plan([case]).memory[0]) - PROCESS
-    rv.run(vary(case, {"surface.shape": [16, 15], "surface.shortcut": 2e-4}), progress=False)  # imports what it needs
+    rv.run(vary(case, FEW), progress=False)  # imports what it needs
     tracemalloc.start()
     try:
         rv.run(case, progress=False)
@@ -166,7 +130,7 @@ def test_memory__is_that_of_the_arrays_of_the_run(study, changes):
 
 @pytest.mark.parametrize("changes", [{}, CYCLE, SLIDE], ids=["hold", "cycle", "slide"])
 def test_coarse_run__is_carried_on_to_the_end(study, monkeypatch, changes):
-    case = vary(study(ROUGH)[0], changes | {"keep.times": 6})
+    case = study(ROUGH, changes | {"keep.times": 6})
     whole = rv.plan([case])
     monkeypatch.setattr(plan_module, "_MOST_CONVOLUTIONS", int(whole.convolutions[0]) // 3)
     cut = rv.plan([case])
@@ -176,8 +140,7 @@ def test_coarse_run__is_carried_on_to_the_end(study, monkeypatch, changes):
 
 
 def test_free_contact__is_solved_on_a_part_of_the_surface(study):
-    (case,) = study(SPHERE)
-    case = vary(case, {"surface.size": 2e-3, "surface.shape": [201, 187], "program.0.load": 1e-3})
+    case = study(SPHERE, {"surface.size": 2e-3, "surface.shape": [201, 187], "program.0.load": 1e-3})
     planned = rv.plan([case, vary(case, {"solve.edge": "accept"})])
     assert planned.cells_x.values.tolist() == [201, 201]
     assert ["solved on" in model for model in planned.model.values] == [True, False]
@@ -188,8 +151,8 @@ def test_free_contact__is_solved_on_a_part_of_the_surface(study):
 def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
     for name in ("_BUDGET", "_SHARE"):
         monkeypatch.setattr(plan_module, name, 0.0)
-    cases = study(ROUGH + '[sweep]\n"program.0.load" = ["10 mN", "20 mN"]\n')
-    planned = rv.plan(cases)
+    (tmp_path / "study.toml").write_text(STUDY + '[sweep]\n"program.0.load" = ["10 mN", "20 mN"]\n')
+    planned = rv.plan(tmp_path / "study.toml")
     assert list(planned.marched.values) == [True, False]
     assert float(planned.steps[0]) == float(planned.steps[1])
     assert list(np.isfinite(planned.contact_fraction.values)) == [True, False]
@@ -202,18 +165,15 @@ def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
 
 
 def test_full_contact__is_foreseen(study):
-    (case,) = study(ROUGH)
-    light, heavy = (rv.plan([vary(case, {"program.0.load": load})]).isel(case=0) for load in (0.02, 2.0))
+    light, heavy = (rv.plan([study(ROUGH, {"program.0.load": load})]).isel(case=0) for load in (0.02, 2.0))
     assert (str(light.warning.values) != "", str(heavy.warning.values) != "") == (False, True)
     assert float(heavy.contact_fraction) > 0.95
     assert float(heavy.nominal_pressure) == pytest.approx(2e6)
 
 
 def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
-    surface = (
-        '[surface]\ngenerate = "self_affine"\nsize = "1 mm"\nshape = [40, 36]\nhurst = 0.8\nrms_slope = 0.1\nseed = 1\n'
-    )
-    (rough,) = study(BALL[: BALL.index("[surface]")] + surface + BALL[BALL.index("[material]") :])
+    surface = ROUGH_SURFACE | {"shape": [40, 36], "seed": 1}
+    rough = study(SPHERE | {"surface": surface}, {"solve.boundary": "free", "program.0.load": 5e-3})
     costs = rv.plan([rough, vary(rough, {"solve.edge": "accept"})])
     assert list(costs.warning.values != "") == [True, False]
     with pytest.raises(EdgeContactError):
@@ -221,7 +181,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
 
 
 def test_plan__refuses_with_a_reason(study, monkeypatch):
-    (case,) = study(BALL)
+    case = study(SPHERE)
     beyond = vary(case, {"solve.boundary": "periodic", "program": [{"approach": "1 mm", "over": 1}]})
     planned = rv.plan([case, beyond])
     assert list(planned.refusal.values != "") == [False, True]
@@ -248,6 +208,5 @@ def test_missing_points__are_refused(study, tmp_path):
     height = rv.self_affine((40e-6, 30e-6), (40, 30), hurst=0.8, rms_height=1e-7, seed=2)
     height.values[3, 4] = np.nan
     height.rename("height").to_netcdf(tmp_path / "scan.nc")
-    surface = ROUGH[ROUGH.index("generate") : ROUGH.index("[material]")]
-    planned = rv.plan(study(ROUGH.replace(surface, 'file = "scan.nc"\n')))
+    planned = rv.plan([study(ROUGH | {"surface": {"file": str(tmp_path / "scan.nc")}})])
     assert "missing" in str(planned.refusal[0].item())
