@@ -44,8 +44,8 @@ from roughvisc.study.machine_history import read_program as read_program
 from roughvisc.study.observed import observe as observe
 from roughvisc.study.plan import plan as plan
 from roughvisc.study.realisations import over_realisations as over_realisations
-from roughvisc.study.storage.export import to_csv as to_csv
 from roughvisc.study.storage.netcdf import open_result as open_result
+from roughvisc.study.storage.results_table import to_csv as to_csv
 from roughvisc.study.storage.results_table import to_table as to_table
 from roughvisc.study.storage.sweep_data import open_results as open_results
 from roughvisc.study.trade import trade as trade

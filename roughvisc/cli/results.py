@@ -135,7 +135,7 @@ def verify(results: Path) -> None:
     Example:
       roughvisc verify results/focus_variation-study
     """
-    from roughvisc.study.storage.upkeep import verify as verified
+    from roughvisc.study.storage.netcdf import verify as verified
 
     found = verified(results)
     bad = [flaw for flaw in found.values() if flaw]
@@ -159,7 +159,7 @@ def clean(results: Path, everything: bool) -> None:
     Example:
       roughvisc clean results/focus_variation-study
     """
-    from roughvisc.study.storage.upkeep import clean_folder
+    from roughvisc.study.storage.index import clean_folder
 
     removed = clean_folder(results, everything=everything)
     for path in removed:

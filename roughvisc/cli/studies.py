@@ -112,7 +112,7 @@ def run(
         cases = [replace(rv.vary(case, {"solve.device": device}), varied=case.varied) for case in cases]
     if targets and len(cases) > 1:
         raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
-    folder, console = result_folder(cases[0], out, to_write=False), screen(quiet)
+    folder, console = result_folder(cases[0], out), screen(quiet)
     remote = [settings.pop(name) for name in ("scheduler", "scheduler_file")]
     with connect(*remote) if any(remote) else nullcontext() as client:
         if len(cases) > 1 or (client is not None and not targets):
@@ -140,11 +140,10 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
-    from roughvisc.study.storage.folder import is_writable, require_writable, result_path
+    from roughvisc.study.storage.folder import is_writable, result_path
 
     path = result_path(folder, case.key)
     if not is_result_of(case, path):
-        require_writable(folder, "since the case is not finished")
         with reporting(True, label, console, case.experiment.progress) as report:
             run_case(case, folder, progress=report, threads=threads or threads_each(1))
     else:
@@ -166,22 +165,22 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     """Compute and summarise a sweep; raise its failure, if there is one."""
     from roughvisc.cli.tables import realisations_tables, sweep_table
     from roughvisc.study.execution.display import Display
-    from roughvisc.study.execution.outcome import REFUSED
+    from roughvisc.study.execution.run import REFUSED
     from roughvisc.study.execution.sweep import run_cases
-    from roughvisc.study.storage.failures import LOG
+    from roughvisc.study.storage.folder import LOG
     from roughvisc.study.storage.index import index_of
-    from roughvisc.study.storage.results_table import CASES, REALISATIONS, realisations_table
-    from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+    from roughvisc.study.storage.results_table import CASES, realisations_table
+    from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
 
     found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     outcomes, listed = list(found.values()), sweep_cases(cases)
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
-    if (folder / REALISATIONS).exists():
-        console.print(realisations_tables(realisations_table(index_of(folder), listed)))
+    if len(drawn := realisations_table(index_of(folder), listed)):
+        console.print(realisations_tables(drawn))
     say_path(console, "Results", folder)
-    for what, name in (("Table of cases", CASES), ("Table of realisations", REALISATIONS), ("Log", LOG)):
+    for what, name in (("Table of cases", CASES), ("Log", LOG)):
         if (folder / name).exists():
             say_path(console, what, folder / name)
     bad = [outcome for outcome in outcomes if outcome.kind != "done"]

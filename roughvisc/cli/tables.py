@@ -22,7 +22,7 @@ from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of, variables_
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roughvisc.study.execution.outcome import Outcome
+    from roughvisc.study.execution.run import Outcome
     from roughvisc.topography.inspection import Inspection
 
 #: Stated error and its parts; the largest values are printed.
@@ -83,7 +83,6 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     title : str
         Title of the study.
     """
-    from roughvisc.study.execution.outcome import IN_WORDS  # slow to import
 
     finished = [outcome.entry for outcome in outcomes if outcome.entry]
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
@@ -91,7 +90,7 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
     before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
     rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(finished)}, {before}")]
-    kinds = Counter(IN_WORDS[outcome.kind] for outcome in outcomes if outcome.kind != "done")
+    kinds = Counter(outcome.kind for outcome in outcomes if outcome.kind != "done")
     rows += [(kind.capitalize(), str(count)) for kind, count in kinds.items()]
     rows += accuracy_rows([entry.arrays for entry in finished])
     if spent:

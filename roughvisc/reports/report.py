@@ -25,12 +25,11 @@ from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
-from roughvisc.study.storage.failures import recorded_failure
-from roughvisc.study.storage.folder import atomic_write, no_results, result_files
+from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.results_table import realisations_table
-from roughvisc.study.storage.sweep_cases import number_by_key, read_sweep
+from roughvisc.study.storage.sweep_data import number_by_key, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of, variables_in_table

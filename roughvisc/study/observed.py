@@ -18,7 +18,7 @@ from roughvisc.study.storage.folder import lock_case, lock_path, require_writabl
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result, write_result
 from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_cases import sweep_cases
+from roughvisc.study.storage.sweep_data import sweep_cases
 
 log = logging.getLogger("roughvisc")
 
@@ -59,7 +59,7 @@ def observe(
     """
     cases = read_cases(cases) if isinstance(cases, str | Path) else cases
     distinct = {case.key: case for case in cases if case.observed}
-    folder = result_folder(cases[0], out, to_write=False).absolute()
+    folder = result_folder(cases[0], out).absolute()
     added = []
     for number, case in enumerate(distinct.values()):
         if progress is not None:

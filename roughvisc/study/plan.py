@@ -47,7 +47,7 @@ from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import existing_part
-from roughvisc.study.storage.sweep_cases import labels_of, parameters_of
+from roughvisc.study.storage.sweep_data import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.indenters import remade
 from roughvisc.topography.parameters import rms_slope
@@ -487,7 +487,7 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    processes = workers or processes_that_fit(largest, cores(), there.size)
+    processes = workers or processes_that_fit(largest[0], cores(), there.size)
     processes = min(processes, total)
     together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]
@@ -495,7 +495,7 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     reasons = [several + "; ".join([*dict.fromkeys(refusals)][:3])] if refusals else []
     if together > PART * there.size >= largest[0]:
         needed = f"{processes} processes need {amount(together)} of memory, and {amount(there.size)} are {there.words}"
-        reasons.append(f"{needed}: use --workers {processes_that_fit(largest, processes, there.size)}")
+        reasons.append(f"{needed}: use --workers {processes_that_fit(largest[0], processes, there.size)}")
     if size > PART * free_disk:
         needed = f"the results need {amount(size)} of disk, and {amount(free_disk)} are free in {place}"
         reasons.append(f"{needed}: keep fewer times or fields, or use another folder")

@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-import xarray as xr
 from support import SMALL
 
 import roughvisc as rv
@@ -18,26 +17,6 @@ def study(tmp_path):
     path = tmp_path / "two.toml"
     path.write_text(TWO_LOADS)
     return path
-
-
-def results(folder):
-    return rv.open_results(folder).drop_vars("wall_time").load()
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("workers", ["0", pytest.param("2", marks=pytest.mark.long)])
-def test_sweep__on_a_full_disk(study, tmp_path, small_disk, invoke, workers):
-    folder, remount = small_disk
-    assert invoke("run", study, "--out", tmp_path / "wanted", "--workers", "0", "-q")[0] == 0
-    for size in ("16k", "80k", "120k"):
-        remount(f"size={size}")
-        status, out, err = invoke("run", study, "--out", folder, "--workers", workers, "-q")
-        assert (status, out) == (1, "")
-        assert "No space left on device" in err.splitlines()[-1]
-        assert "Traceback" not in err
-    remount("size=20m")
-    assert invoke("run", study, "--out", folder, "--workers", workers, "-q") == (0, "", "")
-    xr.testing.assert_equal(results(folder), results(tmp_path / "wanted"))
 
 
 def everything(folder):

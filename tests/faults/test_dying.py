@@ -13,8 +13,8 @@ from support import SMALL
 
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
+from roughvisc.study.storage.index import clean_folder
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.upkeep import clean_folder
 
 WAYS = ("kill", "ENOSPC", "EROFS", "EIO", "MemoryError")
 

@@ -16,7 +16,7 @@ from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.results_table import to_table
-from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
+from roughvisc.study.storage.sweep_data import sweep_cases, write_sweep
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = f"""

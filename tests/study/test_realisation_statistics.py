@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.stats
 import xarray as xr
@@ -13,9 +12,10 @@ from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.realisations import over_realisations
+from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import REALISATIONS, to_table
-from roughvisc.study.storage.sweep_data import open_results
+from roughvisc.study.storage.results_table import realisations_table, to_table
+from roughvisc.study.storage.sweep_data import open_results, read_sweep
 
 
 def of(values, **coords):
@@ -130,7 +130,7 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
     assert table["realisation"].tolist() == [1, 2, 3] * 2
     assert table.index.tolist() == [0, 0, 0, 1, 1, 1]
     area = over_realisations(again["contact_area"]).isel(time=-1)
-    told = pd.read_csv(out / REALISATIONS, encoding="utf-8-sig").set_index(["quantity", "program.0.pressure [kPa]"])
+    told = realisations_table(index_of(out), read_sweep(out)).set_index(["quantity", "program.0.pressure [kPa]"])
     assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
     for number, pressure in enumerate((10, 20)):
         row = told.loc["contact_area", pressure]
@@ -138,8 +138,6 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
             assert row[name] == pytest.approx(float(area[name][number]), rel=1e-6), name
         assert row["case"] == number == area["case"][number]
         assert (row["count"], row["unit"], row["where"]) == (3, "m^2", "end")
-    sweep(study('[sweep]\n"program.0.pressure" = ["10 kPa", "20 kPa"]\n'), out, workers=0, progress=False)
-    assert not (out / REALISATIONS).exists(), "it is of the last sweep"
 
 
 def test_open_results__what_is_not_computed_is_missing(study, tmp_path):

@@ -6,8 +6,9 @@ import json
 import logging
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,16 +40,14 @@ def local_client(processes: int) -> Iterator[Client]:
 
     Raises
     ------
-    InputError
-        If this process runs a script that its child processes would run again.
     RoughviscError
-        If a process is lost while it starts.
+        If a process is lost while it starts. The processes import the script that is running, which must not start
+        another sweep.
     """
     import dask
     from distributed import Client, LocalCluster
     from distributed.system import MEMORY_LIMIT
 
-    refuse_unguarded_script()
     settings = {
         "distributed.scheduler.worker-saturation": 1.0,  # a lost worker has no queued cases
         "distributed.comm.timeouts.connect": "60s",
@@ -68,30 +67,10 @@ def local_client(processes: int) -> Iterator[Client]:
                 silence_logs=logging.CRITICAL,
             )
         except RuntimeError as error:
-            lost = "a process of this machine was lost while it started: repeat the command, or use --workers 0"
-            raise RoughviscError(lost) from error
+            lost = "a process of this machine was lost while it started: expected rv.sweep below "
+            raise RoughviscError(lost + '`if __name__ == "__main__":` in a script; or use workers=0') from error
         with own as cluster, Client(cluster, set_as_default=False) as client:
             yield client
-
-
-def refuse_unguarded_script() -> None:
-    """Refuse to start processes from a script without ``if __name__ == "__main__":``, which every process would run.
-
-    Raises
-    ------
-    InputError
-        If the script has no such condition; the message names the script.
-    """
-    main = sys.modules.get("__main__")
-    path = getattr(main, "__file__", None)
-    if path is None or getattr(main, "__spec__", None) is not None:  # a prompt, a notebook, python -c, python -m
-        return
-    with suppress(OSError):
-        if b"__name__" not in Path(path).read_bytes():
-            raise InputError(
-                f"{path}: rv.sweep starts processes that import this script, and each would start its own: expected "
-                'the call below `if __name__ == "__main__":`, or workers=0'
-            )
 
 
 @contextmanager
@@ -111,26 +90,20 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
         If the scheduler does not answer.
     """
     from distributed import Client
+    from distributed.utils import silence_logging_cmgr
 
     if (address is None) == (file is None):
         raise InputError("found both an address and a file of the scheduler: expected only one")
     if file is not None and not file.is_file():
         raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
-    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    levels = [logger.level for logger in loggers]
     try:
         where = {"address": address} if file is None else {"scheduler_file": str(file)}
         client = Client(**where, set_as_default=False, timeout="20s")
     except (OSError, ValueError) as error:
         raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
-    try:
-        for logger in loggers:
-            logger.setLevel(logging.CRITICAL)  # the sweep reports a lost scheduler
-        with client:
-            yield client
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
+    quiet = partial(silence_logging_cmgr, logging.CRITICAL)  # the sweep reports a lost scheduler
+    with quiet("distributed"), quiet("distributed.client"), client:
+        yield client
 
 
 def default_client() -> Client | None:
@@ -161,13 +134,13 @@ def require_same_version(client: Client) -> None:
             raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 
 
-def processes_that_fit(sizes: Iterable[float], most: int, free: float) -> int:
+def processes_that_fit(largest: float, most: int, free: float) -> int:
     """Return the number of processes that fit in the memory at the same time, at least one.
 
     Parameters
     ----------
-    sizes : iterable of float
-        Memory of each case with its process; zero for small ones. [byte]
+    largest : float
+        Memory of the largest case with its process. [byte]
     most : int
         Largest number of processes.
     free : float
@@ -175,47 +148,42 @@ def processes_that_fit(sizes: Iterable[float], most: int, free: float) -> int:
 
     Examples
     --------
-    >>> processes_that_fit([1e9, 3e9, 2e9, 2e9], 4, 8e9), processes_that_fit([9e9, 1e9], 2, 8e9)
+    >>> processes_that_fit(2e9, 4, 8e9), processes_that_fit(9e9, 2, 8e9)
     (3, 1)
     """
-    largest = sorted((size for size in sizes if size > 0), reverse=True)[:most]
-    together = 0.0
-    for count, size in enumerate(largest):
-        together += size
-        if together > PART * free:
-            return max(count, 1)
-    return most
+    return max(1, min(most, int(PART * free / max(largest, PROCESS))))
 
 
 def side_by_side(cases: Sequence[Case], most: int) -> int:
     """Return the number of processes for some cases on this machine: `most`, or fewer if the memory is too small."""
-    cells, sizes = dict[str, float](), []
-    for case in cases if most > 1 else ():
-        name = json.dumps(case.surface, sort_keys=True)
-        if name not in cells:
-            cells[name] = _cells(case)
-        if cells[name] >= WORTH_ASKING:
-            settings, experiment = case.settings, case.experiment
-            if isinstance(experiment, Loading):
-                program = experiment.program
-                memory = choose_memory(case.body, **memory_options(program, settings)).memory
-                size = march_bytes(settings, memory, cells[name], rows=least_rows(settings, program))
-            else:
-                size = curve_bytes(settings, cells[name])
-            sizes.append(PROCESS + size)
-    return processes_that_fit(sizes, most, memory_available().size) if sizes else most
+    cells, largest = dict[str, float](), PROCESS
+    for case in cases:
+        surface = json.dumps(case.surface, sort_keys=True)
+        if surface not in cells:
+            cells[surface] = _cells(case)
+        if cells[surface] < WORTH_ASKING:
+            continue
+        settings, experiment = case.settings, case.experiment
+        if isinstance(experiment, Loading):
+            program = experiment.program
+            memory = choose_memory(case.body, **memory_options(program, settings)).memory
+            size = march_bytes(settings, memory, cells[surface], rows=least_rows(settings, program))
+        else:
+            size = curve_bytes(settings, cells[surface])
+        largest = max(largest, PROCESS + size)
+    return processes_that_fit(largest, most, memory_available().size) if largest > PROCESS else most
 
 
 def _cells(case: Case) -> float:
     """Return the number of cells of a surface; zero if the surface is small or cannot be read."""
     resample = case.surface.get("resample") or None
     stated = resample["shape"] if isinstance(resample, Mapping) else resample or case.surface.get("shape")
-    shape = None if stated is None else counts("shape", stated)
-    if shape is None and (file := case.surface.get("file")):
-        with suppress(OSError, ValueError):  # the run of the case reports the error
-            if Path(file).stat().st_size >= WORTH_ASKING:  # a file has at least a byte per cell
-                shape = case.height().shape
-    return math.prod(shape) if shape else 0.0
+    if stated is not None:
+        return math.prod(counts("shape", stated))
+    with suppress(OSError, ValueError):  # the run of the case reports the error
+        if Path(case.surface.get("file", "")).stat().st_size >= WORTH_ASKING:  # a file has at least a byte per cell
+            return case.height().size
+    return 0.0
 
 
 def threads_each(processes: int) -> int:

@@ -22,7 +22,7 @@ from distributed.core import Status
 
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import Case
-from roughvisc.study.execution.outcome import Outcome, attempt
+from roughvisc.study.execution.run import Outcome, attempt
 from roughvisc.study.storage.folder import lock_path
 
 if TYPE_CHECKING:
@@ -73,16 +73,15 @@ def distribute(
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
     stop_file = record.folder / f".{name}.stop"
-    shared: dict[str, Any] = {"folder": str(record.folder), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
-    number, taken_over = count(), set[str]()
     workers: dict[str, list[str]] = {key: [] for key in texts}  # in the order in which they began each case
+    number, taken_over = count(), set[str]()
     finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
 
-    def submit(keys: Sequence[str], *, takes_over: bool = False) -> None:
-        names = [f"{name}-{key}-{next(number)}" for key in keys]
-        json = [texts[key] for key in keys]
-        new = client.map(on_worker, json, keys, key=names, pure=False, takes_over=takes_over, **shared)
+    def submit(keys: Sequence[str]) -> None:
+        names, json = [f"{name}-{key}-{next(number)}" for key in keys], [texts[key] for key in keys]
+        settings = {"folder": str(record.folder), "name": name, "threads": threads, "own": own}
+        new = client.map(on_worker, json, keys, key=names, pure=False, **settings)
         futures.update(zip(new, keys, strict=True))
         finished.update(new)
 
@@ -105,7 +104,8 @@ def distribute(
                 outcome = _outcome(key, found)
                 if outcome.kind == "held" and len(workers[key]) > 1 and key not in taken_over:
                     taken_over.add(key)  # a lost worker of this sweep still holds the lock
-                    submit([key], takes_over=True)
+                    lock_path(record.folder, key).unlink(missing_ok=True)
+                    submit([key])
                 elif outcome.kind != "interrupted":
                     record.ended(outcome)
                 elif client.status == "running":  # its worker closes, or another client has restarted the workers
@@ -113,16 +113,14 @@ def distribute(
                 else:
                     raise ConnectionError
             time.sleep(0.1)
-            if said or time.monotonic() - seen < _ALONE_AFTER:
-                continue
-            seen = time.monotonic()
-            if not client.nthreads():
-                said = True
-                record.warn(
-                    f"the cluster has had no worker for a while ({len(futures)} cases to go): start workers (dask "
-                    "worker), or check whether their jobs are queued (squeue); the cases start as soon as one joins. "
-                    "Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
-                )
+            if not said and time.monotonic() - seen > _ALONE_AFTER:
+                seen = time.monotonic()
+                if said := not client.nthreads():
+                    record.warn(
+                        f"the cluster has had no worker for a while ({len(futures)} cases to go): start workers (dask "
+                        "worker), or check whether their jobs are queued (squeue); the cases start as soon as one "
+                        "joins. Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
+                    )
     except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue turns Ctrl-C into SystemExit
         if isinstance(error, OSError) and client.status != "running":
             lost = "the scheduler was lost: finished results are kept; repeat the command to resume"
@@ -130,11 +128,8 @@ def distribute(
         record.display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
         with suppress(OSError):  # a full disk, or a lost scheduler
             stop_file.touch()
-            until = time.monotonic() + _PATIENCE
-            while time.monotonic() < until:
-                running = [workers[key][-1] for future, key in futures.items() if workers[key] and not future.done()]
-                if not client.nthreads().keys() & running:
-                    break
+            begun, until = [future for future, key in futures.items() if workers[key]], time.monotonic() + _PATIENCE
+            while time.monotonic() < until and client.nthreads() and not all(future.done() for future in begun):
                 time.sleep(0.1)
         raise
     finally:
@@ -161,9 +156,7 @@ def _outcome(key: str, found: Any) -> Outcome:
     return Outcome(key, "hindered", message, type(error).__name__)
 
 
-def on_worker(
-    text: str, key: str, *, folder: str, name: str, threads: int | None, own: bool, takes_over: bool
-) -> Outcome:
+def on_worker(text: str, key: str, *, folder: str, name: str, threads: int | None, own: bool) -> Outcome:
     """Compute a case on a worker; the outcome of a stopped case is ``interrupted``, and it has a checkpoint.
 
     Parameters
@@ -178,8 +171,6 @@ def on_worker(
         Number of threads. None: all threads of the worker.
     own : bool
         Whether the worker is a child process of the process of the sweep.
-    takes_over : bool
-        Whether the lock of the case belongs to a lost worker.
     """
     worker = get_worker()
     task, stop_file, last = worker.get_current_task(), Path(folder, f".{name}.stop"), 0.0
@@ -199,19 +190,15 @@ def on_worker(
         if stop():
             return Outcome(key, "interrupted")
         report(0.0, 0.0)
-        if not Path(folder).is_dir():
-            expected = "expected a results folder that every worker shares, under the same path"
-            return Outcome(key, "hindered", f"on {worker.address}: {folder}: does not exist: {expected}")
         try:
+            if not Path(folder).is_dir():
+                raise RoughviscError(f"{folder}: does not exist")
             case = Case.from_json(text)
             if case.key != key:
-                there = f"{worker.address} computes other numbers than the sweep expects ({case.key}, not {key})"
-                return Outcome(key, "hindered", f"{there}: expected the same roughvisc and the same files there")
-            if takes_over:
-                lock_path(Path(folder), key).unlink(missing_ok=True)
+                raise RoughviscError(f"the key of the case is {case.key}, and {key} in the process of the sweep")
             return attempt(case, Path(folder), progress=report, stop=stop, threads=threads or worker.state.nthreads)
-        except RoughviscError as error:  # a file is missing on this machine
-            expected = "expected the files of the study where every worker can read them, under the same path"
+        except RoughviscError as error:
+            expected = "expected the same roughvisc, results folder and files of the study on every worker"
             return Outcome(key, "hindered", f"on {worker.address}: {error}; {expected}", type(error).__name__)
         except KeyboardInterrupt:  # the exception would end the worker
             return Outcome(key, "interrupted")

@@ -13,8 +13,8 @@ from rich.console import Console
 from roughvisc.errors import printable
 from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case
-from roughvisc.study.execution.outcome import IN_WORDS, Outcome
-from roughvisc.study.storage.sweep_cases import number_by_key, sweep_cases
+from roughvisc.study.execution.run import Outcome
+from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
 
 #: Largest number of messages on failed and unconverged cases.
 _SHOWN = 8
@@ -75,7 +75,7 @@ class Display:
         if outcome.kind != "done" and not outcome.reused:
             self._complaints += 1
             if self._complaints <= _SHOWN:
-                self._bars.say(f"{self._names[outcome.key]}: {IN_WORDS[outcome.kind]}: {outcome.message}")
+                self._bars.say(f"{self._names[outcome.key]}: {outcome.kind}: {outcome.message}")
             elif self._complaints == _SHOWN + 1:
                 self._bars.say("further cases that end badly are counted here, and named in the log")
 
@@ -105,5 +105,5 @@ class Display:
         kinds = [outcome.kind for outcome in self._ended.values()]
         parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
         for kind in ("unconverged", "failed", "hindered", "held"):
-            parts += [f"{kinds.count(kind)} {IN_WORDS[kind]}"] if kind in kinds else []
+            parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
         return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])

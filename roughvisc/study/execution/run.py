@@ -1,4 +1,4 @@
-"""Execution of one case, from the study to the result file."""
+"""Execution of one case, from the study to the result file, and the outcome, in which every error is a message."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ import json
 import logging
 import os
 import re
+import time
+import traceback
 from collections.abc import Callable, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import ConvergenceError, InputError, RoughviscError, TooLargeError
+from roughvisc.errors import ConvergenceError, InputError, RoughviscError
 from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
 from roughvisc.solve import solve
@@ -31,8 +34,9 @@ from roughvisc.study.storage.folder import (
     require_writable,
     result_path,
 )
+from roughvisc.study.storage.index import Entry, read_entry
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
-from roughvisc.study.storage.sweep_cases import labels_of_case
+from roughvisc.study.storage.sweep_data import labels_of_case
 from roughvisc.variables import AXES, NOT_CONVERGED, axis_of
 
 if TYPE_CHECKING:
@@ -43,9 +47,14 @@ log = logging.getLogger("roughvisc")
 Progress = Callable[[float, float], None]
 #: Facts that a stored result omits, because its attribute ``case`` contains them.
 _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale", "base")
+#: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
+#: process), so that the same command resumes it; ``held``: another run computes it; ``failed``: it would fail again.
+Kind = Literal["done", "unconverged", "failed", "hindered", "held", "interrupted"]
+#: Errors that refuse the input of a case.
+REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 
 
-def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool = True) -> Path:
+def result_folder(case: Case, out: str | Path | None = None) -> Path:
     """Return the folder of the results of a study.
 
     Parameters
@@ -54,13 +63,11 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
         A case of the study.
     out : path, optional
         The folder. Default: ``results/`` and the name of the study, next to the study.
-    to_write : bool
-        Refuse a folder that cannot be written to.
 
     Raises
     ------
     InputError
-        If the path is a file, or the folder cannot be made or written to.
+        If the path is a file, or lies below a file.
     """
     if out is not None:
         folder = Path(out).expanduser()
@@ -70,8 +77,6 @@ def result_folder(case: Case, out: str | Path | None = None, *, to_write: bool =
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     if not (there := existing_part(folder)).is_dir():
         raise InputError(f"{there}: is a file: expected a folder for the results")
-    if to_write:
-        require_writable(folder)
     return folder
 
 
@@ -91,12 +96,8 @@ def compute(
     try:
         problem = Problem(height, case.body, case.settings)
         dataset = solve(problem, case.experiment, keeper, progress=progress, threads=threads)
-    except (InputError, ConvergenceError) as error:
-        if case.origin is None or (error.transient and not isinstance(error, TooLargeError)):
-            raise
-        if isinstance(error, InputError):
-            raise error.prefixed(str(case.origin)) from error
-        raise ConvergenceError(f"{case.origin}: {error}") from error
+    except InputError as error:
+        raise error.prefixed(str(case.origin)) if case.origin else error  # noqa: B904
     if "speed" in dataset:
         dataset = dataset.assign(reduced_speed=("speed", case.shift_factor * dataset["speed"].values))
     now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
@@ -164,50 +165,45 @@ def run_case(
     path = result_path(folder, case.key)
     if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
         return path  # finished, without leftovers to remove
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    require_writable(folder, "since the case is not finished")
+    folder.mkdir(parents=True, exist_ok=True)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with lock_case(lock_path(folder, case.key)):
+        with (
+            lock_case(lock_path(folder, case.key)),
+            closing(
+                CheckpointWriter(
+                    checkpoint_path(folder, case.key),
+                    case.key,
+                    seconds=checkpoint_seconds,
+                    steps=checkpoint_steps,
+                    stop=stop,
+                )
+            ) as keeper,
+        ):
             for torn in folder.glob(f".{case.key}.*.part.nc"):
                 torn.unlink()
-            keeper = CheckpointWriter(
-                checkpoint_path(folder, case.key),
-                case.key,
-                seconds=checkpoint_seconds,
-                steps=checkpoint_steps,
-                stop=stop,
-            )
-            with closing(keeper):
-                if not is_result_of(case, path, log.warning):
-                    keeper.resume()
-                    try:
-                        dataset = compute(case, keeper, progress=progress, threads=threads)
-                        write_result(dataset, path, precision=case.precision)
-                    except RoughviscError as error:
-                        if not error.transient:  # it would fail again in the same way
-                            keeper.remove()
-                        raise
-                    except KeyboardInterrupt:
-                        keeper.save()
-                        raise
-                    stated = warnings_of(dataset.attrs)
-                    complaints = unconverged(dataset), stated.get("tolerance"), stated.get("material")
-                    for complaint in filter(None, complaints):
-                        log.warning("%s: %s", path, complaint)
-                keeper.remove()
-    except BlockingIOError:
-        if is_result_of(case, path):  # the other run has just finished
-            return path
-        raise
+            if not is_result_of(case, path, set_aside=True):
+                keeper.resume()
+                try:
+                    dataset = compute(case, keeper, progress=progress, threads=threads)
+                    write_result(dataset, path, precision=case.precision)
+                except RoughviscError as error:
+                    if not error.transient:  # it would fail again in the same way
+                        keeper.remove()
+                    raise
+                except KeyboardInterrupt:
+                    keeper.save()
+                    raise
+                stated = warnings_of(dataset.attrs)
+                complaints = unconverged(dataset), stated.get("tolerance"), stated.get("material")
+                for complaint in filter(None, complaints):
+                    log.warning("%s: %s", path, complaint)
+            keeper.remove()
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
-    finally:
-        for place in made:  # rmdir removes only empty folders
-            with suppress(OSError):
-                place.rmdir()
     return path
 
 
@@ -215,17 +211,14 @@ def run_stated(
     case: Case, out: str | Path | None = None, *, progress: bool | Progress = True, threads: int | None = None
 ) -> xr.Dataset:
     """Run a case unless its result exists, and open the result; see :func:`roughvisc.run`."""
-    folder = result_folder(case, out, to_write=False)
-    if not is_result_of(case, result_path(folder, case.key)):
-        require_writable(folder, "since the case is not finished")
-    path = run_case(case, folder, progress=progress, threads=threads)
+    path = run_case(case, result_folder(case, out), progress=progress, threads=threads)
     dataset = open_result(path)
     if complaint := unconverged(dataset):
         raise ConvergenceError(f"{complaint}; the result is kept in {path}, see its variable 'status'")
     return dataset
 
 
-def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = None) -> bool:
+def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
     """Return whether a file is the result of a case; an absent or damaged file is not.
 
     Parameters
@@ -234,9 +227,8 @@ def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = No
         The case.
     path : Path
         File named by the key of the case.
-    warn : callable, optional
-        If given, a damaged file is renamed and `warn` is called with a message. The caller must hold the lock of the
-        case.
+    set_aside : bool
+        Rename a damaged file, and log a warning. The caller must hold the lock of the case.
 
     Raises
     ------
@@ -249,10 +241,10 @@ def is_result_of(case: Case, path: Path, warn: Callable[[str], None] | None = No
         with open_result(path) as dataset:
             found = dataset.attrs.get("case_key")
     except DamagedError as error:
-        if warn is not None:
+        if set_aside:
             aside = path.with_name(f"{path.name}.damaged")
             os.replace(path, aside)
-            warn(f"{path}: is damaged: {error.found}; it is renamed to {aside.name} and computed again")
+            log.warning("%s: is damaged: %s; it is renamed to %s and computed again", path, error.found, aside.name)
         return False
     if found != case.key:
         expected = f"the result of case {case.key}, which its name says"
@@ -273,10 +265,74 @@ def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> st
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:
         return ""
-    # a file of another program may lack the estimates
-    left = np.asarray(histories["residual"], dtype=float)[bad] if "residual" in histories else np.zeros(0)
-    known = left[np.isfinite(left)]
-    by = f" (estimated error of the pressure up to {known.max():.2g})" if known.size else ""
     axis = AXES[rows]
     first = axis.place(float(histories[rows][bad[0]]))
-    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}{by}: try a looser tolerance"
+    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}: try a looser tolerance"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """End of a case, small enough to be sent from a worker.
+
+    Attributes
+    ----------
+    key : str
+        Key of the case.
+    kind : str
+        How it ended.
+    message : str
+        Message to the user; empty if the case is done.
+    error : str
+        Class name of the exception.
+    trace : str
+        Traceback of an unexpected exception.
+    seconds : float
+        Wall time. [s]
+    entry : Entry or None
+        Contents of the result file without the fields.
+    reused : bool
+        Whether an earlier run computed it.
+    disk_full : bool
+        Whether the disk was full.
+    """
+
+    key: str
+    kind: Kind
+    message: str = ""
+    error: str = ""
+    trace: str = ""
+    seconds: float = 0.0
+    entry: Entry | None = None
+    reused: bool = False
+    disk_full: bool = False
+
+
+def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
+    """Return the outcome of a case whose result exists."""
+    message = unconverged(entry.arrays)
+    return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
+
+
+def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:
+    """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
+    began = time.perf_counter()
+
+    def ended(kind: Kind, message: str, error: Exception, **more: Any) -> Outcome:
+        return Outcome(case.key, kind, message, type(error).__name__, seconds=time.perf_counter() - began, **more)
+
+    try:
+        path = run_case(case, folder, progress=progress, **settings)
+        return replace(outcome_of(read_entry(path)), seconds=time.perf_counter() - began)
+    except BlockingIOError as error:
+        return ended("held", f"{error.filename}: {error.strerror}", error)
+    except RoughviscError as error:
+        return ended("hindered" if error.transient else "failed", str(error), error)
+    except MemoryError as error:
+        advice = "roughvisc plan says how much a case needs, and fewer --workers leave more to each"
+        return ended("hindered", f"not enough memory; the last checkpoint is kept: {advice}", error)
+    except OSError as error:  # for example a full disk, or a removed folder
+        place = f"{error.filename}: " if error.filename else ""
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        return ended("hindered", f"{place}{error.strerror or error}", error, disk_full=full)
+    except Exception as error:  # noqa: BLE001  (an unexpected error of one case must not stop the others)
+        return ended("failed", f"{type(error).__name__}: {error}", error, trace=traceback.format_exc())

@@ -19,21 +19,23 @@ from roughvisc.study.case import Case, program, read_cases
 from roughvisc.study.execution.cluster import (
     default_client,
     local_client,
-    refuse_unguarded_script,
     require_same_version,
     side_by_side,
     threads_each,
 )
 from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.outcome import IN_WORDS, REFUSED, Outcome, attempt, outcome_of
-from roughvisc.study.execution.run import is_result_of, result_folder
-from roughvisc.study.storage.failures import log_file, record_failure, record_path, recorded_failure
-from roughvisc.study.storage.folder import is_writable, lock_case, lock_path, require_writable, result_path
-from roughvisc.study.storage.index import Entry, index_of
+from roughvisc.study.execution.run import REFUSED, Outcome, attempt, outcome_of, result_folder
+from roughvisc.study.storage.folder import (
+    is_writable,
+    log_file,
+    record_failure,
+    record_path,
+    recorded_failure,
+    require_writable,
+)
+from roughvisc.study.storage.index import clean_folder, index_of
 from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_cases import sweep_cases, write_sweep
-from roughvisc.study.storage.sweep_data import open_results
-from roughvisc.study.storage.upkeep import clean_folder
+from roughvisc.study.storage.sweep_data import open_results, sweep_cases, write_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +102,7 @@ def sweep(
         cases = read_cases(cases)
     if not cases:
         raise InputError("cases is empty: expected at least one case")
-    folder = result_folder(cases[0], out, to_write=False).absolute()
+    folder = result_folder(cases[0], out).absolute()
     if client is None and workers is None:
         client = default_client()
     outcomes = run_cases(
@@ -150,50 +152,37 @@ def run_cases(
         If interrupted; running cases finish their step first.
     """
     if workers is not None and (client is not None or workers < 0):
-        problem = "a client has workers of its own" if client is not None else "expected 0 or more"
-        raise InputError(f"workers is {workers}: {problem}")
+        expected = "no number of workers together with a client" if client is not None else "0 or more"
+        raise InputError(key="workers", found=workers, expected=expected)
     if client is not None and client.asynchronous:
-        raise InputError("client is asynchronous: expected a Client(asynchronous=False)")
+        raise InputError(key="client", found=client, expected="a Client(asynchronous=False)")
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     writable = is_writable(folder)
     with log_file(folder) if writable else nullcontext():
-        index: dict[str, Entry] = {}
-        if folder.exists():
-            if writable:
-                clean_folder(folder)
-            index = index_of(folder)
-        outcomes = {}
+        if writable and folder.exists():
+            clean_folder(folder)
+        index = index_of(folder) if folder.exists() else {}
+        outcomes: dict[str, Outcome] = {}
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
             elif (failed := recorded_failure(folder, key)).get("source") == program() and not retry_failed:
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
-        processes = 0
         if todo:
             require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
-            if client is None and workers is None:
-                processes = side_by_side(list(todo.values()), min(cores(), len(todo))) if len(todo) > 1 else 0
-            elif client is None:
-                processes = min(workers or 0, len(todo))
-            if processes:
-                refuse_unguarded_script()
             folder.mkdir(parents=True, exist_ok=True)
+        if client is None and workers is None:
+            workers = side_by_side(list(todo.values()), min(cores(), len(todo))) if len(todo) > 1 else 0
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         record = Record(folder, cases, outcomes, display)
         if not writable:
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
-            for key, case in todo.items():
-                if (path := result_path(folder, key)).exists():  # damaged, unless another run computes the case
-                    with suppress(OSError), lock_case(lock_path(folder, key), patience=0.0):
-                        is_result_of(case, path, record.warn)
-            _compute(todo, record, client, processes, threads)
-        except (KeyboardInterrupt, SystemExit):
-            log.warning("interrupted after %d of %d cases", len(outcomes), len(distinct))
-            raise
-        except OSError as error:
-            log.warning("%s", error.strerror or error)
+            _compute(todo, record, client, min(workers or 0, len(todo)), threads)
+        except (KeyboardInterrupt, SystemExit, OSError) as error:
+            reason = str(error) or type(error).__name__
+            log.warning("interrupted after %d of %d cases: %s", len(outcomes), len(distinct), reason)
             raise
         finally:
             record.save()
@@ -239,18 +228,17 @@ class Record:
 
     def __init__(self, folder: Path, cases: Sequence[Case], outcomes: dict[str, Outcome], display: Display) -> None:
         self.folder, self.display = folder, display
-        self._cases, self._outcomes = cases, outcomes
-        self._by_key = {case.key: case for case in cases}
+        self._stated, self._outcomes = cases, outcomes
+        self._cases = {case.key: case for case in cases}
         self._listed = sweep_cases(cases)
         self._saved = time.monotonic()
-        if is_writable(folder):
-            write_sweep(folder, self._listed)
+        write_sweep(folder, self._listed)
 
     def begin(self, link: str = "") -> None:
         """Display the cases, and the address of Dask's dashboard."""
         if link:
             log.info("dashboard: %s", link)
-        self.display.begin(self._cases, link)
+        self.display.begin(self._stated, link)
         for outcome in self._outcomes.values():
             self.display.ended(outcome)
 
@@ -263,19 +251,19 @@ class Record:
             If the disk was full, because further cases would also fail.
         """
         self._outcomes[outcome.key] = outcome
-        case, level = self._by_key[outcome.key], logging.INFO if outcome.kind == "done" else logging.WARNING
-        told = (outcome.key, IN_WORDS[outcome.kind], outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
+        case, level = self._cases[outcome.key], logging.INFO if outcome.kind == "done" else logging.WARNING
+        told = (outcome.key, outcome.kind, outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
         log.log(level, "%s %s %.3g s %s %s", *told)
         if outcome.trace:
             log.error("%s", outcome.trace)
-        if outcome.kind == "failed" and len(self._by_key) > 1:
+        if outcome.kind == "failed" and len(self._cases) > 1:
             record_failure(self.folder, case, outcome.message, outcome.error, outcome.trace)
         self.display.ended(outcome)
-        if len(self._by_key) > 1 and time.monotonic() - self._saved > _SAVE_EVERY:
+        if time.monotonic() - self._saved > _SAVE_EVERY:
             self.save()
         if outcome.disk_full:
-            finished = len(self._entries())
-            raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self._by_key)} cases are finished)")
+            finished = sum(one.entry is not None for one in self._outcomes.values())
+            raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self._cases)} cases are finished)")
 
     def warn(self, text: str) -> None:
         """Display and log an urgent message."""
@@ -287,7 +275,7 @@ class Record:
         self._saved = time.monotonic()
         if not is_writable(self.folder):
             return
-        index = index_of(self.folder, self._entries())
+        index = index_of(self.folder, [outcome.entry for outcome in self._outcomes.values() if outcome.entry])
         for key, outcome in self._outcomes.items():
             if key in index:
                 with suppress(OSError):  # the case failed before
@@ -295,6 +283,3 @@ class Record:
                 if outcome.entry is None:
                     self._outcomes[key] = outcome_of(index[key], reused=True)
         write_table(self.folder, index, self._listed)
-
-    def _entries(self) -> list[Entry]:
-        return [outcome.entry for outcome in self._outcomes.values() if outcome.entry]

@@ -15,7 +15,6 @@ import zipfile
 import zlib
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -82,8 +81,7 @@ class CheckpointWriter(Recorder):
         self._pending, self._last_save = 0, time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
         self._waiting = 0  # size of the arrays in memory [byte]
-        self._files = ExitStack()  # only the last file read stays open: rows are read in their order
-        self._reading: tuple[int, Any] = -1, None
+        self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
@@ -102,9 +100,7 @@ class CheckpointWriter(Recorder):
         if row >= self._ends[-1]:
             return self._arrays[row - self._ends[-1]][name]
         if self._reading[0] != number:
-            self._files.close()
-            opened = self._files.enter_context(np.load(self._rows_path(number), allow_pickle=False))
-            self._reading = number, opened
+            self._reading = number, np.load(self._rows_path(number), allow_pickle=False)
         return self._reading[1][f"{row}/{name}"]
 
     def resume(self) -> None:
@@ -148,7 +144,6 @@ class CheckpointWriter(Recorder):
     def restart(self) -> None:
         """Delete all rows, because the run starts again."""
         super().restart()
-        self._files.close()
         self._reading = -1, None
         self.latest, self._ends, self._waiting, self._pending = Checkpoint(), [0], 0, 0
         (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
@@ -169,12 +164,12 @@ class CheckpointWriter(Recorder):
 
     def remove(self) -> None:
         """Remove the folder, after the result is written or the case has failed."""
-        self._files.close()
+        self._reading = -1, None
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def close(self) -> None:
         """Close the files, and remove them unless a checkpoint exists."""
-        self._files.close()
+        self._reading = -1, None
         if not (self._folder / STATE).exists():
             self.remove()
 

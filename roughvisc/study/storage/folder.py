@@ -1,8 +1,8 @@
-"""Folder of results: names, locks, and atomic writing of files.
+"""Folder of results: names, locks, atomic writing of files, records of failures, and the log of sweeps.
 
 A case with the key ``K`` has the result ``K.nc``. During its run ``.K.lock`` is locked and ``.K.unfinished`` contains
 its checkpoint. During writing, a file has a hidden name that ends in ``.part`` and its suffix. A damaged result is
-renamed to ``K.nc.damaged``.
+renamed to ``K.nc.damaged``. The record of a failed case is ``K.failed.json``.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import stat
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,12 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from roughvisc.errors import InputError
+from roughvisc.study.case import Case, program
 
 log = logging.getLogger("roughvisc")
 
+#: Log of the sweeps in a folder.
+LOG = "sweep.log"
 #: Errors of :func:`read_json`, and errors due to unexpected values in the file.
 DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error)
 #: Time to wait for a lock: the lock of a killed process is free when the system has removed the process. [s]
@@ -235,3 +239,72 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
         with suppress(OSError):  # before the release, so that a run that waits for this file opens a new one
             path.unlink()
         lock.release()
+
+
+def record_path(folder: Path, key: str) -> Path:
+    """Return the path of the record of a failed case."""
+    return folder / f"{key}.failed.json"
+
+
+def record_failure(folder: Path, case: Case, message: str, error: str, trace: str) -> None:
+    """Write the record of a failed case, which is named by the key of the case.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    case : Case
+        The case.
+    message, error, trace : str
+        Message to the user, class name of the exception, and traceback of an unexpected exception.
+    """
+    record = {
+        "case_key": case.key,
+        "message": message,
+        "error": error,
+        "traceback": trace,
+        "time": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        "source": program(),
+        "case": json.loads(case.to_json()),
+    }
+    path = record_path(folder, case.key)
+    try:
+        write_text(path, json.dumps(record, indent=1))
+    except (OSError, InputError) as problem:
+        log.warning("%s cannot be written: %s", path, problem)
+
+
+def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
+    """Return the record of a failed case; empty without a readable record."""
+    try:
+        return dict(json.loads(record_path(folder, key).read_text()))
+    except (OSError, ValueError, TypeError):
+        return {}
+
+
+class _LogFile(logging.FileHandler):
+    """Log file whose errors are ignored if it cannot be written."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with suppress(OSError):  # the file cannot be opened
+            super().emit(record)
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+
+@contextmanager
+def log_file(folder: Path) -> Iterator[None]:
+    """Append all log messages of roughvisc to a file next to the results, within the block."""
+    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
+    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
+    level = log.level
+    log.addHandler(handler)
+    log.setLevel(min(level or logging.INFO, logging.INFO))
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+        log.removeHandler(handler)
+        with suppress(OSError):
+            handler.close()

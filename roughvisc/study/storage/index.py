@@ -1,14 +1,18 @@
-"""Cache of the histories of all results in a folder: one small file, so that results need not be opened.
+"""Contents of a folder of results: their histories, and the removal of leftovers of killed runs.
 
-The cache is made again from the results if it is absent, damaged or older than the results.
+A cache of the histories is one small file, so that results need not be opened. It is made again from the results if it
+is absent, damaged or older than the results.
 """
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
+import time
 from base64 import b64decode, b64encode
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,16 +24,21 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.study.case import program_version
+from roughvisc.study.storage.checkpoint import STATE
 from roughvisc.study.storage.folder import (
     DAMAGED,
+    checkpoint_path,
+    lock_case,
+    lock_path,
     read_json,
     require_file,
     require_folder,
     result_files,
+    result_path,
     warn_once,
     write_json,
 )
-from roughvisc.study.storage.netcdf import ERRORS, NETCDF, foreign, unreadable
+from roughvisc.study.storage.netcdf import ERRORS, NETCDF, foreign, open_result, unreadable
 from roughvisc.variables import ROW, STEP, VARIABLES, axis_of
 
 INDEX = ".index.json.gz"
@@ -37,6 +46,10 @@ INDEX = ".index.json.gz"
 _ARRAYS = ("x", "y", *(name for name, variable in VARIABLES.items() if variable.dims in ((ROW,), (STEP,))))
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
+#: Hidden files of a case: its lock, its checkpoint, and incomplete files.
+_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.")
+#: Age of an incomplete file that belongs to no case, above which the file counts as a leftover. [s]
+_ABANDONED = 3600.0
 
 
 @dataclass(frozen=True)
@@ -182,3 +195,60 @@ def _read_index(folder: Path) -> dict[str, Entry]:
     except DAMAGED:
         return {}
     return entries
+
+
+def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
+    """Remove incomplete files, locks of dead runs, and checkpoints of finished cases.
+
+    Parameters
+    ----------
+    folder : path
+        Results folder. Files of running cases are kept.
+    everything : bool
+        Also remove renamed damaged results, records of failures, and the checkpoints of unfinished cases, which then
+        start again.
+
+    Returns
+    -------
+    list of Path
+        Removed files and folders.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist.
+    """
+    folder = Path(folder)
+    require_folder(folder)
+    of_cases: dict[str, list[Path]] = {}
+    removed: list[Path] = []
+
+    def remove(path: Path) -> None:
+        with suppress(OSError):  # removed in the meantime, or the folder is not writable
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
+            removed.append(path)
+
+    for path in sorted(folder.iterdir()):
+        if matched := _OF_A_CASE.match(path.name):
+            of_cases.setdefault(matched[1], []).append(path)
+        elif path.match(".*.part*"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                    remove(path)
+        elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
+            remove(path)
+    for key, paths in of_cases.items():
+        checkpoint, lock = checkpoint_path(folder, key), lock_path(folder, key)
+        if (checkpoint / STATE).exists() and not everything:
+            try:
+                open_result(result_path(folder, key)).close()
+            except InputError:  # the case is not finished
+                paths.remove(checkpoint)
+        if paths:
+            with suppress(OSError), lock_case(lock, patience=0.0):
+                for path in paths:
+                    remove(path) if path != lock else removed.append(lock)
+    return removed

@@ -26,7 +26,7 @@ from xarray.core import indexing
 
 from roughvisc.errors import InputError
 from roughvisc.labels import STEPS, label, steps_of, with_steps
-from roughvisc.study.storage.folder import atomic_write, require_file
+from roughvisc.study.storage.folder import atomic_write, require_file, results_at
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 #: Errors of the library for a file that it cannot read.
@@ -90,7 +90,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     Notes
     -----
     Every block of a variable has a checksum (fletcher32), which is verified when the block is read. This function reads
-    only the histories. :func:`roughvisc.study.storage.upkeep.verify` reads all blocks.
+    only the histories. :func:`verify` reads all blocks.
     """
     path = Path(path)
     require_file(path)
@@ -191,6 +191,43 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
             return np.asarray(file[name][key])
     except ERRORS as error:
         raise unreadable(Path(path), error, f"its {name}: ") from error
+
+
+def verify(place: str | Path) -> dict[Path, str]:
+    """Read results to their last byte and compare every block with its checksum.
+
+    Parameters
+    ----------
+    place : path
+        A result, or a folder of results.
+
+    Returns
+    -------
+    dict
+        File -> description of its damage, which is empty for an undamaged file; sorted by name.
+
+    Raises
+    ------
+    InputError
+        If there are no results.
+    """
+    place, flaws = Path(place), {}
+    if not place.exists():
+        raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
+    for path in results_at(place):
+        flaws[path] = ""
+        try:
+            require_file(path)
+            with NETCDF, netCDF4.Dataset(path) as file:
+                for group in (file, *file.groups.values()):
+                    for variable in group.variables.values():
+                        for first in range(0, len(variable), 16) if variable.ndim else ():
+                            variable[first : first + 16]
+        except InputError as error:
+            flaws[path] = str(error)
+        except ERRORS as error:
+            flaws[path] = f"{path}: is damaged: {error}"
+    return flaws
 
 
 def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | None = None) -> Path:

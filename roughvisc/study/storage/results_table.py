@@ -1,4 +1,4 @@
-"""Table of a sweep: varied parameters of each case, its status, and its numbers at the end or at the largest value."""
+"""Tables: the cases of a sweep with their status and numbers, and the histories of a result."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
+from roughvisc.observables.frames import need
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
-from roughvisc.study.storage.failures import recorded_failure
-from roughvisc.study.storage.folder import atomic_write, no_results
+from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
 from roughvisc.study.storage.index import Entry, index_of
-from roughvisc.study.storage.sweep_cases import SweepCase, numbers_of, parameters_of, read_sweep
+from roughvisc.study.storage.sweep_data import SweepCase, numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import number, number_and_unit
-from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, variables_in_table
+from roughvisc.variables import AXES, NOT_CONVERGED, OTHER_DIMS, VARIABLES, axis_of, variables_in_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 log = logging.getLogger("roughvisc")
 
-CASES, REALISATIONS = "cases.csv", "realisations.csv"
+CASES = "cases.csv"
 #: Relative difference of the values of all realisations below which a quantity counts as prescribed.
 _ALIKE = 1e-9
 
@@ -79,25 +79,12 @@ def write_table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepC
     cases : sequence of SweepCase
         Cases of the sweep.
     """
-    tables = {CASES: _table(folder, index, cases)}
-    (folder / REALISATIONS).unlink(missing_ok=True)  # from an earlier sweep
-    found = realisations_table(index, cases)
-    if len(found):
-        tables[REALISATIONS] = found.set_index("case")
-    for name, table in tables.items():
-        try:
-            with atomic_write(folder / name) as temporary:
-                # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
-                table.map(_no_formula).to_csv(
-                    temporary, encoding="utf-8-sig", float_format="%.7g", lineterminator="\r\n"
-                )
-        except (OSError, InputError) as error:
-            log.warning("%s cannot be written: %s", folder / name, error)
-
-
-def _no_formula(value: Any) -> Any:
-    """Put an apostrophe in front of text that a spreadsheet would read as a formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+    try:
+        with atomic_write(folder / CASES) as temporary:
+            # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
+            _table(folder, index, cases).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
+    except (OSError, InputError) as error:
+        log.warning("%s cannot be written: %s", folder / CASES, error)
 
 
 def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
@@ -189,3 +176,43 @@ def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -
             what = {"case": case, **varied, "quantity": name, "unit": VARIABLES[name].units, "where": where}
             rows.append(what | {str(key): one.item() for key, one in found.data_vars.items()})
     return pd.DataFrame(rows)
+
+
+def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
+    """Write the histories of a result to a CSV file, with one row per kept time, or per speed of a friction curve.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+    path : path
+        File to write; an existing one is replaced.
+
+    Returns
+    -------
+    pathlib.Path
+        The file. Its first row names each column with its unit, as in ``force [N]``; a status is a word; unknown
+        values are empty. Numbers are written with all digits.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not one case's result, or the folder cannot be written to.
+
+    Examples
+    --------
+    >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
+    """
+    rows = axis_of(dataset)
+    if extra := [str(dim) for dim in dataset.dims if dim not in (rows, *OTHER_DIMS)]:
+        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
+    need(dataset, rows)
+    names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
+    table = dataset[names].reset_coords(drop=True).to_dataframe()
+    for name in table:
+        if meanings := VARIABLES[name].meanings if name in VARIABLES else ():
+            table[name] = [meanings[value] for value in table[name]]
+    headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
+    with atomic_write(path) as temporary:
+        table.to_csv(temporary, header=headings[1:], index_label=headings[0])
+    return Path(path)

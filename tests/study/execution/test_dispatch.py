@@ -20,7 +20,7 @@ from roughvisc.study.execution import dispatch
 from roughvisc.study.execution.cluster import connect, default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.failures import record_path
+from roughvisc.study.storage.folder import record_path
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning",
@@ -324,7 +324,7 @@ def test_results_folder_that_a_worker_does_not_see__fails_no_case(study, tmp_pat
     """Workers of another machine would write where nobody reads."""
     (case,) = study()[:1]
     with thread_workers(1) as client:
-        settings = {"name": "test", "threads": 1, "own": False, "takes_over": False}
+        settings = {"name": "test", "threads": 1, "own": False}
         outcome = client.submit(
             dispatch.on_worker, case.to_json(), case.key, folder=str(tmp_path / "elsewhere"), **settings
         ).result()

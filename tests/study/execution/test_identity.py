@@ -13,7 +13,7 @@ from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.failures import record_path
+from roughvisc.study.storage.folder import record_path
 
 SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'
 STUDY = BALL[: BALL.index("generate")] + SCAN + BALL[BALL.index("level") :]
@@ -83,5 +83,5 @@ def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
     with pytest.raises(RoughviscError, match=text) as caught:
         run(case, tmp_path / "out", progress=False)
     assert caught.value.transient
-    assert not (tmp_path / "out").exists()
+    assert not list((tmp_path / "out").iterdir())
     assert read_study(study).key != key

@@ -12,18 +12,17 @@ import time
 import psutil
 import pytest
 import xarray as xr
-from support import BALL, LONG, assert_same, numbers
+from support import BALL, LONG, assert_same, numbers, refused
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.study.execution import outcome as outcome_module
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.failures import record_path
+from roughvisc.study.storage.folder import record_path
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.results_table import CASES
-from roughvisc.study.storage.sweep_cases import SWEEP
+from roughvisc.study.storage.sweep_data import SWEEP
 
 RUN = [sys.executable, "-m", "roughvisc", "run"]
 
@@ -101,13 +100,13 @@ POISON = '[sweep]\n"program.0.load" = ["4 mN", "50 N", "5 mN", 5e-3]\n'
 def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_path, monkeypatch, caplog):
     cases = study(BALL + POISON)
     computed = []
-    bring = outcome_module.run_case
+    bring = run_module.run_case
 
     def counted(case, folder, **settings):
         computed.append(case.varied["program.0.load"])
         return bring(case, folder, **settings)
 
-    monkeypatch.setattr(outcome_module, "run_case", counted)
+    monkeypatch.setattr(run_module, "run_case", counted)
     ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
     assert computed == [4e-3, 50.0, 5e-3], "those alike are computed once"
     assert list(ds["program_0_load"]) == [4e-3, 5e-3]
@@ -131,7 +130,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     def broken(case, folder, **settings):
         return 1 / 0
 
-    monkeypatch.setattr(outcome_module, "run_case", broken)
+    monkeypatch.setattr(run_module, "run_case", broken)
     with pytest.raises(RoughviscError, match="none of 4 cases could be finished; the first: ZeroDivisionError"):
         sweep(cases, tmp_path / "out", workers=0, progress=False)
     record = json.loads(record_path(tmp_path / "out", cases[0].key).read_text())
@@ -155,7 +154,7 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     def hindered(case, folder, **settings):
         raise error
 
-    monkeypatch.setattr(outcome_module, "run_case", hindered)
+    monkeypatch.setattr(run_module, "run_case", hindered)
     outcomes = run_cases(cases, tmp_path / "out", display=Display(False), workers=0)
     assert {o.kind for o in outcomes.values()} == {kind}
     assert not list((tmp_path / "out").glob("*.failed.json"))
@@ -176,7 +175,7 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
 
     if workers:  # the processes of a local cluster are forked from one that has not seen this
         monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
-    monkeypatch.setattr(outcome_module, "run_case", full)
+    monkeypatch.setattr(run_module, "run_case", full)
     with pytest.raises(OSError, match=r"x\.nc: No space left .*make room \(1 of 4 cases are finished\)$") as caught:
         run_cases(cases, tmp_path / "out", display=Display(False), workers=workers)
     assert caught.value.errno == errno.ENOSPC
@@ -225,7 +224,7 @@ def test_run__ctrl_c_is_status_130(study, tmp_path):
 def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
     with pytest.raises(InputError, match="cases is empty"):
         sweep([], tmp_path)
-    with pytest.raises(InputError, match="workers is -1: expected 0 or more"):
+    with refused("workers", -1):
         sweep(study(), tmp_path, workers=-1)
     bad = BALL + '[sweep]\n"program.0.load" = ["50 N", "60 N"]\n'
     with pytest.raises(InputError, match="none of 2 cases"):

@@ -101,18 +101,3 @@ def test_axes__leave_the_surface_flat_in_paraview(folder):
         ends = [float(one) for axis in (ds.y, ds.x) for one in axis[[0, -1]]]
         assert {image.GetPointData().GetArrayName(i) for i in range(3)} == {"pressure", "displacement", "height"}
     assert image.GetBounds()[:4] == pytest.approx(ends, rel=1e-9)
-
-
-def test_zarr__gives_a_sweep_back(folder, tmp_path):
-    pytest.importorskip("zarr")
-    ds = rv.open_results(folder)
-    ds.to_zarr(tmp_path / "sweep.zarr", zarr_format=2)
-    with xr.open_zarr(tmp_path / "sweep.zarr", decode_timedelta=False) as back:
-        xr.testing.assert_equal(back.load(), ds.load())
-        assert back.program_0_load.attrs == ds.program_0_load.attrs
-
-
-def test_hvplot__draws_a_sweep(folder):
-    pytest.importorskip("hvplot.xarray")
-    drawn = rv.open_results(folder).contact_area.load().hvplot.line(x="time", by="case")
-    assert len(drawn) == 4

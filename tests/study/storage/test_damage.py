@@ -17,8 +17,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import DamagedError
-from roughvisc.study.storage.upkeep import clean_folder, verify
+from roughvisc.study.storage.index import clean_folder
+from roughvisc.study.storage.netcdf import DamagedError, verify
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -230,18 +230,20 @@ def test_run__refuses_what_is_not_damaged_and_leaves_it(copied, change, invoke):
 
 @pytest.mark.parametrize("change", [forbidden, later, pipe])
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files of POSIX")
-def test_sweep__refuses_it_before_anything_is_computed(copied, change, invoke):
+def test_sweep__names_it_and_leaves_it(copied, change, invoke):
     study, case, path = copied
     study.write_text(TWO_LOADS)
     assert case.key in [one.key for one in read_cases(study)]
     if change is forbidden:
         needs_no_more_code(study, invoke)
     change(path)
+    before = path.lstat()
     path.parent.chmod(0o777)
     with another_user(change):
         status, _, err = invoke("run", study, "--out", path.parent, "-q", "--workers", "0")
-    assert (status, str(path) in err) == (2, True)
-    assert [one.name for one in path.parent.glob("*.nc*")] == [path.name]
+    assert (status, str(path) in err) == (1, True)
+    assert (path.lstat().st_ino, path.lstat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    assert len(list(path.parent.glob("*.nc*"))) == 2, "the other case is computed"
 
 
 def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invoke):

@@ -5,7 +5,6 @@ import shutil
 from functools import partial
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from support import BALL, LOADS, refused
@@ -16,7 +15,7 @@ from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.netcdf import open_result, write_result
-from roughvisc.study.storage.sweep_cases import SWEEP
+from roughvisc.study.storage.sweep_data import SWEEP
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 OWN_TIMES = (
@@ -260,18 +259,10 @@ def test_open_results__reads_no_file_that_the_index_knows(sixty, monkeypatch):
 
     monkeypatch.setattr(netCDF4, "Dataset", forbidden)
     ds = rv.open_results(sixty)
+    assert len(rv.to_table(sixty)) == 60
     assert float(ds.force.sum()) == pytest.approx(0.5 * 55 * 6 * 4)
     with pytest.raises(AssertionError, match="a result was opened"):
         ds.pressure.compute(scheduler="sync")
-
-
-def test_table__reads_each_file_once(tmp_path, monkeypatch):
-    import netCDF4
-
-    synthetic(tmp_path, loads=2, seeds=1)
-    wanted = rv.to_table(tmp_path)
-    monkeypatch.setattr(netCDF4, "Dataset", None)
-    pd.testing.assert_frame_equal(rv.to_table(tmp_path), wanted)
 
 
 @pytest.mark.thorough

@@ -95,13 +95,3 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
     assert written["status"].tolist() == ["converged", "not computed"]
     assert written["program.0.load [mN]"].tolist() == [1, 2]
     assert rv.to_table(tmp_path / "out")["status"].tolist() == ["converged", "not computed"]
-
-
-@pytest.mark.parametrize("sign", ["=", "+", "-", "@"])
-def test_table__holds_no_formula(tmp_path, sign):
-    title = f"{sign}HYPERLINK(1)"
-    (tmp_path / "balls.toml").write_text(SMALL.replace("A ball", title) + '[sweep]\n"solve.edge" = ["error"]\n')
-    run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, display=Display(False))
-    written = pd.read_csv(tmp_path / "out" / CASES)
-    assert written["title"].tolist() == [f"'{title}"]
-    assert rv.to_table(tmp_path / "out")["title"].tolist() == [title]

@@ -10,8 +10,8 @@ from support import BALL
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.storage.folder import lock_case
+from roughvisc.study.storage.index import clean_folder
 from roughvisc.study.storage.netcdf import write_result
-from roughvisc.study.storage.upkeep import clean_folder
 
 KEYS = [f"{i:016x}" for i in range(4)]
 
