@@ -118,7 +118,7 @@ def cell_mean(
         Gauss points along each side.
     """
     total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
-    (along_x, share_x), (along_y, share_y) = (_gauss_rule(count) for count in points)
+    (along_x, share_x), (along_y, share_y) = map(_gauss_rule, points)
     for a, part_a in zip(along_x * sides[0] / 2, share_x / 2, strict=True):
         square = (x + a) ** 2
         for b, part_b in zip(along_y * sides[1] / 2, share_y / 2, strict=True):

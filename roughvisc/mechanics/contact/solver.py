@@ -233,7 +233,8 @@ def solve_contact(
             error = 0.0
         elif iteration:
             error = requested_size * math.sqrt(duality / requested_duality) / max(total, 1e-300)
-        is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding)
+        is_empty = size > 0 and total == 0  # a step has emptied all cells although the surfaces overlap
+        is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding) and not is_empty
         if is_solved and is_blind and 4 * contact.size > gap.size:
             error += load_error(grid, separation.reshape(gap.shape), contact, level, present, total)
             is_solved = error <= tolerance

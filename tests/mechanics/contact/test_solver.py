@@ -208,6 +208,21 @@ def test_known_displacement_of_a_single_cell__leaves_its_error_behind(boundary):
     assert found.approach == pytest.approx(exact[7, 5], rel=1e-14)
 
 
+@pytest.mark.parametrize("factor", [10.0, 1e3, 1e6])
+@BOUNDARIES
+def test_known_displacement_under_far_too_much_pressure__does_not_lose_the_contact(boundary, factor):
+    """The first step empties the only cell that carries: surfaces that overlap are not a solution without pressure."""
+    operator, gap = Grid((15, 12), (1.0, 1.0), boundary), rough_gap((15, 12))
+    pressure = np.zeros_like(gap)
+    pressure[np.unravel_index(np.argmin(gap), gap.shape)] = factor
+    approach = float(gap.min()) + 0.2 * np.ptp(gap)
+    expected = solve_contact(operator, gap, approach=approach)
+    known = {"start": pressure, "start_displacement": operator.displacement(pressure)}
+    found = solve_contact(operator, gap, approach=approach, **known)
+    assert expected.load > 0
+    assert l1(found.pressure, expected.pressure) < 2e-4
+
+
 @pytest.mark.parametrize("known", [{"load": 3000.0}, {"approach": 5.0}], ids=["load", "approach"])
 @BOUNDARIES
 def test_wide_grid__has_its_displacement_in_double_precision(boundary, known):
