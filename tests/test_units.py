@@ -1,4 +1,4 @@
-"""Arguments with units: their conversion to SI units, and what is refused."""
+"""Quantities with units: their conversion to SI units, what is refused, and the unit in which values are shown."""
 
 import contextlib
 import math
@@ -19,20 +19,22 @@ PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
 @pytest.mark.parametrize(
     ("text", "unit", "expected"),
     [
-        ("10 um", "m", 1e-5),
         ("10um", "m", 1e-5),
         ("10 µm", "m", 1e-5),
         ("10 μm", "m", 1e-5),  # the other Greek mu
         ("-3.5 nm", "m", -3.5e-9),
+        ("1 Em", "m", 1e18),
+        ("1 inch", "m", 0.0254),
         ("0.1 MPa s", "Pa s", 1e5),
         ("0.1 MPa*s", "Pa s", 1e5),
+        ("2 s kPa", "Pa s", 2e3),
         ("3 N/m^2", "Pa", 3.0),
         ("3 N / m**2", "Pa", 3.0),
         ("3 N/m²", "Pa", 3.0),
+        ("1 hPa", "Pa", 100.0),
         ("2 kg m/s^2", "N", 2.0),
         ("50 ms", "s", 0.05),
         ("2 min", "s", 120.0),
-        ("1 inch", "m", 0.0254),
         ("0.3", "1", 0.3),
         ("50 %", "1", 0.5),
         ("5 MPa/MPa", "1", 5.0),
@@ -41,16 +43,13 @@ PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
         ("20 degC", "K", 293.15),
     ],
 )
-def test_quantity__reads_number_and_unit(text, unit, expected):
+def test_number__reads_number_and_unit(text, unit, expected):
     assert number(text, unit) == pytest.approx(expected, rel=2e-15)
 
 
-@given(
-    st.decimals(min_value="0.001", max_value="9999", places=3),
-    st.sampled_from(sorted(PREFIXES)),
-)
-def test_quantity__is_the_float_that_a_person_would_write(number, unit):
-    assert number(f"{number} {unit}", "m") == float(f"{number}{PREFIXES[unit]}")
+@given(st.decimals(min_value="0.001", max_value="9999", places=3), st.sampled_from(sorted(PREFIXES)))
+def test_number__is_the_float_that_a_person_would_write(value, unit):
+    assert number(f"{value} {unit}", "m") == float(f"{value}{PREFIXES[unit]}")
 
 
 @given(
@@ -59,66 +58,33 @@ def test_quantity__is_the_float_that_a_person_would_write(number, unit):
     st.sampled_from(["m", "N", "Pa", "s", "Pa s"]),
     st.sampled_from(["", "f", "p", "n", "µ", "\N{GREEK SMALL LETTER MU}", "u", "m", "k", "M", "G", "T"]),
 )
-def test_quantity__with_a_prefix_is_what_pint_makes_of_it(number, power, unit, prefix):
-    text = f"{number}e{power} {prefix}{unit}"
-    by_pint = number(f"{number}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
-    assert number(text, unit) == by_pint
+def test_number__with_a_prefix_is_what_pint_makes_of_it(value, power, unit, prefix):
+    by_pint = number(f"{value}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
+    assert number(f"{value}e{power} {prefix}{unit}", unit) == by_pint
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "expected"),
-    [
-        ("1 min", "s", 60.0),
-        ("1 hPa", "Pa", 100.0),
-        ("1 Em", "m", 1e18),
-        ("2 s kPa", "Pa s", 2e3),
-        ("1 ft", "m", 0.3048),
-    ],
-)
-def test_quantity__with_what_is_no_plain_prefix_is_that_unit(text, unit, expected):
-    assert number(text, unit) == expected
-
-
-@pytest.mark.parametrize("text", ["1 smm", "1 mkm", "1 Mkg", "1 mm/s", "1 k", "1 N"])
-def test_quantity__with_two_prefixes_or_another_unit_is_refused(text):
-    with refused(found=text):
-        number(text, "m")
-
-
-@pytest.mark.parametrize("number", [3, 3.0, np.float64(3), np.int32(3)])
-def test_quantity__takes_plain_numbers_as_they_are(number):
-    assert number(number, "m") == 3.0
-    assert type(number(number, "m")) is float
+@pytest.mark.parametrize("value", [3, 3.0, np.float64(3), np.int32(3), np.array(3.0), xr.DataArray(3.0)])
+def test_number__of_a_plain_number_is_a_float(value):
+    assert number(value, "m") == 3.0
+    assert type(number(value, "m")) is float
 
 
 @pytest.mark.parametrize(
     ("value", "unit"),
     [
-        ("3 s", "m"),
+        *(
+            (f"1 {unit}", "m")
+            for unit in ("smm", "mkm", "Mkg", "mm/s", "k", "N", "s", "bananas", "nan", "m^0", "abohm^0")
+        ),
+        *((f"1 {unit}", "m") for unit in ("m \u037a", "dB^2", "dBW")),
         ("3 Pa", "Pa s"),
-        ("3 bananas", "m"),
-        ("3 nan", "m"),
-        ("3 m^0", "m"),
-        ("3 abohm^0", "m"),
-        ("3 m \u037a", "m"),
-        ("3 dB^2", "m"),
-        ("3 dBW", "m"),
         ("3 degC^2", "K"),
-        ("3", "m"),
-        ("um", "m"),
-        ("", "m"),
-        ("3 + 4 m", "m"),
         ("45 degree", "1"),
-        (True, "m"),
-        (None, "m"),
-        ([1], "m"),
-        (math.nan, "m"),
-        (math.inf, "m"),
-        ("1e999 m", "m"),
-        ("nan m", "m"),
+        *((text, "m") for text in ("3", "um", "", "3 + 4 m", "1e999 m", "nan m")),
+        *((value, "m") for value in (True, None, [1], math.nan, math.inf)),
     ],
 )
-def test_quantity__of_another_kind_or_no_number_is_refused(value, unit):
+def test_number__of_another_kind_is_refused(value, unit):
     with refused("radius", value):
         number(value, unit, "radius")
 
@@ -128,15 +94,42 @@ def test_quantity__of_another_kind_or_no_number_is_refused(value, unit):
     "text",
     ["9**9**9**9 m", "1 m**9**9**9", "1 " + "m " * 40_000, "1 m^99999999", "1 " + "a" * 90, "1 " + "a" * 90 + "!"],
 )
-def test_quantity__does_not_hang_on_hostile_text(text):
+def test_number__does_not_hang_on_hostile_text(text):
     with refused(found=text):
         number(text, "m")
 
 
 @given(st.text(max_size=40))
-def test_quantity__any_text_gives_a_number_or_an_input_error(text):
+def test_number__of_any_text_is_finite_or_an_input_error(text):
     with contextlib.suppress(InputError):
         assert math.isfinite(number(text, "m"))
+
+
+@pytest.mark.parametrize(
+    ("value", "bounds"),
+    [
+        (0, {"above": 0}),
+        (2.0, {"above": 2}),
+        (1e-320, {"above": 0}),  # no double is its reciprocal
+        ("-1 mm", {"least": 0}),
+        (0.7, {"above": 0, "most": 0.5}),
+        (1.0, {"least": 0, "below": 1}),
+        (np.float32(2.0), {"most": 1}),
+    ],
+)
+def test_number__outside_its_bounds_is_refused(value, bounds):
+    with refused("radius", value):
+        number(value, "m", "radius", **bounds)
+
+
+def test_number__within_its_bounds():
+    for value, bounds in ((0, {"least": 0}), ("1 mm", {"above": 0, "most": 1e-3}), (2.0, {"below": 3})):
+        assert number(value, "m", **bounds) == number(value, "m")
+
+
+def test_number__of_another_quantity_suggests_its_key():
+    with pytest.raises(InputError, match=r"load: .*pressure = '2 MPa'"):
+        number("2 MPa", "N", "load", instead={"approach": "m", "pressure": "Pa"})
 
 
 @pytest.mark.parametrize(
@@ -163,40 +156,3 @@ def test_quantity__any_text_gives_a_number_or_an_input_error(text):
 )
 def test_unit_for__reads_well(values, si, text):
     assert unit_for(values, si).text(np.nanmax(np.abs(values))) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "bounds"),
-    [
-        (0, {"above": 0}),
-        (2.0, {"above": 2}),
-        (1e-320, {"above": 0}),  # no double is its reciprocal
-        ("-1 mm", {"least": 0}),
-        (0.7, {"above": 0, "most": 0.5}),
-        (1.0, {"least": 0, "below": 1}),
-        (np.float32(2.0), {"most": 1}),
-    ],
-)
-def test_number__outside_its_bounds_is_refused(value, bounds):
-    with refused("radius", value):
-        number(value, "m", "radius", **bounds)
-
-
-@pytest.mark.parametrize(
-    ("value", "bounds", "expected"),
-    [
-        (0, {"least": 0}, 0.0),
-        ("1 mm", {"above": 0, "most": 1e-3}, 1e-3),
-        (np.array(2.0), {"below": 3}, 2.0),
-        (xr.DataArray(2.0), {}, 2.0),
-    ],
-)
-def test_number__within_its_bounds_is_a_float(value, bounds, expected):
-    found = number(value, "m", "radius", **bounds)
-    assert type(found) is float
-    assert found == expected
-
-
-def test_number__of_another_quantity_suggests_its_key():
-    with pytest.raises(InputError, match=r"load: .*pressure = '2 MPa'"):
-        number("2 MPa", "N", "load", instead={"approach": "m", "pressure": "Pa"})
