@@ -69,15 +69,6 @@ series_with_common_times = st.builds(
     st.tuples(st.sampled_from([0.1, 1.0]), st.floats(2, 10)),
     st.floats(-0.9, 0.5),
 )
-#: With and without an instantaneous compliance, in seconds, microseconds and weeks.
-power_laws = st.builds(
-    rv.power_law,
-    st.sampled_from([0.0, 0.3, 10.0]),
-    st.just(2.0),
-    st.floats(0.05, 0.95),
-    st.sampled_from([1.0, 1e-6, 1e6]),
-    st.just(0.3),
-)
 
 
 @st.composite

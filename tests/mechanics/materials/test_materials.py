@@ -1,6 +1,5 @@
 """Creep compliances against closed forms, and exact conversion over many decades."""
 
-import itertools
 import math
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate
-from strategies import examples, positive, series, series_with_common_times
+from strategies import series_with_common_times
 from support import refused
 
 import roughvisc as rv
@@ -27,20 +26,6 @@ def test_maxwell__flows():
     material = rv.maxwell(2.0, 4.0)
     assert material.contact_compliance(3.0) == pytest.approx((1 / 2 + 3 / 4) / 4)
     assert material.contact_integral(3.0) == pytest.approx((3 / 2 + 9 / 8) / 4)
-
-
-@given(
-    material=series(positive, positive, st.floats(1e-3, 1e3), (0.0, positive), least=1, most=4),
-    t=st.floats(1e-3, 1e3),
-)
-@examples(50)
-def test_contact_integral__is_the_integral(material, t):
-    breaks = sorted({0.0, t, *(b for x in material.times for b in (x / 10, x, 10 * x, 100 * x) if b < t)})
-    parts = [
-        integrate.quad(material.contact_compliance, a, b, epsabs=0, epsrel=1e-12)[0]
-        for a, b in itertools.pairwise(breaks)
-    ]
-    assert material.contact_integral(t) == pytest.approx(sum(parts), rel=1e-10)
 
 
 @pytest.mark.parametrize("equilibrium", [0.0, 1e-9, 5.0])
@@ -127,7 +112,7 @@ def transformed(material, s):
 
 
 @pytest.mark.parametrize("name", SHEAR)
-@pytest.mark.parametrize("ratio", [1e-3, 1.0, 30.0, 1e8])
+@pytest.mark.parametrize("ratio", [1e-12, 1e-3, 1.0, 30.0, 1e8, 1e12])
 def test_bulk_modulus__satisfies_the_correspondence_principle(name, ratio):
     """``(1 - nu)/G = 1/2 (1/G + 3/(3K + G))`` with the transformed modulus; twice the contact compliance."""
     bulk = 2.0 * ratio
@@ -164,15 +149,6 @@ def test_bulk_modulus__excludes_a_poisson_ratio():
         rv.from_relaxation(1.0, [1.0], [1.0], poisson=0.5, bulk_modulus=3.0)
     with refused("bulk_modulus", 0.0):
         rv.from_relaxation(1.0, [1.0], [1.0], bulk_modulus=0.0)
-
-
-def test_bulk_modulus__of_kelvin_voigt_over_any_ratio():
-    """A zero at the very end of its bracket is found: one pole, whose offset is known."""
-    for ratio in 10.0 ** np.arange(-12, 12.1, 0.5):
-        material = with_elastic_bulk(rv.kelvin_voigt(2.0, 3.0), 2.0 * ratio)
-        # B belongs to 3K + G + eta d/dt
-        assert material.compliances[1] == pytest.approx(3 / (6 * ratio + 2), rel=2e-15, abs=0)
-        assert material.times[1] == pytest.approx(3 / (6 * ratio + 2), rel=2e-15, abs=0)
 
 
 # --- relaxation by ratios -------------------------------------------------------------------------------------------
@@ -248,9 +224,6 @@ def test_contact_integral__of_every_material_is_the_integral(name):
             lambda x, end=end: end * 5 * x**4 * float(material.contact_compliance(end * x**5)), 0, 1, epsrel=1e-12
         )
         assert value == pytest.approx(exact, rel=1e-9, abs=0)
-
-
-# --- power law ------------------------------------------------------------------------------------------------------
 
 
 # --- pairs ----------------------------------------------------------------------------------------------------------

@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from strategies import examples, power_laws
 
 import roughvisc as rv
 from roughvisc.mechanics.materials.series import series
@@ -14,23 +11,6 @@ def true_error(material, found, shortest, longest):
     """Largest relative error at instants other than those of the certificate."""
     t = np.append(np.geomspace(shortest, longest, 7919), longest)
     return float(np.abs(found.contact_compliance(t) / material.contact_compliance(t) - 1).max())
-
-
-@given(
-    material=power_laws,
-    shortest=st.floats(1e-9, 1e3),
-    decades=st.floats(0.1, 8),
-    tolerance=st.sampled_from([1e-2, 1e-3, 1e-4, 1e-5]),
-)
-@examples(60)
-def test_series__of_a_power_law_keeps_the_tolerance(material, shortest, decades, tolerance):
-    longest = shortest * 10**decades
-    found, error = series(material, shortest, longest, tolerance)
-    assert error <= tolerance
-    assert true_error(material, found, shortest, longest) <= 1.05 * error + 1e-14
-    assert found.poisson == 0.3
-    assert found.glassy == material.creep_compliance(0.0)
-    assert min(found.compliances, default=1.0) > 0
 
 
 CURVES = {

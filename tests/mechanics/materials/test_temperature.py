@@ -1,10 +1,11 @@
-"""Time-temperature shift: creep at another temperature is creep at shifted times."""
+"""Shifted and stiffer materials: creep at another temperature is creep at shifted times."""
 
 import numpy as np
 import pytest
 from support import refused
 
 import roughvisc as rv
+from roughvisc.mechanics.materials.creep import stiffened
 
 GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)
 
@@ -29,37 +30,43 @@ def own(t):
     return 4e-6 * (1 - np.exp(-t / 3) / 2)
 
 
-MATERIALS = [
-    rv.elastic(2e6, 0.3),
-    rv.maxwell(1e6, 1e5),
-    rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
-    rv.power_law(1e-8, 1e-6, 0.3, 7.0, 0.4),
-    rv.creep_table((0.5, 1.0, 30.0, 700.0), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
-    rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)),
-    rv.pair(rv.elastic(8e10, 0.3), rv.power_law(1e-8, 1e-6, 0.5)),
-    rv.creep(own),
-]
+MATERIALS = {
+    "elastic": rv.elastic(2e6, 0.3),
+    "series": rv.Prony(2e-7, 1e-8, (3e-7, 1e-7), (0.1, 3.0), 0.4),
+    "bulk": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
+    "power law": rv.power_law(1e-8, 1e-6, 0.3, 7.0, 0.4),
+    "noisy table": rv.creep_table((0.5, 1.0, 30.0, 700.0), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
+    "table": rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)),
+    "pair": rv.pair(rv.elastic(8e10, 0.3), rv.zener(3e6, 1e6, 1e5)),
+    "mixed pair": rv.pair(rv.elastic(8e10, 0.3), rv.power_law(1e-8, 1e-6, 0.5)),
+    "own": rv.creep(own, 0.3),
+}
 
 
-@pytest.mark.parametrize("material", MATERIALS, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
 @pytest.mark.parametrize("factor", [1e-3, 40.0])
-def test_shifted__is_the_material_in_reduced_time(material, factor):
-    moved, t = rv.shift(material, factor), np.array([0.0, 1e-3, 0.4, 6.0, 500.0])
-    assert moved.contact_compliance(factor * t) == pytest.approx(material.contact_compliance(t), rel=1e-13)
-    integral = material.contact_integral(t)
+def test_scaled__is_the_material_in_reduced_time_or_stiffer(material, factor):
+    t = np.array([0.0, 1e-3, 0.4, 6.0, 500.0])
+    compliance, integral = material.contact_compliance(t), material.contact_integral(t)
+    moved, harder = rv.shift(material, factor), stiffened(material, factor)
+    assert moved.contact_compliance(factor * t) == pytest.approx(compliance, rel=1e-13)
     assert moved.contact_integral(factor * t) == pytest.approx(factor * integral, rel=1e-12, abs=0)
+    assert harder.contact_compliance(t) == pytest.approx(compliance / factor, rel=1e-12, abs=0)
+    assert harder.contact_integral(t) == pytest.approx(integral / factor, rel=1e-12, abs=0)
     assert f"{factor:g} (time-temperature shift)" in moved.note
-    assert rv.shift(moved, 1 / factor).contact_compliance(t) == pytest.approx(material.contact_compliance(t))
+    assert f"all moduli multiplied by {factor:g}" in harder.note
+    assert moved.poisson == harder.poisson == material.poisson
+    assert rv.shift(moved, 1 / factor).contact_compliance(t) == pytest.approx(compliance)
 
 
 def test_shifted__a_table_ends_later_in_the_cold():
-    cold = rv.shift(MATERIALS[5], 10.0)
+    cold = rv.shift(MATERIALS["table"], 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
     with pytest.raises(rv.InputError, match="table ends at 7000 s"):
         cold.contact_compliance(7001.0)
 
 
-@pytest.mark.parametrize("material", [MATERIALS[2], MATERIALS[3], rv.creep(own)], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("material", [MATERIALS[name] for name in ("bulk", "power law", "own")])
 def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(material):
     height = rv.sphere(1e-2, (1e-3, 1.1e-3), (17, 20))
 
@@ -79,16 +86,14 @@ def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(m
         (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature"),
         (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "wlf_c1"),
         (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
-        (lambda: rv.shift(MATERIALS[0], 0.0), "factor"),
-        (lambda: rv.shift(MATERIALS[0], np.nan), "factor"),
-        (lambda: rv.shift(MATERIALS[0], "2"), "factor"),
+        (lambda: rv.shift(MATERIALS["elastic"], 0.0), "factor"),
+        (lambda: rv.shift(MATERIALS["elastic"], np.nan), "factor"),
+        (lambda: rv.shift(MATERIALS["elastic"], "2"), "factor"),
+        (lambda: rv.shift(3.0, 2.0), "material"),
+        (lambda: stiffened(MATERIALS["elastic"], 0.0), "modulus_factor"),
+        (lambda: stiffened(MATERIALS["elastic"], np.inf), "modulus_factor"),
     ],
 )
-def test_shift__refuses_at_the_argument(wrong, key):
+def test_scaling__refuses_at_the_argument(wrong, key):
     with refused(key):
         wrong()
-
-
-def test_shift__refuses_what_is_no_material():
-    with refused("material", 3.0):
-        rv.shift(3.0, 2.0)
