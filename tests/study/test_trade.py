@@ -8,40 +8,15 @@ import xarray as xr
 from support import FRICTION, PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
 
 import roughvisc as rv
-from roughvisc.study.neighbours import on_cells
 from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.study.trade import cheapest, format_tolerance, open_trade, pareto_front, uncertainty
 
-WAVE = """
-[surface]
-generate = "wavy"
-amplitude = "2 um"
-wavelength = "1 mm"
-size = "1 mm"
-shape = [24, 2]
-waves = 1
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.3 MPa"
-kelvin_viscosity = "0.3 kPa s"
-[solve]
-boundary = "periodic"
-"""
-CURVE = FRICTION.replace('{ from = "2 mm/s", to = "2 m/s", count = 4 }', '["5 mm/s", "0.2 m/s"]')
-SLIDES = (
-    WAVE
-    + """
-[[program]]
-pressure = "10 kPa"
-over = "1 ms"
-[[program]]
-slide = "1 mm"
-speed = "0.1 m/s"
-[[program]]
-hold = "2 ms"
-"""
-)
+WAVE = {
+    "surface": {"generate": "wavy", "amplitude": 2e-6, "wavelength": 1e-3, "size": 1e-3, "shape": [24, 2], "waves": 1},
+    "material": {"model": "zener", "shear_modulus": 1e6, "kelvin_modulus": 3e5, "kelvin_viscosity": 300.0},
+    "program": [{"pressure": 1e4, "over": 1e-3}, {"slide": 1e-3, "speed": 0.1}, {"hold": 2e-3}],
+    "solve": {"boundary": "periodic"},
+}
 RUBBING, AREA = "friction_coefficient", "contact_area"
 
 
@@ -72,7 +47,7 @@ def test_finer_grid__has_the_smaller_errors_and_takes_more_transforms(tmp_path):
 
 
 def test_friction__errors_are_those_against_its_finest_run(tmp_path):
-    case = case_of(tmp_path, CURVE)
+    case = case_of(tmp_path, FRICTION, friction__speeds=[5e-3, 0.2])
     ds = measured(case, (0.1, 1), (0.01, 1), (1e-3, 2.0))
     assert set(ds.quantity.values) == {"pressure", "approach", AREA, "mean_gap", RUBBING}
 
@@ -89,7 +64,8 @@ def test_friction__errors_are_those_against_its_finest_run(tmp_path):
 
 def test_friction__uncertainty_of_the_finest_run_holds_its_true_error(tmp_path):
     """The true error is that of a wave against eight times as many cells."""
-    case = case_of(tmp_path, WAVE + '[friction]\npressure = "10 kPa"\nspeeds = ["30 mm/s", "0.3 m/s"]\n')
+    sliding = {"program": None, "keep": None, "friction": {"pressure": 1e4, "speeds": [0.03, 0.3]}}
+    case = case_of(tmp_path, **WAVE | sliding)
     ds = measured(case, (1e-3, 1))
     wave = {"amplitude": 2e-6, "wavelength": 1e-3, "size": (1e-3, 1e-3), "waves": 1}
     solve = {"pressure": 1e4, "speeds": [0.03, 0.3], "tolerance": 2e-4, "progress": False}
@@ -99,10 +75,10 @@ def test_friction__uncertainty_of_the_finest_run_holds_its_true_error(tmp_path):
         assert 0.3 * true < uncertainty(ds, name) < 1, name
 
 
-@pytest.mark.parametrize(("times", "least"), [('"all"', 1), pytest.param("20", 3, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(("times", "least"), [("all", 1), pytest.param(20, 3, marks=pytest.mark.thorough)])
 def test_slides__are_compared_where_the_profile_has_moved_by_whole_cells_of_all_grids(tmp_path, times, least):
     """The coarsest grid, for the accuracy of the reference, has 6 cells along the wave."""
-    ds = measured(case_of(tmp_path, SLIDES + f"[keep]\ntimes = {times}\n"), (0.1, 1), (1e-2, 2.0))
+    ds = measured(case_of(tmp_path, **WAVE, keep={"times": times}), (0.1, 1), (1e-2, 2.0))
     assert np.isfinite(ds.error).all()
     kept = np.array(json.loads(ds.attrs["case"])["keep"]["times"])
     cells = (kept - 1e-3) / 1e-2 * 6
@@ -116,25 +92,12 @@ def test_slides__are_compared_where_the_profile_has_moved_by_whole_cells_of_all_
 # a scan
 
 
-def test_scan__on_a_coarser_grid_keeps_the_waves_that_it_holds(tmp_path):
+def test_scan__on_a_coarser_grid_is_another_surface_and_has_no_finer_one(tmp_path):
     case = case_of(tmp_path, ROUGH)
     ds = measured(case, (1e-2, 1), (1e-3, 2.0))
     assert ds.error.sel(quantity="pressure")[1] > 2 * ds.error.sel(quantity="pressure")[0]
     with refused("settings", (1e-3, 0.5)):
         measured(case, (1e-3, 0.5))
-    few = on_cells(case, case.height(), 2.0).height()
-    x, y = (_waves_at(old, new) for old, new in ((30, 15), (26, 13)))
-    expected = x @ case.height().values @ y.T
-    assert few.values == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
-
-
-def _waves_at(old, new):
-    """Values at the centres of fewer cells, from values at more, by the waves that fewer cells hold."""
-    number = np.arange(new) - (new - 1) // 2
-    fine, few = (
-        np.exp(2j * np.pi * np.outer((np.arange(n) + 0.5) / n, number[2 * abs(number) < new])) for n in (old, new)
-    )
-    return (few @ fine.conj().T).real / old
 
 
 # ----------------------------------------------------------------------------------------------------------------
