@@ -24,7 +24,7 @@ from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
 from roughvisc.study.storage.netcdf import NETCDF
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
-from roughvisc.variables import AXES, axis_of
+from roughvisc.variables import AXES
 
 #: Variable of a trade -> unit and long name.
 COLUMNS = {
@@ -135,12 +135,12 @@ def trade(
     wanted = {(sharpest / _SHARPER, part * grid) for grid in finest for part in (1.0, 2.0, 4.0)}
     wanted |= {*rungs, *((sharpest, grid) for grid in finest)}
     times, experiment = case.settings.times or _FEW, case.experiment
-    if isinstance(experiment, Loading) and experiment.program.slides:
+    if isinstance(experiment, Loading):
         shapes = [shape_on(case, height, grid) for _, grid in wanted]
         sides = np.array(spacing(height)) * height.shape / np.array(shapes)
-        times = kept_times(experiment.program, times, *map(tuple, sides)) or "all"
+        times = kept_times(experiment.program, times, *map(tuple, sides))
     fields = ["pressure", *(field for one in observed for field in one.fields)]
-    base = with_rows(case, fields, list(times) if isinstance(times, tuple) else times)
+    base = with_rows(case, fields, times)
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
     solved = partial(solve, folder=folder, watch=partial(Display, progress, summary=False))
 
@@ -191,7 +191,7 @@ def _compared(
     reference: tuple[float, float],
 ) -> xr.Dataset:
     """Return the cost and the errors of the settings that were solved."""
-    (sharp, finest), axis = reference, AXES[case.experiment.axis]
+    sharp, finest = reference
 
     def apart(one: tuple[float, float], other: tuple[float, float] = reference) -> NDArray[np.float64]:
         both = {one, other} <= results.keys()
@@ -202,8 +202,6 @@ def _compared(
         shape, note, error = shape_on(case, height, setting[1]), notes.get(setting, ""), apart(setting)
         if setting[1] < finest:
             note, error = note or "finer than the reference, for which there is no time", np.full_like(error, math.nan)
-        elif not note and np.isnan(error).all():
-            note = f"its {axis.rows} differ from those of the reference"
         found = None if note else results[setting]
         spent = math.nan if found is None else float(found["wall_time"][-1])
         transforms = math.nan if found is None else float(found["convolutions"].sum())
@@ -230,20 +228,17 @@ def _compared(
         case=case.to_json(),
         reference=f"finest run: {_label(*reference, shapes[0])}",
         grid_is_data=int(is_data(case)),
-        rows=axis.rows,
+        rows=AXES[case.experiment.axis].rows,
     )
 
 
 def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
     """Return the largest difference of each quantity over all rows, over the largest value of the second result.
 
-    The difference of pressures is the integral of the absolute difference (L1), over the largest force. Differences are
-    missing if the rows are at other times. A quantity that is missing in both results, such as the friction before
-    loading, counts as equal.
+    The difference of pressures is the integral of the absolute difference (L1), over the largest force. A quantity that
+    is missing in both results, such as the friction before loading, counts as equal.
     """
-    rows, errors = axis_of(wanted.variables), []
-    if found[rows].shape != wanted[rows].shape or not np.allclose(found[rows], wanted[rows], rtol=1e-9, atol=0):
-        return np.full(len(names), math.nan)
+    errors = []
     for name in names:
         if name == "pressure":
             error, largest = pressure_distance(found, wanted), float(wanted["force"].max())

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from references import OnSheet, Paraboloid, sticking_stiffness
+from references import OnSheet, Paraboloid
 from scipy import special
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -132,11 +132,6 @@ def test_dundurs_coupling__of_a_rigid_partner_and_of_like_bodies():
     johnson = ((1 - 2 * v1) / g1 - (1 - 2 * v2) / g2) / ((1 - v1) / g1 + (1 - v2) / g2) / 2
     compliances = [(1 - v) / (2 * g) for g, v in ((g1, v1), (g2, v2))]
     assert effects.dundurs_coupling(compliances, [v1, v2]) == pytest.approx(abs(johnson), rel=1e-12)
-
-
-def test_sticking_stiffness__goes_to_one_of_incompressible_bodies():
-    assert sticking_stiffness(0.5 - 1e-9) == pytest.approx(1.0, abs=1e-8)
-    assert sticking_stiffness(0.0) == pytest.approx(math.log(3), rel=1e-14)
 
 
 def moving_compliance(speed, shear, density, poisson):
