@@ -127,33 +127,28 @@ def inspect(h: xr.DataArray) -> Inspection:
         step, advice = {}, "too small to crop; fill them with the other missing points"
         if limits := _largest_part(h, void) if share >= _HOLES else {}:
             step, h = {"crop": limits}, crop(h, **limits)
-            advice = (
-                f"crop to the largest part without holes, {h.shape[0]} x {h.shape[1]} points (the findings below refer "
-                'to it); or keep the whole scan with missing = "absent" if the holes contain no material'
-            )
+            part = f"{h.shape[0]} x {h.shape[1]} points, to which the findings below refer"
+            advice = f'crop to the largest part without holes, {part}; missing = "absent" if holes contain no material'
         find("Holes", f"{_percent(share)} of the scan lies in holes wider than a few points", advice, step, share=share)
 
+    seen, advice, step = "none", "", {}
     if missing := int(h.isnull().sum()):
+        seen, step = f"{missing} ({_percent(missing / h.size)})", {"fill": "harmonic"}
         advice = 'fill = "harmonic"; the result marks the filled points'
-        seen = f"{missing} ({_percent(missing / h.size)})"
-        find("Missing points", seen, advice, {"fill": "harmonic"}, points=missing)
-    else:
-        find("Missing points", "none", points=0)
+    find("Missing points", seen, advice, step, points=missing)
 
     levelled = level(h)
     kept = mask_outliers(levelled)
     spikes = int(kept.isnull().sum()) - missing
     doubtful = spikes > _MOST_SPIKES * h.size
     kept = levelled if doubtful else kept
-    rms_raw, rms_levelled, rms = (float(np.nanstd(one.values)) for one in (h, levelled, level(kept)))
+    rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
     seen, advice, step = "none", "", {}
     if spikes:
         seen = f"{spikes} point{'s' * (spikes > 1)} ({_percent(spikes / h.size)})"
     if spikes and doubtful:
         seen += " differ strongly from their neighbours"
-        advice = (
-            "too many to be spikes: check the picture; set outliers = true only if the surface has no such features"
-        )
+        advice = "too many to be spikes: check the picture; outliers = true only if the surface has no such features"
     elif spikes:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice, step = "outliers = true; otherwise the spikes carry the load", {"outliers": True, "fill": "harmonic"}
@@ -165,18 +160,11 @@ def inspect(h: xr.DataArray) -> Inspection:
     repeats = border_mismatch(kept).jumps and not border_mismatch(h).jumps
     order = 2 if form > _FORM else 0 if repeats else 1
     treated = kept if order == 1 else level(h, order).where(kept.notnull())
-    slopes = [
-        float(np.nanmean(np.diff(h.values - levelled.values, axis=axis)) / d) for axis, d in enumerate(spacing(h))
-    ]
-    seen = (
-        f"{_angle(slopes[0])} along x and {_angle(slopes[1])} along y: Sq is {_length(rms_raw)} before and "
-        f"{_length(rms_levelled)} after levelling"
-    )
-    advice = {
-        2: "level = 2 subtracts the plane too",
-        1: "level = 1 subtracts the plane",
-        0: "level = 0 subtracts the mean only; subtracting a plane would break the periodicity",
-    }[order]
+    plane = h.values - levelled.values
+    slopes = [float(np.nanmean(np.diff(plane, axis=axis)) / d) for axis, d in enumerate(spacing(h))]
+    seen = f"{_angle(slopes[0])} along x, {_angle(slopes[1])} along y: Sq is {_length(rms_levelled)} without the plane"
+    advice = f"level = {order} subtracts the plane{' too' if order == 2 else ''}"
+    advice = advice if order else "level = 0 subtracts the mean only; a plane would break the periodicity"
     find("Tilt", seen, advice, {"level": order}, slopes=(slopes[0], slopes[1]))
     seen, advice = f"a quadratic form accounts for {_percent(form)} of Sq squared", ""
     if order == 2:
@@ -186,11 +174,8 @@ def inspect(h: xr.DataArray) -> Inspection:
 
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
-    (x, y), (nx, ny) = borders.of_rms, borders.of_neighbours
-    seen = (
-        f"opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y: {nx:.2g} and {ny:.2g} times the "
-        "difference of neighbouring rows"
-    )
+    x, y = borders.of_neighbours
+    seen = f"opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as neighbouring rows"
     advice = 'boundary = "mirror"; with "periodic" the step at the seam carries load'
     find("Borders", seen, advice if borders.jumps else 'boundary = "periodic"', of_neighbours=borders.of_neighbours)
 
@@ -204,10 +189,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     seen, advice = f"the rms slope is {slope:.2g} after these steps", ""
     if slope > _STEEP:
         seen += ", which is steeper than 45°, unlike almost any measured surface"
-        advice = (
-            "check the spacing and the units of x, y and height (unit, spacing, height_scale): one of them is probably "
-            "wrong; if all are right, the half-space model does not hold, since it assumes small slopes"
-        )
+        advice = "check unit, spacing and height_scale; the half-space model holds for small slopes only"
     find("Slope", seen, advice, rms_slope=slope)
     seen, advice = f"their kurtosis is {kurtosis:.2g} (3: Gaussian)", ""
     if not _GAUSSIAN[0] <= kurtosis <= _GAUSSIAN[1] and not math.isnan(kurtosis):
@@ -220,9 +202,9 @@ def inspect(h: xr.DataArray) -> Inspection:
     if noise is not None:
         seen = f"no noise floor down to two cells; noise is below {_length(noise['rms'])} rms"
     if noise is not None and noise["floor"]:
+        part = f"{_percent(noise['noisy_slopes'])} of the mean square slope"
         seen = (
-            f"noise floor of {_length(noise['rms'])} rms; wavelengths below {_length(noise['wavelength'])} are noise "
-            f"and make {_percent(noise['noisy_slopes'])} of the mean square slope"
+            f"{_length(noise['rms'])} rms: wavelengths below {_length(noise['wavelength'])} are noise and make {part}"
         )
     step, advice = ({"filter": cutoff}, "filter out these wavelengths") if cutoff else ({}, "")
     find("Noise", seen, advice, step, **(noise or {}))
