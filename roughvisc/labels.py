@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.variables import AXES, ERRORS, ROW, ROWS, STEP, VARIABLES, axis_of
+from roughvisc.variables import ERRORS, ROW, ROWS, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from roughvisc.variables import Variable
 
 #: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
 _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
@@ -40,23 +39,18 @@ def heading(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) -> xr.Dataset:
+def label(dataset: xr.Dataset) -> xr.Dataset:
     """Return a Dataset with the declared dtype and attributes on every variable.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Contains declared variables only, and coordinates of any name, for the varied parameters of a case. Extra
-        leading dimensions (``case``) are allowed.
-    variables : mapping
-        Declarations by name.
+        Contains declared variables only, and coordinates of any name, for the varied parameters of a case.
 
     Raises
     ------
     KeyError
         If a variable is not declared.
-    ValueError
-        If the dimensions of a variable do not end in the declared ones.
 
     Notes
     -----
@@ -64,29 +58,20 @@ def label(dataset: xr.Dataset, variables: Mapping[str, Variable] = VARIABLES) ->
     """
     if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())
-    rows, attributes, converted = (*AXES, ROW, STEP), {}, {}
-    for name, variable in dataset.variables.items():
-        declared = variables.get(str(name))
-        if declared is None and name not in dataset.coords:
-            raise KeyError(f"variable {name!r} is not declared")
-        wanted = declared.dims if declared else variable.dims
-        found = variable.dims[variable.ndim - len(wanted) :]
-        if wanted and found and wanted[0] in (ROW, STEP) and found[0] in rows:
-            found = (wanted[0], *found[1:])  # rows may lie over any axis of rows
-        if declared is None or found != wanted:
-            if name in dataset.coords:
-                continue  # of another meaning
-            raise ValueError(f"variable {name!r} has dimensions {variable.dims}, declared are {wanted}")
-        if variable.dtype != np.dtype(declared.dtype) and variable.dtype.kind not in "fUO":
-            converted[name] = variable.astype(declared.dtype)
-        attributes[name] = dict(declared.attributes)
-        if errors := " ".join(one for one in ERRORS.get(str(name), ()) if one in dataset):
-            attributes[name]["ancillary_variables"] = errors
+    declared = {
+        name: VARIABLES[str(name)] for name in dataset.variables if name in VARIABLES or name in dataset.data_vars
+    }
+    found = {name: dataset.variables[name] for name in declared}
+    labelled = dataset.assign(  # once: each assignment merges the whole
+        {name: one.astype(declared[name].dtype) for name, one in found.items() if one.dtype.kind not in "fUO"}
+    )
+    for name, one in declared.items():
+        attributes = labelled.variables[name].attrs
+        attributes.update(one.attributes)
+        if errors := " ".join(error for error in ERRORS[str(name)] if error in dataset):
+            attributes["ancillary_variables"] = errors
         if name in _CARTESIAN:
-            attributes[name]["cartesian_axis"] = _CARTESIAN[str(name)]
-    labelled = dataset.assign(converted)  # once: each assignment merges the whole
-    for name, found in attributes.items():
-        labelled.variables[name].attrs.update(found)
+            attributes["cartesian_axis"] = _CARTESIAN[str(name)]
     return labelled
 
 
@@ -99,7 +84,7 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
     {'slope': 'too steep'}
     """
     lines = str(attributes.get("warnings", "")).splitlines()
-    return {subject: text for subject, _, text in (line.partition(": ") for line in lines)}
+    return dict(line.split(": ", 1) for line in lines)
 
 
 def warnings_text(warnings: Mapping[str, str]) -> str:
