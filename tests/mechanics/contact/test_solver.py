@@ -146,9 +146,15 @@ def test_error__is_honestly_estimated():
     tolerance=st.floats(-7, -1),
     present=st.sampled_from([0.5, 1.0, 1.0]),
     is_load=st.booleans(),
+    guess=st.sampled_from([None, "cell", "cells"]),
+    size=st.floats(-6, 6),
+    is_known=st.booleans(),
 )
-@examples(100)
-def test_random_problems__are_solved_to_the_tolerance(shape, boundary, seed, load, tolerance, present, is_load):
+@examples(200)
+def test_random_problems__are_solved_to_the_tolerance(
+    shape, boundary, seed, load, tolerance, present, is_load, guess, size, is_known
+):
+    """Cold, and from a guess far from the solution; a step may empty all cells that carry."""
     rng = np.random.default_rng(seed)
     gap, present = rng.random(shape), rng.random(shape) <= present
     assume(present.any())
@@ -157,6 +163,10 @@ def test_random_problems__are_solved_to_the_tolerance(shape, boundary, seed, loa
     is_full = boundary == "periodic" and 1 - exact.approach / gap.mean() < 0.02
     assume(is_load or not is_full)
     known = {"load": exact.load} if is_load else {"approach": exact.approach}
+    if guess is not None:
+        carries = rng.permutation(gap.size).reshape(shape) < (1 if guess == "cell" else 0.3 * gap.size)
+        known["start"] = np.where(carries & present, exact.pressure.max() * 10**size, 0.0)
+        known["start_displacement"] = operator.displacement(known["start"]) if is_known else None
     state = solve_contact(operator, gap, present=present, tolerance=10**tolerance, **known)
     assert l1(state.pressure, exact.pressure) < max(10**tolerance, 1e-8)
 
@@ -206,21 +216,6 @@ def test_known_displacement_of_a_single_cell__leaves_its_error_behind(boundary):
     assert np.array_equal(found.pressure, pressure)
     assert np.abs(found.displacement - exact).max() < 1e-14 * exact.max()
     assert found.approach == pytest.approx(exact[7, 5], rel=1e-14)
-
-
-@pytest.mark.parametrize("factor", [10.0, 1e3, 1e6])
-@BOUNDARIES
-def test_known_displacement_under_far_too_much_pressure__does_not_lose_the_contact(boundary, factor):
-    """The first step empties the only cell that carries: surfaces that overlap are not a solution without pressure."""
-    operator, gap = Grid((15, 12), (1.0, 1.0), boundary), rough_gap((15, 12))
-    pressure = np.zeros_like(gap)
-    pressure[np.unravel_index(np.argmin(gap), gap.shape)] = factor
-    approach = float(gap.min()) + 0.2 * np.ptp(gap)
-    expected = solve_contact(operator, gap, approach=approach)
-    known = {"start": pressure, "start_displacement": operator.displacement(pressure)}
-    found = solve_contact(operator, gap, approach=approach, **known)
-    assert expected.load > 0
-    assert l1(found.pressure, expected.pressure) < 2e-4
 
 
 @pytest.mark.parametrize("known", [{"load": 3000.0}, {"approach": 5.0}], ids=["load", "approach"])
