@@ -17,7 +17,7 @@ def study(folder, text):
 
 
 @pytest.mark.thorough
-def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke):
+def test_run__a_case_of_another_run_is_hindered_and_has_not_failed(tmp_path, invoke):
     path, out = study(tmp_path, TWO), tmp_path / "out"
     out.mkdir()
     first, _ = read_cases(path)
@@ -25,7 +25,7 @@ def test_run__a_case_of_another_run_is_held_and_has_not_failed(tmp_path, invoke)
         status, said, err = invoke("run", path, "--out", out, "--workers", "0")
         assert status == 1
         assert str(lock_path(out, first.key)) in err
-        assert "held" in said
+        assert "hindered" in said
         assert not list(out.glob("*.failed.json"))
         one = study(tmp_path / "one", SMALL.replace("5 mN", "4 mN"))
         status, said, err = invoke("run", one, "--out", out, "--no-plots", "-q")

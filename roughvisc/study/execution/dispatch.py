@@ -102,7 +102,7 @@ def distribute(
             for future, found in finished.next_batch(block=False):
                 key = futures.pop(future)
                 outcome = _outcome(key, found)
-                if outcome.kind == "held" and len(workers[key]) > 1 and key not in taken_over:
+                if outcome.error == "BlockingIOError" and len(workers[key]) > 1 and key not in taken_over:
                     taken_over.add(key)  # a lost worker of this sweep still holds the lock
                     lock_path(record.folder, key).unlink(missing_ok=True)
                     submit([key])

@@ -104,6 +104,6 @@ class Display:
     def _summary(self) -> str:
         kinds = [outcome.kind for outcome in self._ended.values()]
         parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
-        for kind in ("unconverged", "failed", "hindered", "held"):
+        for kind in ("unconverged", "failed", "hindered"):
             parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
         return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])

@@ -48,8 +48,8 @@ Progress = Callable[[float, float], None]
 #: Facts that a stored result omits, because its attribute ``case`` contains them.
 _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
-#: process), so that the same command resumes it; ``held``: another run computes it; ``failed``: it would fail again.
-Kind = Literal["done", "unconverged", "failed", "hindered", "held", "interrupted"]
+#: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
+Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
 #: Errors that refuse the input of a case.
 REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 
@@ -323,14 +323,12 @@ def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None
     try:
         path = run_case(case, folder, progress=progress, **settings)
         return replace(outcome_of(read_entry(path)), seconds=time.perf_counter() - began)
-    except BlockingIOError as error:
-        return ended("held", f"{error.filename}: {error.strerror}", error)
     except RoughviscError as error:
         return ended("hindered" if error.transient else "failed", str(error), error)
     except MemoryError as error:
         advice = "roughvisc plan says how much a case needs, and fewer --workers leave more to each"
         return ended("hindered", f"not enough memory; the last checkpoint is kept: {advice}", error)
-    except OSError as error:  # for example a full disk, or a removed folder
+    except OSError as error:  # for example a full disk, or another run of the case
         place = f"{error.filename}: " if error.filename else ""
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         return ended("hindered", f"{place}{error.strerror or error}", error, disk_full=full)

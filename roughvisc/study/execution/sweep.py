@@ -143,7 +143,7 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong, or a file with the name of a result cannot be read.
+        If a setting is wrong, or there are cases to compute and the folder is not writable.
     OSError
         If the disk is full; no further case is started.
     RoughviscError

@@ -217,16 +217,12 @@ def verify(place: str | Path) -> dict[Path, str]:
     for path in results_at(place):
         flaws[path] = ""
         try:
-            require_file(path)
-            with NETCDF, netCDF4.Dataset(path) as file:
-                for group in (file, *file.groups.values()):
-                    for variable in group.variables.values():
-                        for first in range(0, len(variable), 16) if variable.ndim else ():
-                            variable[first : first + 16]
+            with open_result(path) as result:
+                for variable in result.variables.values():
+                    for first in range(0, len(variable), 16) if variable.ndim else ():
+                        _ = variable[first : first + 16].values
         except InputError as error:
             flaws[path] = str(error)
-        except ERRORS as error:
-            flaws[path] = f"{path}: is damaged: {error}"
     return flaws
 
 

@@ -21,7 +21,7 @@ from roughvisc.study.si_tables import default_of, unit_of
 from roughvisc.study.storage.folder import DAMAGED, no_results, read_json, warn_once, write_json
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import read_variable
-from roughvisc.study.sweep_table import DRAWN, REALISATION, SURROGATE
+from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
 #: File with the cases of the last sweep.
@@ -31,7 +31,6 @@ CASE_KEY = "case_key"
 #: Dimensions, values and attributes of a coordinate.
 Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 
-_NOT_A_PARAMETER = ("title", "origin", "varied", "written")
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
 
@@ -105,15 +104,9 @@ def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
 
 
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Return varied parameters of cases in JSON: parameters of the sweep, and others in which the cases differ."""
+    """Return the varied parameters of cases in JSON; a case that does not vary one states it, or has its default."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
-    leaves = [dict(_leaves({k: v for k, v in case.items() if k not in _NOT_A_PARAMETER})) for case in cases]
-    known = (*keys, SURROGATE) if REALISATION in keys else tuple(keys)
-    for key in dict.fromkeys(key for leaf in leaves for key in leaf):
-        stated = any(key == one or key.startswith(f"{one}.") for one in known)
-        if not stated and any(leaf.get(key) != leaves[0].get(key) for leaf in leaves):
-            keys[key] = None
-    values = [leaf | case.get("varied", {}) for case, leaf in zip(cases, leaves, strict=True)]
+    values = [dict(_leaves(case)) | case.get("varied", {}) for case in cases]
     return {
         key: _column(
             [one[key] if key in one else default_of(key, case) for one, case in zip(values, cases, strict=True)]
