@@ -30,19 +30,12 @@ WORKERS = click.option(
 QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 
 
-class Quantity(click.ParamType):
-    """Number in SI, or text with a unit; the functions of the package check it."""
-
-    name = "value"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        try:
-            return float(value)
-        except ValueError:
-            return value
-
-
-QUANTITY = Quantity()
+def number_or_text(text: str) -> float | str:
+    """Return the value of an option: a number in SI, or text with a unit, which the functions of the package check."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def options(*them: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -52,7 +45,7 @@ def options(*them: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 def quantity(name: str, metavar: str, meaning: str, **settings: Any) -> Any:
     """Return an option whose value is a quantity."""
-    return click.option(name, type=QUANTITY, metavar=metavar, help=meaning, **settings)
+    return click.option(name, type=number_or_text, metavar=metavar, help=meaning, **settings)
 
 
 class Failure(click.ClickException):

@@ -10,28 +10,24 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, QUANTITY, options, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, number_or_text, options, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-class _Sides(click.ParamType):
-    """One length, or two separated by a comma."""
-
-    name = "length"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        sides = tuple(QUANTITY.convert(part.strip(), param, ctx) for part in value.split(","))
-        return sides[0] if len(sides) == 1 else sides
+def _sides(text: str) -> Any:
+    """Return one length, or two separated by a comma."""
+    sides = tuple(number_or_text(part.strip()) for part in text.split(","))
+    return sides[0] if len(sides) == 1 else sides
 
 
 #: Options of :func:`roughvisc.open_scan`.
 _READING = options(
     click.option("--unit", help="Unit of length, if the file states none: um."),
     click.option("--height-unit", help="Unit of the heights, if it differs."),
-    click.option("--spacing", type=_Sides(), help="Distance between points, if the file states none: 1um, or 1um,2um."),
+    click.option("--spacing", type=_sides, metavar="LENGTH", help="Distance between points: 1um, or 1um,2um."),
     quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
     click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
     click.option("--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."),
@@ -41,7 +37,7 @@ _READING = options(
 #: Question for an argument that a file lacks, and the type of the answer.
 _QUESTIONS: dict[str, tuple[str, Any]] = {
     "unit": ("Unit of x, y and heights (such as um)", str),
-    "spacing": ("Distance between points (such as 1 um)", _Sides()),
+    "spacing": ("Distance between points (such as 1 um)", _sides),
 }
 
 
@@ -106,9 +102,10 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
     height = _opened(file, options)
     channels = () if "card" in height.attrs else rv.list_channels(file, format=options["format"])
     picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
+    keeps_picture = picture.exists() and not (plot or force)
     if to:
         known_suffix(to)
-    for out in filter(None, (to, card, picture if plot or force else None)):
+    for out in filter(None, (to, card, None if keeps_picture else picture)):
         if out.exists() and (not force or out.samefile(file)):
             raise InputError(f"{out}: already exists: expected another name" + ("" if force else ", or --force"))
     levelled, found = rv.level(height), rv.inspect(height)
@@ -118,7 +115,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
         scan_table(height, rv.parameters(levelled), file.name, channels), "", findings_table(found), "", sep="\n"
     )
     say(console, surface_table(file, Path(), options, found.steps))
-    if picture.exists() and not force and not plot:
+    if keeps_picture:
         say_path(console, "Existing picture kept (--force overwrites it)", picture)
     else:
         say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture))
