@@ -21,8 +21,6 @@ RESULT_FORMAT = 1
 #: How an accepted step ended; the values of ``status``, in order.
 STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
 NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
-#: Whether fluid flows at a time, and whether its rate is known; the values of ``leak_status``, in order.
-LEAK_MEANINGS = ("flows", "closed", "not_certified")
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
 ROW, ROWS = "row", "rows"
@@ -227,14 +225,6 @@ VARIABLES: dict[str, Variable] = {
         in_table="last",
     ),
     "leak_rate_error": Variable(_SERIES, "m^3/s", "stated error of the leak rate", _SOLVER),
-    "leak_status": Variable(
-        _SERIES,
-        "",
-        "whether fluid flows",
-        "closed: no path of cells with common sides; not_certified: error above 1e-6 of the leak rate",
-        dtype="int8",
-        meanings=LEAK_MEANINGS,
-    ),
     "transmissivity": Variable(
         _SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12", in_table="last"
     ),

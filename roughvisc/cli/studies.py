@@ -136,7 +136,7 @@ def run(
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
     """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
     from roughvisc.cli.tables import result_table
-    from roughvisc.plot import save_figures
+    from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case, unconverged
@@ -156,7 +156,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
         console.print(result_table(dataset))
         say_path(console, "Result", path)
         if plots:
-            say_figures(console, save_figures(dataset, folder, case.key, every=False))
+            say_figures(console, save_figures(dataset, folder, case.key, names=DEFAULT))
             say(console, f"For all figures, run: roughvisc plot --all {near(folder)}")
         return unconverged(dataset) or missed
 

@@ -78,7 +78,7 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
     """
     steps = history(dataset)
     need(steps, "work")
-    times, work = steps["time"].values, steps["work"].values
+    times = steps["time"].values
     starts, periods = [], []
     for start, segment in zip(program.corners, program.segments, strict=False):
         if segment.amplitude:
@@ -87,17 +87,12 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
             periods += [segment.period] * whole
     if not starts:
         raise InputError(key="program", found=program, expected="a program with a whole cycle, see Program.cycle")
-    begin, slack = np.array(starts), _SAME * np.array(periods)
-    end = begin + periods
-    covered = (times[0] <= begin + slack) & (end <= times[-1] + slack)
-
-    def work_at(at: np.ndarray) -> np.ndarray:
-        """Return the work at some times, interpolated between steps; at a jump the work after the jump."""
-        last = np.searchsorted(times, at + slack, side="right") - 1
-        return np.where(np.abs(times[last] - at) <= slack, work[last], np.interp(at, times, work))
-
+    begin, period = np.array(starts), np.array(periods)
+    covered = (times[0] <= begin + _SAME * period) & (begin + period <= times[-1] + _SAME * period)
+    begin, end = begin[covered], (begin + period)[covered]
+    work = np.interp(end, times, steps["work"]) - np.interp(begin, times, steps["work"])
     found = xr.Dataset(
-        {"cycle_start": ("cycle", begin[covered]), "cycle_work": ("cycle", (work_at(end) - work_at(begin))[covered])},
+        {"cycle_start": ("cycle", begin), "cycle_work": ("cycle", work)},
         coords={"cycle": np.flatnonzero(covered) + 1},
     )
     return label(found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -14,10 +14,6 @@ from roughvisc.mechanics.transport.flow import fluxes
 from roughvisc.observables.frames import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
-from roughvisc.variables import LEAK_MEANINGS
-
-#: Relative error up to which a leak rate counts as known.
-_CERTIFIED = 1e-6
 
 
 @quantities(viscosity="Pa s", pressure_drop="Pa")
@@ -54,9 +50,9 @@ def leakage(
     Returns
     -------
     xarray.Dataset
-        Over time ``leak_rate`` and ``leak_rate_error`` [m3/s]; ``leak_status``, one of its ``flag_values``;
-        ``transmissivity`` [m3] and ``hydraulic_aperture`` [m], which are independent of the fluid; with `flow` also
-        ``flux_x`` and ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` state the arguments.
+        Over time ``leak_rate``, zero if no path connects the sides, and ``leak_rate_error`` [m3/s]; ``transmissivity``
+        [m3] and ``hydraulic_aperture`` [m], which are independent of the fluid; with `flow` also ``flux_x`` and
+        ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` state the arguments.
 
     Raises
     ------
@@ -84,7 +80,7 @@ def leakage(
     if along not in ("x", "y"):
         raise InputError(key="along", found=along, expected="'x' or 'y'")
     if sides not in (None, "closed", "periodic") or (sides == "periodic" and boundary != "periodic"):
-        expected = "'closed' or 'periodic'" if sides != "periodic" else f"'closed', since the boundary is {boundary!r}"
+        expected = f"'closed', or 'periodic' if the boundary is, which is {boundary!r}"
         raise InputError(key="sides", found=sides, expected=expected)
     wrap = boundary == "periodic" and sides != "closed"
     need(dataset, "gap")
@@ -92,30 +88,26 @@ def leakage(
     across = "y" if along == "x" else "x"
     sides_of_cell = cells[along], cells[across]
 
-    def measure(field: np.ndarray) -> tuple[np.ndarray, ...]:
+    def measure(field: np.ndarray) -> tuple[Any, ...]:
         missing = int(np.count_nonzero(np.isnan(field)))
         if missing == field.size:  # after the last row of a case of a sweep
-            return (np.array([np.nan, np.nan, 0]), field, field)[: len(outputs)]
+            return (np.nan, np.nan, field, field)[: len(outputs)]
         if missing:
             raise InputError(
                 f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: the "
                 "flow through these cells is unknown: expected a surface that is cropped, or filled"
             )
         found = flow_through(field, sides_of_cell, wrap=wrap)
-        known = found.error <= _CERTIFIED * found.conductance
-        status = LEAK_MEANINGS.index("closed" if found.is_closed else "flows" if known else "not_certified")
-        numbers = np.array([found.conductance, found.error, status])
-        return (numbers, *fluxes(field, sides_of_cell, found.pressure, wrap=wrap)) if flow else (numbers,)
+        fields = fluxes(field, sides_of_cell, found.pressure, wrap=wrap) if flow else ()
+        return found.conductance, found.error, *fields
 
-    outputs = [["number"], [along, across], [along, across]] if flow else [["number"]]
-    numbers, *fields = frame_by_frame(measure, gap, outputs=outputs, sizes={"number": 3}, over=(along, across))
-    conductance, error, status = (numbers.isel(number=place) for place in range(3))
+    outputs = [[], []] + [[along, across]] * (2 * flow)
+    conductance, error, *fields = frame_by_frame(measure, gap, outputs=outputs, over=(along, across))
     transmissivity = conductance * (cells[along] * gap.sizes[along] / (cells[across] * gap.sizes[across]))
     drop = pressure_drop / viscosity
     variables = {
         "leak_rate": conductance * drop,
         "leak_rate_error": error * drop,
-        "leak_status": status.astype("int8"),
         "transmissivity": transmissivity,
         "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
     }

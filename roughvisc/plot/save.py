@@ -44,7 +44,7 @@ FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] 
     ),
     "section": (
         section,
-        ("x", "y", "height", "gap"),
+        ("x", "y", "height", "pressure", "gap"),
         "Section through the contact at its largest area: pressure, profile and deformed surface.",
     ),
     "slide": (
@@ -66,7 +66,7 @@ def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Ite
 
 
 @matplotlib.rc_context(style.STYLE)
-def write_figure(figure: Figure, path: Path, dpi: float = 200.0, title: str = "") -> Path:
+def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = "") -> Path:
     """Write a figure to a file in the format of its suffix, complete or not at all.
 
     Parameters
@@ -101,9 +101,9 @@ def save_figures(
     stem: str,
     *,
     suffix: str = ".png",
-    dpi: float = 200.0,
+    dpi: float = 150.0,
     title: str = "",
-    every: bool = True,
+    names: Collection[str] | None = None,
 ) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
@@ -121,8 +121,8 @@ def save_figures(
         Resolution of pictures made of pixels.
     title : str
         Text above each figure, such as its case.
-    every : bool
-        False: only history or friction curve, maps, and leakage flux.
+    names : collection of str, optional
+        Only these figures, such as ``["history", "maps"]``.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def save_figures(
     expect_result(dataset)
     written = [
         write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title)
-        for name, _, figure in figures_of(dataset, None if every else DEFAULT)
+        for name, _, figure in figures_of(dataset, names)
     ]
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
@@ -157,7 +157,7 @@ def save_figures_of_files(
     folder : Path, optional
         Folder for the figures. Default: the folder of each result.
     every : bool
-        False: only the default figures of each result.
+        Whether all figures are drawn, a surface that several results share once, or the default ones.
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
     """
@@ -168,20 +168,22 @@ def save_figures_of_files(
         for path in paths:
             with suppress(InputError, ValueError), open_result(path) as dataset:
                 cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
-    stems = file_stems(cases)
-    jobs = [
-        (path, folder or path.parent, stems.get(path.stem, path.stem), case_words(cases.get(path.stem, {})), every)
-        for path in paths
-    ]
+    stems, surfaces, jobs = file_stems(cases), set(), []
+    for path in paths:
+        case = cases.get(path.stem, {})
+        surface = json.dumps(case["surface"]) if "surface" in case else path
+        names = DEFAULT if not every else set(FIGURES) - ({"surface"} if surface in surfaces else set())
+        surfaces.add(surface)
+        jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), case_words(case), names))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
 
 
-def _save_file(job: tuple[Path, Path, str, str, bool]) -> list[Path]:
+def _save_file(job: tuple[Path, Path, str, str, Collection[str]]) -> list[Path]:
     from roughvisc.study.storage.netcdf import open_result  # slow to import
 
-    path, folder, stem, title, every = job
+    path, folder, stem, title, names = job
     with open_result(path) as dataset:
-        return save_figures(dataset, folder, stem, title=title, every=every)
+        return save_figures(dataset, folder, stem, title=title, names=names)
 
 
 def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: int, label: str) -> list[_Result]:
@@ -216,7 +218,7 @@ def results_of_sweep(folder: Path) -> xr.Dataset | None:
     return results if results["case_key"].size > 1 else None
 
 
-def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png", dpi: float = 200.0) -> list[Path]:
+def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png", dpi: float = 150.0) -> list[Path]:
     """Write the figures of a sweep, as ``sweep-contact_area.png``, ``sweep-approach.png`` and so on.
 
     Parameters

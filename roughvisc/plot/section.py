@@ -25,7 +25,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result with ``height``, and ``gap`` or ``displacement``.
+        One case's result with ``height``, ``pressure``, and ``gap`` or ``displacement``.
     time : float or str, optional
         The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
         the largest contact area. [s]
@@ -38,7 +38,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     -------
     matplotlib.figure.Figure
     """
-    expect_result(dataset, "x", "y", "height")
+    expect_result(dataset, "x", "y", "height", "pressure")
     if axis not in ("x", "y"):
         raise InputError(key="axis", found=axis, expected="'x' or 'y'")
     dataset = measured_part(dataset)
@@ -47,25 +47,22 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     whole = dataset.isel({str(rows.name): frame})
     if at is not None:
         index = int(np.abs(dataset[across].values - at).argmin())
-    elif "pressure" in whole and float(whole["pressure"].max()) > 0:
+    elif float(whole["pressure"].max()) > 0:
         index = int(whole["pressure"].sum(axis).values.argmax())
     else:
         index = int(whole["height"].max(axis).values.argmax())
-    surface = deformed(dataset, float(rows[frame])).isel({across: index}).values
     cut = whole.isel({across: index}).load()
+    height = cut["height"].values
+    surface = deformed(dataset, float(rows[frame])).isel({across: index}).values
     plane = plane_unit(dataset)
     edges, x = plane(cell_edges(dataset[axis])), plane(dataset[axis])
     figure = style.new_figure(5.0, 3.9)
     top, bottom = figure.subplots(2, sharex=True, height_ratios=[1, 1.3])
-    if "pressure" in cut:
-        pressure = unit_for(cut["pressure"], "Pa")
-        top.stairs(pressure(cut["pressure"]), edges, fill=True, color=style.GREEN, alpha=0.3)
-        top.stairs(pressure(cut["pressure"]), edges, color=style.GREEN, lw=1)
-        top.set_ylim(bottom=0)
-        top.set_ylabel(pressure.label(VARIABLES["pressure"].label))
-    else:
-        top.text(0.5, 0.5, "pressure was not kept", transform=top.transAxes, ha="center", va="center", color="0.4")
-    height = cut["height"].values
+    pressure = unit_for(cut["pressure"], "Pa")
+    top.stairs(pressure(cut["pressure"]), edges, fill=True, color=style.GREEN, alpha=0.3)
+    top.stairs(pressure(cut["pressure"]), edges, color=style.GREEN, lw=1)
+    top.set_ylim(bottom=0)
+    top.set_ylabel(pressure.label(VARIABLES["pressure"].label))
     known = np.concatenate([height, surface])
     known = known[np.isfinite(known)] if np.isfinite(known).any() else np.zeros(1)
     unit = unit_for(np.ptp(known), "m")

@@ -58,9 +58,7 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     on_map, profile, heights, spectrum = figure.subplots(2, 2).ravel()
     limits = (float(unit(low)), float(unit(high)) if high > low else float(unit(low)) + 1.0)
     image = draw_map(on_map, drawn(height), unit, "cividis", vmin=limits[0], vmax=limits[1])
-    beyond = (float((height < low).mean()), float((height > high).mean()))
-    extend = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}[beyond[0] > 0, beyond[1] > 0]
-    figure.colorbar(image, ax=on_map, pad=0.02, aspect=22, extend=extend).set_label(unit.label("Height"))
+    figure.colorbar(image, ax=on_map, pad=0.02, aspect=22).set_label(unit.label("Height"))
     line = height.isel(y=height.sizes["y"] // 2)
     profile.plot(plane(line["x"]), unit(line), color=style.BLUE, lw=0.9)
     on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
@@ -72,11 +70,12 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     _draw_heights(heights, levelled.values[np.isfinite(levelled.values)])
     _draw_spectrum(spectrum, levelled)
     style.letter_panels((on_map, profile, heights, spectrum))
-    missing, every = float(height.isnull().mean()), block_side(height)
+    missing, beyond = float(height.isnull().mean()), float(((height < low) | (height > high)).mean())
+    every = block_side(height)
     notes = [
         "Measured area only; mirror images are not shown." if height.size < whole.size else "",
         f"{100 * missing:.2g} % of the points are missing (grey)." if missing else "",
-        f"{100 * sum(beyond):.2g} % of the points lie beyond the colour scale." if sum(beyond) else "",
+        f"{100 * beyond:.2g} % of the points lie beyond the colour scale." if beyond else "",
         f"One point of the map is the mean of {every} × {every}." if every > 1 else "",
     ]
     style.note_below(figure, " ".join(filter(None, notes)))

@@ -108,7 +108,7 @@ def sweep(
     quantity: str | None = None,
     *,
     along: str | Sequence[str] | None = None,
-    times: Any = -1,
+    times: Any = None,
 ) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
@@ -127,7 +127,8 @@ def sweep(
         ``"reduced_speed"`` for curves of all cases; or two keys for maps. Default: the key with most numbers, or the
         speed.
     times : float or str, or a list, optional
-        The nearest kept times are drawn; negative whole numbers count from the end. [s]
+        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time at which the
+        cases differ by at least half of their largest difference. [s]
 
     Returns
     -------
@@ -170,15 +171,23 @@ def sweep(
 
 def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
     """Return the lines of a table that can be drawn."""
-    table = table[np.isfinite(table[quantity])]
-    return table[table[quantity] > 0] if quantity == "leak_rate" else table  # a logarithmic axis has no zero
+    known = np.isfinite(table[quantity])
+    if quantity == "leak_rate":  # a logarithmic axis has no zero
+        known &= table[quantity] > 0
+    if not known.any():
+        raise InputError(f"{quantity} has no value to draw")
+    return table[known]
 
 
-def _at_times(results: xr.Dataset, quantity: str, times: Any = -1) -> pd.DataFrame:
+def _at_times(results: xr.Dataset, quantity: str, times: Any = None) -> pd.DataFrame:
     """Return a table of a quantity of all cases at some times, with the text of the time as column ``at``."""
     values, axis = results[quantity].load(), axis_of(results.variables)
     rows, row = values[axis], ROW if ROW in values.dims else axis
-    places = np.atleast_1d(in_si(times, VARIABLES[axis].units, "times"))
+    places = np.atleast_1d(in_si(-1 if times is None else times, VARIABLES[axis].units, "times"))
+    if times is None and row == axis:
+        others = [dim for dim in values.dims if dim != axis]
+        spread = (values.max(others) - values.min(others)).fillna(0).values
+        places = rows.values[spread >= 0.5 * spread.max()][-1:]
     if not 0 < len(places) <= _MOST_PANELS:
         raise InputError(key="times", found=f"{len(places)} of them", expected=f"1 to {_MOST_PANELS}")
     parts = []
@@ -338,12 +347,12 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
         return
     keys = swept_keys(results)[1]
     for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES):
-        if name not in results:
+        if name not in results or not results[name].any():
             continue
         table = _at_times(results, name)
         values = table[name].to_numpy()
         stated = [values[:1], *(table[key.column] for key in keys if key.is_numeric)]
-        scale = 1e-6 * np.abs(values).max(initial=0.0)
+        scale = 1e-6 * np.abs(values).max()
         if keys and not any(np.allclose(values, one, rtol=0, atol=scale) for one in stated):
             file = "area" if name == "contact_area" else name
             yield file, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)

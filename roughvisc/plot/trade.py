@@ -125,28 +125,28 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     if "quantity" in dataset.dims:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
     axis = axis_of(dataset.variables)
-    several = dataset["value"].size > 1
-    figure = style.new_figure(6.8 if several else 4.4, 2.9)
-    axes = figure.subplots(1, 1 + several, squeeze=False, width_ratios=[1.25, 1.0][: 1 + several])[0]
-    at, names = dataset.isel({axis: row}), dataset["source"].values.tolist()
+    rows, names = dataset[axis], dataset["source"].values.tolist()
+    at = dataset.isel({axis: row})
     half, towards = at["half_width"].values, at["direction"].values
-    low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        whole = [float(np.log(at[end] / at["value"])) for end in ("lower", "upper")]
-    logs = np.array([*np.c_[low, high], whole])
-    wide = bool(np.nanmax(np.abs(logs), initial=0.0) > 0.5)
-    ends = np.exp(logs) if wide else 100 * np.expm1(logs)
+        whole = [np.log(float(at[end] / at["value"])) for end in ("lower", "upper")]
+    low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
+    logs = np.nan_to_num([*np.c_[low, high], whole])
+    wide = bool(np.abs(logs).max() > 0.5)
+    ends, middle = (np.exp(logs), 1.0) if wide else (100 * np.expm1(logs), 0.0)
+    count = min(rows.size, 2)
+    figure, axes = style.new_panels(count, count, 2.0 + 2.4 * count, 2.9)
     ax, places = axes[0], np.arange(len(names) + 1)[::-1]
     colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
-    ax.barh(places, np.nan_to_num(ends[:, 1] - ends[:, 0]), left=np.nan_to_num(ends[:, 0]), height=0.62, color=colours)
+    ax.barh(places, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
     for place, state in zip(places, at["state"].values.astype(str), strict=False):
         if state != "counted":
             look = {"va": "center", "fontsize": 7.5, "color": "0.35", "textcoords": "offset points"}
-            ax.annotate(state, (1.0 if wide else 0.0, place), (5, 0), **look)
-    ax.axvline(1.0 if wide else 0.0, color="black", lw=0.7)
+            ax.annotate(state, (middle, place), (5, 0), **look)
+    ax.axvline(middle, color="black", lw=0.7)
     if wide:
         style.log_axis(ax.xaxis, ends)
-    text = AXES[axis].place(float(dataset[axis].values[row]))
+    text = AXES[axis].place(float(rows[row]))
     ax.set_xlabel(f"Factor of the value at {text} [-]" if wide else f"Error at {text} [%]")
     ax.set_yticks(places, [*names, "all together"])
     ax.tick_params(axis="y", length=0)
@@ -154,16 +154,14 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     ax.margins(x=0.15, y=0.06)
     if (towards != 0).any():
         ax.set_title("orange: one direction only", loc="right", fontsize=8)
-    if several:
-        curve = axes[1]
-        unit, rows = unit_for(dataset["upper"].values, dataset["value"].attrs["units"]), dataset[axis]
+    for curve in axes[1:]:
+        unit = unit_for(dataset["upper"].values, dataset["value"].attrs["units"])
         over = style.row_unit(rows)(rows)
-        band = (unit(dataset["lower"].values), unit(dataset["upper"].values))
-        curve.fill_between(over, *band, color=style.BLUE, alpha=0.25, lw=0)
-        curve.plot(over, unit(dataset["value"].values), "o-", color=style.BLUE)
+        curve.fill_between(over, unit(dataset["lower"]), unit(dataset["upper"]), color=style.BLUE, alpha=0.25, lw=0)
+        curve.plot(over, unit(dataset["value"]), "o-", color=style.BLUE)
         style.row_axis(curve, rows)
         curve.set_ylabel(unit.label(dataset.attrs["quantity"].replace("_", " ").capitalize()))
         if wide:
             curve.set_yscale("log")
-        style.letter_panels(axes)
+    style.letter_panels(axes)
     return figure

@@ -8,6 +8,7 @@ import sample_results as made
 import scipy.stats
 import xarray as xr
 from matplotlib.collections import PolyCollection
+from support import refused
 
 import roughvisc as rv
 from roughvisc import plot
@@ -64,6 +65,10 @@ def test_sweep__of_one_key_has_a_line_for_each_time():
         np.testing.assert_allclose(line.get_xdata(), [10, 20, 40])
         np.testing.assert_allclose(line.get_ydata(), share * LOADS**0.9)
     assert legend(plot.sweep(ds)) == ["t = 10 s"]
+    released = ds.assign(contact_area=ds.contact_area * xr.DataArray([1.0, 1.0, 0.0], dims="time"))
+    assert legend(plot.sweep(released)) == ["t = 1 s"], "the cases do not differ at the end"
+    with refused():
+        plot.sweep(ds.assign(contact_area=np.nan * ds.contact_area))
 
 
 def test_sweep__of_two_keys_has_a_panel_for_each_time():

@@ -76,12 +76,10 @@ def test_run__ends_with_what_is_observed(invoke, study, tmp_path, counted, coars
     assert (tmp_path / "out" / f"{path.stem}-leakage.png").exists()
     with rv.open_result(path) as ds:
         assert ds.leak_rate[0] > 0
-        assert ds.leak_status.values.tolist() == [0, 1]
+        assert (ds.leak_rate > 0).values.tolist() == [True, False]
         assert ds.leak_rate.attrs["viscosity"] == 1e-3
         assert json.loads(ds.attrs["observed"]) == {"leakage": {"viscosity": 1e-3, "pressure_drop": 1e5}}
         xr.testing.assert_allclose(ds.leak_rate, rv.observables.leakage(ds).leak_rate, rtol=1e-12, atol=0)
-    table = rv.to_csv(ds, tmp_path / "history.csv").read_text()
-    assert ",closed" in table
     written = path.stat().st_mtime_ns
     assert invoke("run", study(LEAKAGE), "--out", "out", "--no-plots")[0] == 0
     assert path.stat().st_mtime_ns == written, "nothing was asked anew"
