@@ -77,7 +77,7 @@ def step_load(material, duration, tolerance=TOLERANCE):
 
 
 @pytest.mark.parametrize(
-    "exponent", [-12, 0, 12, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-6, -3, 3, 6))]
+    "exponent", [-12, 12, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-6, -3, 0, 3, 6))]
 )
 @pytest.mark.parametrize(
     "material", [rv.maxwell(0.25, 0.25), ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=["maxwell", "zener", "kelvin_voigt"]
@@ -123,23 +123,32 @@ def test_steps_of_all_sizes_in_one_program():
 
 
 @pytest.mark.parametrize(
-    ("program", "message"),
+    ("program", "settings", "message"),
     [
-        (rv.Program().load(1e-3, over=1e15).hold(1e-15), r"program\.1: a segment lasts 1e-15 s where time has reached"),
-        (rv.Program().load(1e-3, over=1e10) + rv.Program.cycle(1e-3, 5e-4, 1e-8, 3), "the period of a cycle lasts"),
-        (rv.Program().load(1e-3, over=1e200), r"an end by 1e\+100 s"),
-        (rv.Program().load(1e-3, over=1e-200), "expected at least 1e-100 s"),
-        (rv.Program().load(1e150, over=1.0), "the load reaches 1e"),
+        (
+            rv.Program().load(1e-3, over=1e15).hold(1e-15),
+            {},
+            r"program\.1: a segment lasts 1e-15 s where time has reached",
+        ),
+        (rv.Program().load(1e-3, over=1e10) + rv.Program.cycle(1e-3, 5e-4, 1e-8, 3), {}, "the period of a cycle lasts"),
+        (rv.Program().load(1e-3, over=1e200), {}, r"an end by 1e\+100 s"),
+        (rv.Program().load(1e-3, over=1e-200), {}, "expected at least 1e-100 s"),
+        (rv.Program().load(1e150, over=1.0), {}, "the load reaches 1e"),
+        (
+            rv.Program().load(1e90, over=0),
+            {"boundary": "periodic"},
+            "rounding would hide the variation of the pressure",
+        ),
+        (
+            rv.Program().load(1e-3, over=100.0),
+            {"numerics": rv.Numerics(time_step=1e-15)},
+            "time_step is 1e-15 s and the program ends at 100 s",
+        ),
     ],
 )
-def test_what_cannot_be_represented__is_refused(program, message):
+def test_what_cannot_be_represented__is_refused(program, settings, message):
     with pytest.raises(rv.InputError, match=message):
-        simulate(BALL, ZENER, program)
-
-
-def test_steps_that_do_not_move_time__are_refused():
-    with pytest.raises(rv.InputError, match="time_step is 1e-15 s and the program ends at 100 s"):
-        simulate(BALL, ZENER, rv.Program().load(1e-3, over=100.0), numerics=rv.Numerics(time_step=1e-15))
+        simulate(ROUGH, ZENER, program, **{"edge": "accept", **settings})
 
 
 def test_shortest_segment__is_computed():
@@ -184,11 +193,6 @@ def test_large_load__makes_full_contact_and_no_more(boundary, load):
         elif load >= 1e6:  # the heights do not matter: a flat square
             flat = simulate(0 * ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), edge="accept")
             assert ds.approach.values == pytest.approx(flat.approach.values, rel=1e-3)
-
-
-def test_load_beyond_the_surface__is_refused_where_rounding_is_all_that_is_left():
-    with pytest.raises(rv.InputError, match="rounding would hide the variation of the pressure"):
-        simulate(ROUGH, ZENER, rv.Program().load(1e90, over=0), boundary="periodic")
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e3, pytest.param(1e-6, marks=pytest.mark.thorough)])
@@ -358,32 +362,12 @@ def test_float32_heights__differ_by_their_rounding(boundary):
 # nothing modelled that the scene does not need
 
 
-def counted(height, material, program, **settings):
-    """A run with the number of its accepted steps."""
-    steps = []
-    ds = simulate(height, material, program, progress=lambda now, end: steps.append(now), **settings)
-    return ds, len(steps)
-
-
-def test_elastic__keeps_no_field_and_steps_to_kept_times_only(monkeypatch):
-    from roughvisc.mechanics.memory import Memory
-
-    kept = []
-    sound = Memory.advance
-    monkeypatch.setattr(Memory, "advance", lambda *a: kept.append(sound(*a).modes.shape[0]) or sound(*a))
-    ds, steps = counted(BALL, ELASTIC, rv.Program().load(0.1, over=1.0).load(0.01, over=1.0), times=5)
-    assert set(kept) == {0}
-    assert steps == 5
-    assert ds.attrs["memory"] == "no memory: elastic"
-
-
 def test_constant_load__takes_few_steps_once_relaxed():
-    """Ten times the hold, hardly more steps; a step only costs one solution that is confirmed."""
+    """A hundred times the hold, hardly more steps; a step only costs one solution that is confirmed."""
     load = rv.Program().load(0.05, over=0)
-    _, steps = counted(BALL, ZENER, load.hold(30.0), times=[30.0])
-    longer, more = counted(BALL, ZENER, load.hold(3000.0), times=[3000.0])
-    assert more <= steps + 10
-    late, _ = counted(BALL, ZENER, load.hold(30.0).hold(2970.0), times=[30.0, 3000.0])
+    short, longer = (simulate(BALL, ZENER, load.hold(time), times=[time]) for time in (30.0, 3000.0))
+    assert longer.roughvisc.steps.sizes["step"] <= short.roughvisc.steps.sizes["step"] + 10
+    late = simulate(BALL, ZENER, load.hold(30.0).hold(2970.0), times=[30.0, 3000.0])
     assert int(late.convolutions[1]) < int(late.convolutions[0])
     assert float(longer.approach[-1]) == pytest.approx(float(late.approach[-1]), rel=TOLERANCE)
 

@@ -27,55 +27,24 @@ def ramp(load):
     return rv.Program().load(load, over=0.5).hold(1.0).load(0.3 * load, over=0.5)
 
 
-def differs(one, other, name, factor=1.0):
+def differs(one, other):
     """Difference of a quantity: in the sum over the grid, over its largest."""
-    a, b = one[name].values, other[name].values / factor
-    axes = tuple(range(1, a.ndim))
-    return float(np.max(np.sum(np.abs(a - b), axis=axes)) / np.max(np.sum(np.abs(a), axis=axes)))
+    apart, whole = (np.abs(a).reshape(len(a), -1).sum(axis=1) for a in (one - other, one))
+    return float(np.max(apart) / np.max(whole))
 
 
 @of_whole_runs
-@given(surfaces(), stiffened(), boundaries)
-def test_mirrored_surface__gives_the_mirrored_result(height, make, boundary):
-    program = ramp(load_for(make(1.0)))
-    one = simulate(height, make(1.0), program, boundary)
-    mirrored = height.copy(data=height.values[::-1])
-    other = simulate(mirrored, make(1.0), program, boundary)
-    other = other.assign(pressure=other.pressure.copy(data=other.pressure.values[:, ::-1]))
-    for name in ("pressure", "approach"):
-        assert differs(one, other, name) < 2 * TOLERANCE
-
-
-@of_whole_runs
-@given(surfaces(), stiffened(), boundaries)
-def test_turned_surface__gives_the_turned_result(height, make, boundary):
-    program = ramp(load_for(make(1.0)))
-    one = simulate(height, make(1.0), program, boundary)
-    other = simulate(height.T.rename(x="y", y="x"), make(1.0), program, boundary)
-    turned = one.assign(approach=other.approach, pressure=one.pressure.copy(data=other.pressure.values.swapaxes(1, 2)))
-    for name in ("pressure", "approach"):
-        assert differs(one, turned, name) < 2 * TOLERANCE
-
-
-@of_whole_runs
-@given(surfaces(), stiffened(), boundaries, decades)
-def test_load_and_stiffness_together__change_nothing_but_pressure(height, make, boundary, factor):
+@given(surfaces(), stiffened(), boundaries, decades, decades)
+def test_turned_mirrored_and_scaled_problem__has_the_turned_mirrored_and_scaled_result(height, make, boundary, e, h):
+    """Stiffness and load together change the pressure alone; heights and load together scale the approach as well."""
     load = load_for(make(1.0))
     one = simulate(height, make(1.0), ramp(load), boundary)
-    other = simulate(height, make(factor), ramp(load * factor), boundary)
-    assert differs(one, other, "approach") < 2 * TOLERANCE
-    assert differs(one, other, "pressure", factor) < 2 * TOLERANCE
-
-
-@of_whole_runs
-@given(surfaces(), stiffened(), boundaries, decades)
-def test_heights_and_load_together__scale_the_approach(height, make, boundary, factor):
-    """The problem is positively homogeneous."""
-    load = load_for(make(1.0))
-    one = simulate(height, make(1.0), ramp(load), boundary)
-    other = simulate(height * factor, make(1.0), ramp(load * factor), boundary)
-    for name in ("approach", "pressure"):
-        assert differs(one, other, name, factor) < 2 * TOLERANCE
+    turned = height.T.rename(x="y", y="x")
+    turned = turned.copy(data=h * turned.values[::-1])
+    other = simulate(turned, make(e), ramp(load * e * h), boundary)
+    back = other.pressure.values[:, ::-1].swapaxes(1, 2) / (e * h)
+    assert differs(one.pressure.values, back) < 2 * TOLERANCE
+    assert differs(one.approach.values, other.approach.values / h) < 2 * TOLERANCE
 
 
 @of_whole_runs
@@ -86,7 +55,7 @@ def test_split_segment__changes_nothing_beyond_the_tolerance(height, make, bound
     split = rv.Program().load(part * load, over=part).load(load, over=1 - part).hold(part).hold(1 - part)
     one, other = (simulate(height, make(1.0), p, boundary, times=[0.5, 1.0, 2.0]) for p in (whole, split))
     for name in ("approach", "pressure"):
-        assert differs(one, other, name) < 2 * TOLERANCE
+        assert differs(one[name].values, other[name].values) < 2 * TOLERANCE
 
 
 @of_whole_runs
@@ -132,28 +101,13 @@ def test_random_cases__are_contact_states(monkeypatch, capsys):
     """A few of the cases of workflows/benchmarks/random_cases.py."""
     monkeypatch.syspath_prepend(str(pathlib.Path(__file__).parents[1] / "workflows" / "benchmarks"))
     random_cases = importlib.import_module("random_cases")
-    assert random_cases.main(40, seed=7) == 0, capsys.readouterr().out
+    assert random_cases.main(15, seed=7) == 0, capsys.readouterr().out
     ds = simulate(rv.sphere(1.0, 1.0, 9), rv.elastic(1.0), rv.Program().load(0.1, over=0), "free",
                   fields=("pressure", "gap", "displacement"), times=1)  # fmt: skip
     assert random_cases.violations(ds) == []
     for name, wrong in [("pressure", -ds.pressure), ("force", 2 * ds.force), ("displacement", 0 * ds.displacement),
                         ("work", -ds.work), ("approach", ds.approach * np.nan)]:  # fmt: skip
         assert random_cases.violations(ds.assign({name: wrong})), name
-
-
-def test_work_of_a_jump__is_two_fifths_under_a_sphere():
-    """Hertz, loaded at once: the stored energy, not half of force times approach."""
-    ball = rv.sphere(1.0, 0.6, 41)
-    ds = simulate(
-        ball,
-        rv.elastic(1.0),
-        rv.Program().load(0.02, over=0).hold(1.0),
-        "free",
-        numerics=rv.Numerics(time_step=1.0),
-    )
-    expected = 0.4 * float(ds.force[0] * ds.approach[0])
-    # of second order in h / a = 0.094
-    assert float(ds.work[-1]) == pytest.approx(expected, rel=1e-2)
 
 
 @of_whole_runs

@@ -6,9 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 from samples import Scaled
-from scipy import fft
 from support import assert_same, numbers
 
 import roughvisc as rv
@@ -66,20 +64,6 @@ KINDS = {
     ),
 }
 ROWS = 3
-#: Of what takes seconds, the plain load is drawn, told and traded by many tests.
-plain_load_is_thorough = pytest.mark.parametrize(
-    "kind", [pytest.param("load", marks=pytest.mark.thorough), "slide", "friction"], indirect=True, scope="module"
-)
-#: For figures and reports: test_friction_study.py draws those of a friction curve.
-only_slides_are_quick = pytest.mark.parametrize(
-    "kind",
-    [
-        pytest.param(kind, marks=[] if kind == "slide" else pytest.mark.thorough)
-        for kind in ("load", "slide", "friction")
-    ],
-    indirect=True,
-    scope="module",
-)
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -178,7 +162,6 @@ def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
 
 
 @pytest.mark.thorough
-@only_slides_are_quick
 def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pictures):
     drawn = rv.plot.save_figures(done.result, tmp_path, "one")
     names = {path.stem.rpartition("-")[2] for path in drawn}
@@ -195,30 +178,20 @@ def test_audit__has_a_verdict_on_each_assumption(kind, done):
     assert ("heating" in verdicts) == kind.moves
 
 
-def test_leakage__falls_with_the_contact(kind, done):
-    found = rv.observables.leakage(done.result, viscosity="1 mPa s", pressure_drop="1 bar")
-    rate = over_the_rows(found.leak_rate, kind)
+def test_observables__follow_the_contact(kind, done):
+    """It leaks less, conducts more, and its clusters add up."""
     order = np.argsort(done.result.contact_area.values)
-    assert (np.diff(rate[order]) <= 0).all()
-    assert rate.max() > 0
-    assert (found.leak_rate_error <= 1e-9 * found.leak_rate).all()
-
-
-def test_conductance__rises_with_the_contact(kind, done):
-    found = over_the_rows(
-        rv.observables.conductance(done.result, ("1e-7 ohm m", "2e-7 ohm m")).electrical_conductance, kind
-    )
-    order = np.argsort(done.result.contact_area.values)
-    assert (np.diff(found[order]) > 0).all()
-    assert found.max() > 0
-
-
-def test_clusters__add_up_to_the_contact(kind, done):
+    leaks = rv.observables.leakage(done.result, viscosity="1 mPa s", pressure_drop="1 bar")
+    rate = over_the_rows(leaks.leak_rate, kind)[order]
+    assert rate[0] > 0
+    assert (np.diff(rate) <= 0).all()
+    assert (leaks.leak_rate_error <= 1e-9 * leaks.leak_rate).all()
+    conductance = rv.observables.conductance(done.result, ("1e-7 ohm m", "2e-7 ohm m")).electrical_conductance
+    assert (np.diff(over_the_rows(conductance, kind)[order]) > 0).all()
     found = rv.observables.clusters(done.result)
-    count = over_the_rows(found.cluster_count, kind)
+    assert over_the_rows(found.cluster_count, kind).max() > 1
     total = (found.cluster_count * found.cluster_area_mean).fillna(0)
     np.testing.assert_allclose(total, done.result.contact_area_counted)
-    assert count.max() > 1
 
 
 def test_grid_error__is_stated_in_every_row(kind, done):
@@ -239,7 +212,6 @@ def test_grid_error__is_stated_in_every_row(kind, done):
 
 
 @pytest.mark.thorough
-@plain_load_is_thorough
 def test_trade__measures_each_setting(kind, done, tmp_path):
     ds = rv.trade(done.case, [(0.1, 1), (1e-2, 1), (1e-2, 1.5)], out=tmp_path, progress=False)
     assert not any(ds.note.values)
@@ -249,16 +221,6 @@ def test_trade__measures_each_setting(kind, done, tmp_path):
     assert wrong[1] < wrong[0] or wrong[0] < 1e-4  # a slide's steps are its cells: a hundredth of the tolerance
     assert wrong[1] < wrong[2]
     assert rv.plot.trade(ds).axes
-
-
-def test_threads__change_no_bit(kind, done, monkeypatch):
-    """Fields of any size count as wide, which else have a million cells."""
-    monkeypatch.setattr("roughvisc.mechanics.grid.THREADED_FROM", 64)
-    using, used = fft.set_workers, set()
-    monkeypatch.setattr(fft, "set_workers", lambda number: used.add(number) or using(number))
-    one, two = (computed(done.case, threads=number).drop_vars("wall_time") for number in (1, 2))
-    assert used == {1, 2}
-    xr.testing.assert_identical(one, two)
 
 
 def test_own_body__is_what_its_kernel_says(kind, done):

@@ -72,16 +72,6 @@ def test_relaxation__load_then_constant_approach():
     assert ds.approach.values == pytest.approx(exact.approach, rel=3e-3)
 
 
-@pytest.mark.thorough
-def test_power_law_ramp__approach():
-    material = rv.power_law(0.0, 1.0, 0.5)
-    program, times = rv.Program().load(0.3, over=1.0), [0.5, 1.0]
-    exact = closed_forms.lee_radok(1.0, material, program).approach(times)
-    ball = rv.sphere(1.0, 1.4, (101, 99))
-    ds = rv.simulate(ball, material, program, times=times, tolerance=1e-3, progress=False)
-    assert ds.approach.values == pytest.approx(exact, rel=2e-3)
-
-
 def test_full_periodic_contact__each_wave_relaxes_with_the_modulus():
     amplitude, wavelength = 1e-3, 1.0
     surface = rv.wavy(amplitude, wavelength, size=(wavelength, 0.1), shape=(33, 3), waves=1)

@@ -37,6 +37,14 @@ def test_study__runs(path, tmp_path):
         assert 0.01 < float(ds.contact_fraction[-1]) < 0.6
 
 
+@pytest.fixture
+def script(monkeypatch):
+    """What imports a script of a folder of the workflows."""
+    for folder in (FOLDER / "benchmarks", FOLDER):
+        monkeypatch.syspath_prepend(str(folder))
+    return importlib.import_module
+
+
 def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     (case,) = read_cases(FOLDER / "stop_and_go.toml")
     ds = run(vary(case, {"surface.shape": [50, 40], "keep.fields": []}), tmp_path, progress=False)
@@ -54,9 +62,8 @@ def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["maxwell_step", "zener_step"])
-def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    figure = importlib.import_module(name).main(cells=41, figure=tmp_path / "figure.png")
+def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, script):
+    figure = script(name).main(cells=41, figure=tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     for axes in figure.axes:
         exact, computed = axes.lines[::2], axes.lines[1::2]
@@ -69,9 +76,8 @@ def test_validation_script__draws_profiles_on_the_closed_form(name, tmp_path, mo
 
 
 @pytest.mark.thorough
-def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monkeypatch, capsys):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    figure = importlib.import_module("thin_sheet").main(cells=21, figure=tmp_path / "figure.png")
+def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, script, capsys):
+    figure = script("thin_sheet").main(cells=21, figure=tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     ratio, deviation = ({line.get_label(): line.get_data() for line in axes.lines} for axes in figure.axes)
     at, computed = ratio["computed"]
@@ -85,9 +91,8 @@ def test_thin_sheet__has_computed_forces_on_the_integral_equation(tmp_path, monk
 
 
 @pytest.mark.thorough
-def test_stability_map__is_right_everywhere(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    found = importlib.import_module("stability_map").main(tmp_path / "map.png", every=2)
+def test_stability_map__is_right_everywhere(tmp_path, script):
+    found = script("stability_map").main(tmp_path / "map.png", every=2)
     assert (tmp_path / "map.png").stat().st_size > 10_000
     assert found.error.shape == (5, 5)
     assert float(found.duration.max() / found.duration.min()) == pytest.approx(1e24)
@@ -108,18 +113,16 @@ def test_friction__rises_and_falls_as_the_rubber_stiffens(tmp_path):
 
 
 @pytest.mark.thorough
-def test_benchmarks__run_small(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
-    tables = importlib.import_module("run").main(small=True, out=tmp_path / "table.nc")
+def test_benchmarks__run_small(tmp_path, script):
+    tables = script("run").main(small=True, out=tmp_path / "table.nc")
     assert (tmp_path / "table.nc").exists()
     for row in tables["paper"] + tables["tamaas"] + tables["contact_mechanics"]:
         assert row["error"] <= row["peer_error"]
 
 
 @pytest.mark.thorough
-def test_accuracy__of_random_cases_is_judged(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
-    module = importlib.import_module("accuracy")
+def test_accuracy__of_random_cases_is_judged(tmp_path, script):
+    module = script("accuracy")
     ds, _ = module.main(3, first=10, out=tmp_path / "accuracy.nc", processes=0)
     assert (ds.status == "ok").all()
     assert (ds.rows.sel(quantity="pressure") >= 8).all()
@@ -131,9 +134,8 @@ def test_accuracy__of_random_cases_is_judged(tmp_path, monkeypatch):
 
 
 @pytest.mark.thorough
-def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER / "benchmarks"))
-    module = importlib.import_module("grid_accuracy")
+def test_grid_accuracy__is_what_the_docs_say(script):
+    module = script("grid_accuracy")
     rows = module.main(small=True)
     assert {(row["kind"], row["quantity"]) for row in rows} >= {
         ("sphere", "force"),
@@ -152,10 +154,9 @@ def test_grid_accuracy__is_what_the_docs_say(monkeypatch):
 
 
 @pytest.mark.thorough
-def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
+def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, script):
     coarse = {"surface.resample": [96, 84], "solve.tolerance": 5e-3}
-    figure = importlib.import_module("scan_to_area").main(tmp_path, coarse)
+    figure = script("scan_to_area").main(tmp_path, coarse)
     assert (tmp_path / "area_against_load.png").stat().st_size > 10_000
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     assert list(lines) == [
@@ -181,9 +182,8 @@ def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, m
 
 
 @pytest.mark.thorough
-def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    seal = importlib.import_module("creeping_seal").main(tmp_path / "seal.png")
+def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, script):
+    seal = script("creeping_seal").main(tmp_path / "seal.png")
     assert (tmp_path / "seal.png").stat().st_size > 10_000
     stated = float(seal.time_error.max())
     assert stated <= 1.1 * seal.tolerance  # what is stated is some three times the error
@@ -197,9 +197,8 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, monkeypatc
     assert (seal.leak_rate_error <= 1e-9 * seal.leak_rate).all()
 
 
-def test_coating__that_is_thicker_has_more_contact(tmp_path, monkeypatch, capsys):
-    monkeypatch.syspath_prepend(str(FOLDER))
-    figure = importlib.import_module("coating").main(cells=20, figure=tmp_path / "figure.png", speeds=[1e-2, 1.0])
+def test_coating__that_is_thicker_has_more_contact(tmp_path, script, capsys):
+    figure = script("coating").main(cells=20, figure=tmp_path / "figure.png", speeds=[1e-2, 1.0])
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     area = np.array([line.get_ydata() for line in figure.axes[2].lines])
     assert (np.diff(area, axis=0) > 0).all()

@@ -63,21 +63,3 @@ def test_approach__is_that_to_the_mean_plane_of_the_half_space(part):
         stated = float(undeformed.mean()) - float(ds.mean_gap[0]) + bulge
         assert float(ds.approach[0]) == pytest.approx(stated, rel=1e-4)
         assert bulge > 2e-3 * approach, "without it the approach would be another"
-
-
-def test_approach__is_what_the_force_works_on():
-    """An elastic ramp stores the integral of force over approach, which that to any other plane would not give."""
-    settings = {"boundary": "periodic", "missing": "absent", "tolerance": 1e-5, "progress": False}
-    ds = rv.simulate(rough(), UNIT, rv.Program().load(1.0, over=1.0), times=401, **settings)
-    work = np.trapezoid(ds.force, ds.approach)
-    assert float(ds.work[-1]) == pytest.approx(work, rel=2e-3)
-
-
-def test_punches_side_by_side__take_any_approach():
-    """A flat punch in a period of its own: force in proportion to the approach."""
-    punch = rv.flat_punch(0.3, 1.0, (12, 11))
-    found = [
-        float(rv.simulate(punch, UNIT, rv.Program().approach(d, over=0), boundary="periodic", progress=False).force[0])
-        for d in (1e-3, 2e-3)
-    ]
-    assert found[1] == pytest.approx(2 * found[0], rel=1e-3)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import device
 import numpy as np
 import pytest
-from support import refused
+from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -45,10 +45,27 @@ SCENES = {
     "part of a ball": (rv.sphere(1e-3, 1e-3, 71), ZENER, rv.Program().load(1e-4, over=0.1).hold(0.2), {}),
     "periodic": (ROUGH, ZENER, PRESS, {"boundary": "periodic"}),
     "mirror, absent cells": (holed(), ZENER, PRESS, {"boundary": "mirror", "missing": "absent"}),
-    "slide": (ROUGH, ZENER, rv.Program().pressure(2e4, over=0.1).slide(2e-4, speed=1e-3), {"boundary": "periodic"}),
+    "loss of contact": (
+        ROUGH,
+        rv.Prony(1e-6, 2e-7, (1e-6, 2e-6), (0.03, 0.3)),
+        rv.Program().approach(4e-6, over=0.2).approach(-1e-6, over=0.2).approach(4e-6, over=0.3),
+        {"boundary": "free", "edge": "accept"},
+    ),
+    "slide": (
+        ROUGH,
+        ZENER,
+        rv.Program().pressure(2e4, over=0.1).slide(2e-4, speed=1e-3).slide(1e-4, speed=1e-3, direction="-y").hold(0.1),
+        {"boundary": "periodic"},
+    ),
     "sheet": (ROUGH, rv.sheet(ZENER, 2e-4), PRESS, {"boundary": "mirror"}),
     "layer": (ROUGH, rv.layer(ZENER, 1e-4, on=rv.elastic(5e6)), PRESS, {"boundary": "periodic"}),
-    "soft": (ROUGH, rv.kelvin_voigt(1e6, 1e5), rv.Program().pressure(2e4, over=0.1), {"boundary": "periodic"}),
+    "layer, free": (ROUGH, rv.layer(ZENER, 1e-4, on=rv.zener(3e6, 1e6, 2e5)), PRESS, {"edge": "accept"}),
+    "soft": (
+        ROUGH,
+        rv.kelvin_voigt(1e6, 1e5),
+        rv.Program().pressure(2e4, over=0.1),
+        {"boundary": "periodic", "tolerance": 1e-2},
+    ),
     "grid error": (ROUGH, ZENER, PRESS, {"boundary": "periodic", "grid_error": True}),
 }
 FIELDS = ("pressure", "gap", "displacement")
@@ -66,6 +83,8 @@ def test_simulate__on_a_device_gives_what_a_cpu_gives(gpu, name):
                 found[variable], expected[variable], rtol=0, atol=1e-8 * scale, err_msg=str(variable)
             )
     assert found.attrs["memory"] == expected.attrs["memory"]
+    if name == "loss of contact":
+        assert (np.diff((expected.roughvisc.steps.force > 0).astype(int)) < 0).any()
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror"])
@@ -114,22 +133,7 @@ NO_DEVICE = SimpleNamespace(cuda=SimpleNamespace(runtime=SimpleNamespace(getDevi
 def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeypatch, tmp_path, capsys, cupy, expected):
     monkeypatch.setitem(sys.modules, "cupy", cupy)
     study = tmp_path / "study.toml"
-    study.write_text(
-        """[surface]
-generate = "sphere"
-radius = "1 mm"
-size = "0.2 mm"
-shape = 15
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-load = "0.1 mN"
-over = "0.1 s"
-"""
-    )
+    study.write_text(BALL)
     with pytest.raises(SystemExit) as ended:
         main(["run", str(study), "--device", "gpu"])
     assert ended.value.code == 2

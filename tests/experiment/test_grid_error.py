@@ -7,7 +7,7 @@ from support import EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment.coarser import block_means, pressure_distance
+from roughvisc.experiment.coarser import pressure_distance
 
 
 def pressed(shape, **settings):
@@ -126,21 +126,11 @@ def test_grid_error__holds_an_opening_that_full_contact_hides(cells, offset):
     assert float(well.grid_error_area[0]) < 1e-6
 
 
-def test_block_means__conserve_the_force_on_any_grid():
-    field = np.random.default_rng(3).random((2, 7, 5))
-    cells = (np.linspace(0, 7, 8), np.linspace(0, 10, 6))
-    onto = (np.linspace(-1, 8, 4), np.linspace(0, 10, 4))
-    means = block_means(field, cells, onto)
-    area = np.diff(onto[0])[:, None] * np.diff(onto[1])
-    assert (means * area).sum((-2, -1)) == pytest.approx(field.sum((-2, -1)) * 1 * 2, rel=1e-12)
-
-
 def test_pressure_distance__counts_what_lies_outside_the_other_grid():
     def uniform(low, high, pressure):
         centres = np.arange(low + 0.5, high)
-        shape = (1, len(centres), len(centres))
-        coords = {"time": [0.0], "x": centres, "y": centres}
-        return xr.Dataset({"pressure": (("time", "x", "y"), np.full(shape, pressure))}, coords=coords)
+        field = (("time", "x", "y"), np.full((1, len(centres), len(centres)), pressure))
+        return xr.Dataset({"pressure": field}, coords={"time": [0.0], "x": centres, "y": centres})
 
     small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
     assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]

@@ -1,11 +1,11 @@
 """Layers whose materials creep differently: space and time do not separate. Against inverted Laplace transforms,
-against a dense sum over past steps, against steady sliding, and limits."""
+against a dense sum over past steps, and against steady sliding."""
 
 import math
 
 import numpy as np
 import pytest
-from references.layered import line_contact_history, relaxation_of_wave, sliding_symbol
+from references.layered import line_contact_history, relaxation_of_wave
 
 import roughvisc as rv
 
@@ -33,7 +33,7 @@ def simulated(height, pair, thickness, program, **settings):
 )
 def test_wave_in_full_contact__relaxes_as_the_inverted_transform(pair, thickness):
     """The displacement is that of the profile from the first instant on; its pressure is 1 / (s C(q, s))."""
-    amplitude, cells, q, t = 1e-6, (15, 12), 2 * math.pi / SIDE, np.array([1e-3, 0.03, 0.3, 2.0, 20.0])
+    amplitude, cells, q, t = 1e-6, (15, 3), 2 * math.pi / SIDE, np.array([1e-3, 0.03, 0.3, 2.0, 20.0])
     crest = amplitude * relaxation_of_wave(q, *PAIRS[pair], thickness, np.append(1e-9, t))
     program = rv.Program().load(1.5 * crest[0] * SIDE**2, over=0).hold(20.0)
     height = rv.wavy(amplitude, SIDE, SIDE, cells, waves=1)
@@ -62,17 +62,6 @@ def test_contact_that_grows_and_recedes__is_that_of_a_dense_sum_over_past_steps(
     assert areas[0] <= areas[1] >= areas[3]
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_rigid_base__is_the_sheet(boundary):
-    height = rv.self_affine(SIDE, (24, 21), hurst=0.8, rms_slope=0.2, seed=4)
-    program = rv.Program().load(0.02, over=0.1).hold(0.3).load(0.01, over=0.1)
-    edge = {"edge": "accept"} if boundary == "free" else {}
-    settings = {"boundary": boundary, "times": [0.1, 0.4, 0.5], "tolerance": 1e-3, **edge}
-    sheet = rv.simulate(height, rv.sheet(RUBBER, 1.2e-4), program, progress=False, **settings)
-    found = simulated(height, (RUBBER, rv.elastic(1e11)), 1.2e-4, program, **settings)
-    assert float((abs(found.pressure - sheet.pressure).sum(["x", "y"]) / sheet.pressure.sum(["x", "y"])).max()) < 1e-3
-
-
 #: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.
 QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
 
@@ -97,19 +86,3 @@ def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair, cell
         errors.append(abs(float(ds.friction_coefficient[-1] / steady.friction_coefficient[0]) - 1))
     assert errors[-1] < 3e-3
     assert -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.6
-
-
-@pytest.mark.thorough
-def test_settled_slide_in_full_contact__takes_what_both_bodies_dissipate():
-    """Work of friction over a period is the loss of the wave, ``q A^2 |Im 1/C| / 2`` of area and distance."""
-    thickness, amplitude, q, cells = 1.5e-4, 1e-6, 2 * math.pi / SIDE, 65
-    stiffness = 1 / complex(sliding_symbol(q, SPEED, QUICK, SLOW, thickness))
-    height = rv.wavy(amplitude, SIDE, (SIDE, 3 * SIDE / cells), (cells, 3), waves=1)
-    program = rv.Program().pressure(8 * amplitude * abs(stiffness), over=0).slide(6 * SIDE, speed=SPEED)
-    settings = {"boundary": "periodic", "times": [0.025, 0.03], "fields": (), "tolerance": 1e-4}
-    ds = simulated(height, (QUICK, SLOW), thickness, program, **settings)
-    distance, area = float(ds.sliding_distance[1] - ds.sliding_distance[0]), SIDE * 3 * SIDE / cells
-    expected = q * amplitude**2 * abs(stiffness.imag) / 2 * area
-    late = ds.roughvisc.steps.where(ds.roughvisc.steps.time >= float(ds.time[0]), drop=True)
-    work = np.trapezoid(late.friction_force, late.sliding_distance)
-    assert work / distance == pytest.approx(expected, rel=2e-3)

@@ -23,7 +23,7 @@ def test_relaxed_contact_of_two_cells__is_the_elastic_one_after_many_steps(toler
     assert relative_errors(found, exact).max() < tolerance
 
 
-@pytest.mark.parametrize("cycles", [10, pytest.param(100, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("cycles", [5, pytest.param(100, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("control", ["load", "approach"])
 def test_last_of_many_cycles__is_the_first_one(control, cycles):
     """Contact opens in each cycle and the body recovers until the next one, within the stated errors."""

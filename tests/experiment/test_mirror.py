@@ -56,7 +56,7 @@ def test_mirror__gives_what_the_unfolded_surface_gives(name):
 
 @pytest.fixture(scope="module")
 def pair():
-    settings = {"fields": ("pressure", "gap"), "numerics": rv.Numerics()}
+    settings = {"fields": ("pressure", "gap"), "numerics": rv.Numerics(), "tolerance": 1e-5}
     program = rv.Program().pressure(4e4, over=0).hold(0.3)
     scan = rv.resample(SCAN, (24, 16))  # coarser grids of the unfolded surface have twice as many cells a side
     one = pressed(scan, ZENER, program, boundary="mirror", grid_error=True, **settings)
@@ -99,28 +99,3 @@ def test_steady_sliding__is_that_of_the_unfolded_surface(direction):
         np.testing.assert_array_equal(found[name], whole[name])
     assert found.height.shape == (44, 34)
     assert "mirrored along x and y" in found.attrs["history"]
-
-
-def test_checkpoint__goes_on_with_the_same_bits(tmp_path):
-    study = tmp_path / "study.toml"
-    study.write_text(
-        '[surface]\ngenerate = "self_affine"\nsize = "1 mm"\nshape = [16, 18]\nrms_slope = 0.1\nseed = 1\nhurst = 0.8\n'
-        '[material]\nmodel = "zener"\nshear_modulus = "1 MPa"\nkelvin_modulus = "1 MPa"\nkelvin_viscosity = "1 MPa s"\n'
-        '[[program]]\npressure = "10 kPa"\nover = "0.5 s"\n[[program]]\npressure = "30 kPa"\nover = "0.5 s"\n'
-        '[solve]\nboundary = "mirror"\n[keep]\ntimes = 9\n'
-    )
-    case = rv.read_study(study)
-    whole = rv.run(case, tmp_path / "whole", progress=False)
-
-    class Enough(Exception):
-        pass
-
-    def stop(now, end):
-        if now > 0.6 * end:
-            raise Enough
-
-    with pytest.raises(Enough):
-        rv.run(case, tmp_path / "part", progress=stop)
-    resumed = rv.run(case, tmp_path / "part", progress=False)
-    for name in ("pressure", "gap", "approach", "convolutions"):
-        assert resumed[name].values.tobytes() == whole[name].values.tobytes(), name

@@ -1,12 +1,8 @@
 """Materials by a creep function of the user, which the solver replaces by a series."""
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from references import Paraboloid, reduced_contact
-from scipy.special import gammainc
 from support import refused
 
 import roughvisc as rv
@@ -14,49 +10,20 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.series import series
 from roughvisc.mechanics.memory_choice import choose_memory
 
-
-@dataclass(frozen=True)
-class Stretched:
-    """Kohlrausch, Williams and Watts: ``C = glassy + creep (1 - exp(-(t/time)^exponent))``."""
-
-    glassy: float = 1e-7
-    creep: float = 3e-7
-    time: float = 0.2
-    exponent: float = 0.5
-
-    def contact_compliance(self, t):
-        return self.glassy - self.creep * np.expm1(-((t / self.time) ** self.exponent))
-
-    def contact_integral(self, t):
-        power = 1 / self.exponent
-        left = self.time * power * math.gamma(power) * gammainc(power, (t / self.time) ** self.exponent)
-        return (self.glassy + self.creep) * t - self.creep * left
-
-
-@dataclass(frozen=True)
-class Logarithmic:
-    """``C = glassy + slope log(1 + t/time)``."""
-
-    glassy: float = 1e-7
-    slope: float = 5e-8
-    time: float = 1e-3
-
-    def contact_compliance(self, t):
-        return self.glassy + self.slope * np.log1p(t / self.time)
-
-    def contact_integral(self, t):
-        return self.glassy * t + self.slope * ((t + self.time) * np.log1p(t / self.time) - t)
+#: Contact compliances ``(1 - nu) J / 2``: Kohlrausch, Williams and Watts, with a singular rate; and without an end.
+CURVES = {
+    "stretched": lambda t: 1e-7 - 3e-7 * np.expm1(-np.sqrt(t / 0.2)),
+    "logarithmic": lambda t: 1e-7 + 5e-8 * np.log1p(t / 1e-3),
+}
 
 
 def of(curve, poisson=0.5):
-    """Material of a contact compliance ``C = (1 - nu) J / 2``."""
-    return rv.creep(lambda t: 2 / (1 - poisson) * curve.contact_compliance(t), poisson)
+    return rv.creep(lambda t: 2 / (1 - poisson) * curve(t), poisson)
 
 
 RADIUS = 1e-3
 BALL = rv.sphere(RADIUS, 2e-4, (45, 41))
 STEP = rv.Program().load(1e-3, over=0).hold(2.0)
-CURVES = [Stretched(), Logarithmic()]
 
 
 def pressed(material, program=STEP, **settings):
@@ -64,12 +31,12 @@ def pressed(material, program=STEP, **settings):
     return rv.simulate(BALL, material, program, **{**given, **settings})
 
 
-@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
 def test_a_step_load__has_the_approach_of_the_compliance_then(curve):
     """Lee and Radok: while the contact grows, it is the elastic one of the compliance then, on any grid."""
     material = of(curve)
     ds = pressed(material)
-    compliance = curve.contact_compliance(ds.time.values)
+    compliance = curve(ds.time.values)
     first = rv.Program().load(1e-3, over=0)
     on_this_grid = [
         float(pressed(rv.elastic(1 / (4 * c)), first, times=[0.0], tolerance=1e-4).approach[0]) for c in compliance
@@ -78,8 +45,6 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(curve):
     assert ds.approach.values == pytest.approx(
         rv.closed_forms.lee_radok(RADIUS, material, 1e-3).approach(ds.time.values), rel=0.02
     )
-    power = (ds.approach.values / ds.approach.values[0]) ** 1.5
-    assert power == pytest.approx(compliance / compliance[0], rel=0.02)
     assert (ds.stated_error.values <= 1e-3).all()
     assert 0 < ds.attrs["series_error"] <= 1e-4
     assert "exponentials" in ds.attrs["memory"]
@@ -87,7 +52,7 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(curve):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
 def test_a_cycle__is_that_of_all_past_forces_without_a_series(curve):
     """The method of dimensionality reduction, with the material's own compliance and integral."""
     material, program = of(curve), rv.Program().load(1e-3, over=0.2).load(3e-4, over=0.2).hold(0.4)
@@ -100,12 +65,12 @@ def test_a_cycle__is_that_of_all_past_forces_without_a_series(curve):
     assert np.sqrt(ds.contact_area.values / np.pi) == pytest.approx(exact.radius, rel=0.02)
 
 
-@pytest.mark.parametrize("curve", CURVES, ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)
 @pytest.mark.parametrize("shortest", [1e-8, 1e-4])
 def test_the_series__is_within_the_tolerance_between_its_samples(curve, shortest):
     found, error = series(of(curve, 0.4), shortest, 10.0, 1e-4)
     t = np.append(0.0, np.geomspace(shortest, 10.0, 3001))
-    assert found.contact_compliance(t) == pytest.approx(curve.contact_compliance(t), rel=1.05e-4)
+    assert found.contact_compliance(t) == pytest.approx(curve(t), rel=1.05e-4)
     assert error <= 1e-4
     assert found.poisson == 0.4
 
@@ -129,10 +94,10 @@ def test_creep__refuses(make, key, found):
 
 
 def test_a_pair__takes_one():
-    both = rv.pair(of(Stretched()), rv.zener(1e6, 1e6, 1e5))
+    both = rv.pair(of(CURVES["stretched"]), rv.zener(1e6, 1e6, 1e5))
     t = np.array([0.0, 0.1, 2.0])
     rest = rv.zener(1e6, 1e6, 1e5).contact_compliance(t)
-    assert both.contact_compliance(t) == pytest.approx(Stretched().contact_compliance(t) + rest)
+    assert both.contact_compliance(t) == pytest.approx(CURVES["stretched"](t) + rest)
     choice = choose_memory(both, 2.0, 1e-3)
     assert choice.series_error <= 1e-4
     assert choice.material.contact_compliance(t) == pytest.approx(both.contact_compliance(t), rel=1e-4)
@@ -161,7 +126,7 @@ def test_what_is_no_creep__is_refused(function, words):
         pressed(rv.creep(function))
 
 
-@pytest.mark.parametrize("material", [3.0, Stretched(), np.sqrt], ids=["number", "object", "function"])
+@pytest.mark.parametrize("material", [3.0, np.sqrt], ids=["number", "function"])
 def test_what_is_no_material__is_refused(material):
     for use in (pressed, lambda one: rv.pair(one, rv.elastic(1.0)), lambda one: rv.shift(one, 2.0)):
         with refused("material", material):

@@ -7,7 +7,7 @@ import psutil
 import pytest
 from samples import RUBBER
 from scipy import fft
-from support import refused
+from support import ROUGH, refused
 
 import roughvisc as rv
 from roughvisc.errors import TooLargeError
@@ -17,29 +17,8 @@ from roughvisc.experiment.resources import Available, cores, memory_available, t
 from roughvisc.study.case import read_cases
 from roughvisc.study.execution import cluster as side_module
 
-ROUGH = """
-title = "Rough"
-[surface]
-generate = "self_affine"
-size = "1 mm"
-shape = [600, 512]
-hurst = 0.8
-rms_slope = 0.1
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-pressure = "6 kPa"
-over = "10 ms"
-[solve]
-boundary = "periodic"
-[keep]
-times = 5
-"""
 PRESS = rv.Program().pressure(6e3, over=0.01)
+LARGE = ROUGH.replace("[30, 26]", "[600, 512]")
 
 
 @pytest.fixture
@@ -63,7 +42,7 @@ def study(tmp_path):
 
 
 def test_run__refuses_what_cannot_fit_and_says_what_would(study, limited, tmp_path, monkeypatch, invoke):
-    path = study(ROUGH)
+    path = study(LARGE)
     limited(40e6)
     monkeypatch.setattr(Profile, "__init__", lambda *_: pytest.fail("an array was made"))
     with pytest.raises(TooLargeError, match="300 x 256 cells") as found:
@@ -82,7 +61,7 @@ def test_simulate__refuses_what_cannot_fit(limited):
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
-    path = study(ROUGH.replace("times = 5", "times = 2") + '[sweep]\n"surface.shape" = [[600, 512], [24, 20]]\n')
+    path = study(LARGE + '[sweep]\n"surface.shape" = [[600, 512], [24, 20]]\n')
     limited(40e6)
     cases = read_cases(path)
     results = rv.sweep(cases, tmp_path / "out", workers=0, progress=False)

@@ -1,13 +1,13 @@
-"""The labelled result: what is in it, what is refused, the two validations of the paper."""
+"""The labelled result: what is in it, what is refused, and the part of a free surface that is solved on."""
 
 import numpy as np
 import pytest
 import xarray as xr
-from references import lee_radok_step
 
 import roughvisc as rv
 from roughvisc.experiment import profile as domain
 from roughvisc.experiment.rows import kept_times
+from roughvisc.solve import Recorder
 from roughvisc.variables import FIELDS, VARIABLES
 
 BALL = rv.sphere(1e-3, size=3e-4, shape=(31, 34))
@@ -31,48 +31,6 @@ def test_result__holds_declared_variables_with_units():
     assert ds.attrs["Conventions"] == "CF-1.11"
     assert ds["status"].attrs["flag_meanings"].split()[int(ds["status"][0])] == "converged"
     np.testing.assert_allclose(ds["time"], [0.0, 1e-3**0.5, 1.0])
-
-
-def test_result__is_a_contact_state():
-    ds = simulate(fields=FIELDS, tolerance=1e-5)
-    area = float(ds.x[1] - ds.x[0]) * float(ds.y[1] - ds.y[0])
-    assert (ds.pressure >= 0).all()
-    assert (ds.gap >= 0).all()
-    assert not ((ds.pressure > 0) & (ds.gap > 0)).any()
-    assert (ds.pressure.sum(("x", "y")) * area).values == pytest.approx(ds.force.values, rel=1e-12)
-    undeformed = -BALL  # from the apex, which lies between two cells
-    opening = undeformed + ds.displacement - ds.approach
-    assert (ds.gap - opening).where(ds.pressure == 0, 0.0).values == pytest.approx(0, abs=1e-4 * float(ds.approach[0]))
-    counted = (ds.pressure > 0).sum(("x", "y")) * area
-    assert ds.contact_area_counted.values == pytest.approx(counted.values)
-    assert ds.mean_gap.values == pytest.approx(ds.gap.mean(("x", "y")).values)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("material", "duration"),
-    [(rv.maxwell(1e6, 1e6), 2.0), (rv.zener(1e6, 0.25e6, 0.25e6), 4.0)],
-    ids=["maxwell", "zener"],
-)
-def test_seed_papers_validations__at_the_default_tolerance(material, duration):
-    """128 x 128, free space, step load: L1 pressure 5e-3, approach 1e-3, force 1e-8 at every kept time."""
-    radius, load = 1e-3, 8e-2
-    exact = lee_radok_step(radius, material, load)
-    size = 2.4 * float(exact.radius(duration))
-    height = rv.sphere(radius, size, 128)
-    times = np.linspace(0, duration, 9)
-    ds = rv.simulate(
-        height, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=1e-3, progress=False
-    )
-    distance = np.hypot(ds.x - size / 2, ds.y - size / 2).values
-    for i, t in enumerate(times):
-        error = np.abs(ds.pressure[i].values - exact.pressure(distance, t)).sum() * (size / 128) ** 2 / load
-        assert error < 5e-3
-    assert ds.approach.values == pytest.approx(exact.approach(times), rel=1e-3)
-    assert ds.force.values == pytest.approx(load, rel=1e-8)
-    assert float(ds.time_error.max()) < 1e-3
-    radii = np.sqrt(ds.contact_area.values / np.pi)
-    assert radii == pytest.approx(exact.radius(times), rel=5e-3)
 
 
 @pytest.mark.thorough
@@ -180,12 +138,18 @@ FOLLOWED = {
 @pytest.mark.parametrize(
     "name", [n if n == "stress relaxation" else pytest.param(n, marks=pytest.mark.thorough) for n in FOLLOWED]
 )
-def test_part_of_the_surface__changes_nothing_but_cost(name, solved_on, monkeypatch):
+@pytest.mark.parametrize("margin", [None, 0.4], ids=["", "outgrown"])
+def test_part_of_the_surface__changes_nothing_but_cost(name, margin, solved_on, monkeypatch):
+    """With too small a margin the contact outgrows its part, and the run begins anew."""
     material, program = FOLLOWED[name]
     settings = {"boundary": "free", "tolerance": 3e-3, "times": 6, "fields": FIELDS}
+    restarts, restart = [], Recorder.restart
+    monkeypatch.setattr(Recorder, "restart", lambda self: restarts.append(self) or restart(self))
+    if margin:
+        monkeypatch.setattr(domain, "MARGIN", margin)
     followed = simulate(two_hills(), material, program, **settings)
     if name == "stress relaxation":
-        assert (97, 63) in solved_on, "it was solved on a part"
+        assert restarts if margin else (97, 63) in solved_on, "it was solved on a part"
     monkeypatch.setattr(domain, "WORTH_CROPPING", 10**9)
     whole = simulate(two_hills(), material, program, **settings)
     assert solved_on[-1] == (151, 133)
@@ -195,7 +159,6 @@ def test_part_of_the_surface__changes_nothing_but_cost(name, solved_on, monkeypa
     assert (np.abs(followed.pressure - whole.pressure).sum(("x", "y")) * area).max() < 2 * 3e-3 * force
     for field in ("gap", "displacement"):
         assert np.abs(followed[field] - whole[field]).max() < 1e-2 * depth
-    assert np.abs(followed.mean_gap - whole.mean_gap).max() < 3e-3 * depth
     assert followed.mean_gap.values == pytest.approx(followed.gap.mean(("x", "y")).values, rel=1e-3)
     right = followed.x > 1.7e-4
     assert (followed.pressure.where(right).max() > 0) == (whole.pressure.where(right).max() > 0)

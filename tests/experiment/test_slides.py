@@ -8,44 +8,9 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.rows import kept_times
-from roughvisc.study.case import Case, read_study
-from roughvisc.study.si_tables import unit_of
 
 SIDE = 1e-3
 PRESS = rv.Program().pressure(1e4, over=0).hold(2e-3)
-STUDY = """
-title = "Stop and go"
-[surface]
-generate = "wavy"
-amplitude = "2 um"
-wavelength = "1 mm"
-size = "1 mm"
-shape = [24, 2]
-waves = 1
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.3 MPa"
-kelvin_viscosity = "0.3 kPa s"
-[[program]]
-pressure = "10 kPa"
-over = 0
-[[program]]
-hold = "2 ms"
-[[program]]
-slide = "1 mm"
-speed = "0.1 m/s"
-[[program]]
-hold = "2 ms"
-[[program]]
-slide = "0.5 mm"
-over = "5 ms"
-direction = "-x"
-[solve]
-boundary = "periodic"
-[keep]
-times = 9
-"""
 
 
 def wave(cells=24):
@@ -144,21 +109,6 @@ def test_grid_error__holds_the_true_one_although_coarser_slides_come_to_other_in
 def test_what_cannot_be_computed__is_refused(program, settings, message):
     with pytest.raises(InputError, match=message):
         slid(program, **settings)
-
-
-@pytest.fixture(scope="module")
-def study(tmp_path_factory):
-    path = tmp_path_factory.mktemp("study") / "study.toml"
-    path.write_text(STUDY)
-    return path
-
-
-def test_study__states_the_same_program(study):
-    case = read_study(study)
-    program = PRESS.slide(SIDE, speed=0.1).hold(2e-3).slide(0.5 * SIDE, over=5e-3, direction="-x")
-    assert case.program == program
-    assert Case.from_json(case.to_json()).program == program
-    assert unit_of("program.2.speed") == "m/s"
 
 
 def test_friction_error__of_a_stroke_of_one_cell_is_the_whole_force():

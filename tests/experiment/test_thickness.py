@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from references import OnSheet, Paraboloid, StepLoad
-from support import refused
+from references import OnSheet, Paraboloid
+from support import BALL, refused
 
 import roughvisc as rv
-from roughvisc.cli import main
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.study.case import Case, read_cases
 
@@ -23,26 +21,14 @@ def pressed(height, material, program, *, thickness=THICKNESS, **settings):
     return rv.simulate(height, body, program, **{"progress": False, **settings})
 
 
-@pytest.mark.parametrize("wide", [0.3, 1.0, 3.0])
-@pytest.mark.parametrize("poisson", [0.3, 0.45, 0.5])
-@pytest.mark.parametrize("base", ["bonded", "slipping"])
+@pytest.mark.parametrize("wide", [0.3, 3.0])
+@pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.5, "bonded"), (0.45, "slipping")])
 def test_elastic_sphere__agrees_with_the_integral_equation(wide, poisson, base):
     exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS, poisson, base)), wide * THICKNESS
     load = rv.Program().load(float(exact.scaled_force(a)) * 2e6 / (1 - poisson), over=0)
     ds = pressed(rv.sphere(RADIUS, 2.6 * a, 128), rv.elastic(1e6, poisson), load, base=base)
     assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
     assert math.sqrt(float(ds.contact_area[0]) / math.pi) == pytest.approx(a, rel=2e-3)
-
-
-@pytest.mark.parametrize(("poisson", "base"), [(0.5, "bonded"), (0.3, "bonded"), (0.45, "slipping")])
-def test_creeping_sphere__agrees_with_the_integral_equation(poisson, base):
-    rubber = rv.zener(1e6, 3e5, 1e5, poisson)
-    exact = StepLoad(OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS, poisson, base)), rubber, 2e-3)
-    ball = rv.sphere(RADIUS, 2.6 * float(exact.radius(2.0)), 128)
-    times = [0.0, 0.1, 0.5, 2.0]
-    ds = pressed(ball, rubber, rv.Program().load(2e-3, over=0).hold(2.0), base=base, times=times, fields=())
-    np.testing.assert_allclose(ds.approach, exact.approach(times), rtol=1e-3)
-    np.testing.assert_allclose(np.sqrt(ds.contact_area / math.pi), exact.radius(times), rtol=2e-3)
 
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.5, "bonded"), (0.5, "slipping")])
@@ -65,28 +51,7 @@ def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base):
 # --------------------------------------------------------------------------------------------------------------
 # studies
 
-STUDY = """
-title = "A ball on a gel"
-[surface]
-generate = "sphere"
-radius = "1 mm"
-size = "0.3 mm"
-shape = [24, 21]
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "0.3 MPa"
-kelvin_viscosity = "0.1 MPa s"
-thickness = "0.1 mm"
-base = "slipping"
-[[program]]
-load = "1 mN"
-over = 0
-[[program]]
-hold = "0.5 s"
-[keep]
-times = [0, 0.5]
-"""
+STUDY = BALL.replace("[[program]]", 'thickness = "0.1 mm"\nbase = "slipping"\n[[program]]', 1)
 
 
 @pytest.fixture
@@ -101,25 +66,23 @@ def test_study__presses_the_sheet_that_it_states(case, tmp_path):
     ds = rv.run(case, out=tmp_path / "out", progress=False)
     assert ds.attrs["thickness"] == 1e-4
     assert "kernel" not in ds.attrs
-    same = pressed(case.height(), case.material, case.program, base="slipping", times=[0, 0.5])
+    same = pressed(case.height(), case.material, case.program, base="slipping", times=[0, 0.1, 0.2], boundary="free")
     np.testing.assert_array_equal(ds.pressure, same.pressure)
     assert Case.from_json(ds.attrs["case"]).body == case.body
 
 
-def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path):
-    thickness, load = 2e-4 / 51 / 15, rv.Program().load(1e-3, over=0)
-    message = r"thickness is 2.61438e-07 m and a cell is 1.33333e-05 m long, 51 times .* expected cells of at most 50"
-    ball = rv.sphere(RADIUS, 2e-4, (15, 16))
-    with pytest.raises(rv.InputError, match=message):
+def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tmp_path, invoke):
+    thickness, load = 1e-3 / 21 / 51, rv.Program().load(1e-3, over=0)
+    ball = rv.sphere(RADIUS, 1e-3, (24, 21))
+    with pytest.raises(rv.InputError, match="51 times the thickness: expected cells of at most 50"):
         pressed(ball, rv.elastic(1e6), load, thickness=thickness)
     assert float(pressed(ball, rv.elastic(1e6), load, thickness=thickness, boundary="periodic").force[0]) > 0
     study = tmp_path / "gel.toml"
-    text = STUDY.replace('"0.1 mm"', f"{thickness}").replace('"0.3 mm"', '"0.2 mm"').replace("[24, 21]", "[15, 16]")
-    study.write_text(text)
-    for verb in (["plan"], ["run", "--out", str(tmp_path / "out"), "--no-plots"]):
-        done = CliRunner().invoke(main, [*verb, str(study)])
-        assert done.exit_code == 2, done.output
-        assert "51 times the thickness" in " ".join((done.output + done.stderr).split())
+    study.write_text(STUDY.replace('"0.1 mm"', f"{thickness}"))
+    for verb in (["plan"], ["run", "--out", tmp_path / "out", "--no-plots"]):
+        status, out, wrong = invoke(*verb, study)
+        assert status == 2
+        assert "51 times the thickness" in " ".join((out + wrong).split())
     assert not list(tmp_path.glob("out/*.nc"))
 
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support import displaced
+from support import displaced, scene
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import Grid
@@ -17,11 +17,7 @@ MATERIAL = rv.zener(1.0, 1.0, 0.05)
 
 
 def sphere(program, material=MATERIAL, **settings):
-    shape, spacing = (9, 7), (0.1, 0.12)
-    x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
-    gap = 0.5 * (x[:, None] ** 2 + y[None, :] ** 2)
-    memory = Memory(material, program.duration)
-    return Scene(Grid(shape, spacing), gap, memory, program, settings.pop("times", None), **settings)
+    return scene(material, program, shape=(9, 7), size=0.9, **settings)
 
 
 def contacts(steps):
@@ -30,34 +26,12 @@ def contacts(steps):
     return sum(now and not before for before, now in pairwise(touching))
 
 
-AMPLITUDE, PERIOD, CYCLES = 0.03, 1.0, 20
+AMPLITUDE, PERIOD = 0.03, 1.0
 
 
 def tapping(cycles):
     """About half an amplitude outside: contact in a third of each cycle."""
     return rv.Program.cycle(-0.5 * AMPLITUDE, AMPLITUDE, PERIOD, cycles, control="approach")
-
-
-@pytest.fixture(scope="module")
-def one_by_one():
-    """Work of the same cycles, each a program of its own upon the last."""
-    program = rv.Program()
-    for _ in range(CYCLES):
-        program += tapping(1)
-    steps = list(march(sphere(program, times=(program.duration,), tolerance=1e-3)))
-    assert contacts(steps) == CYCLES
-    return steps[-1].state.work
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "kept", [8, pytest.param(0, marks=pytest.mark.thorough), pytest.param(50, marks=pytest.mark.thorough)]
-)
-def test_taps__are_all_found_and_work_as_in_single_cycles(kept, one_by_one):
-    times = tuple((PERIOD / kept * np.arange(kept * CYCLES + 1)).tolist()) if kept else (CYCLES * PERIOD,)
-    steps = list(march(sphere(tapping(CYCLES), times=times, tolerance=1e-3)))
-    assert contacts(steps) == CYCLES
-    assert steps[-1].state.work == pytest.approx(one_by_one, rel=5e-3)
 
 
 def test_taps__work_as_in_steps_eight_times_as_short():

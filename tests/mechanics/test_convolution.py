@@ -8,9 +8,7 @@ from support import direct
 
 import roughvisc as rv
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import Grid, transform_library
-from roughvisc.mechanics.steady_sliding import Sliding
 
 SHAPES = [(7, 5), (8, 6), (1, 9), (13, 1), (1, 1), (31, 34)]
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
@@ -82,32 +80,6 @@ def test_convolutions__are_symmetric_and_positive(shape, boundary, seed):
         assert np.sum(applied(a) * a) >= -precision * scale
 
 
-@pytest.fixture
-def in_small_blocks(monkeypatch):
-    """Blocks and threads as on a large grid."""
-    monkeypatch.setattr(grids, "THREADED_FROM", 1)
-    for name, value in {"BLOCKS_FROM": 1, "COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
-        monkeypatch.setattr(grids, name, value)
-
-
-@BOUNDARIES
-@pytest.mark.parametrize("kind", [np.float64, np.float32])
-def test_fields__do_not_depend_on_blocks_and_threads(boundary, kind, request):
-    pressure = np.random.default_rng(4).random((65, 70)).astype(kind)
-    whole = Grid((65, 70), (1.0, 1.0), boundary)
-    fields = [(whole.displacement(pressure), whole.inverse(pressure.astype(np.float32)))]
-    request.getfixturevalue("in_small_blocks")
-    for count in (1, 2, 3):
-        grid = Grid((65, 70), (1.0, 1.0), boundary, workers=count)
-        assert grid.threads == count
-        fields.append((grid.displacement(pressure), grid.inverse(pressure.astype(np.float32))))
-    for others in fields[1:]:
-        for field, other in zip(fields[0], others, strict=True):
-            assert field.dtype == other.dtype
-            precision = 1e-14 if field.dtype == np.float64 else 1e-6
-            np.testing.assert_allclose(field, other, rtol=0, atol=precision * np.abs(field).max())
-
-
 # ------------------------------------------------------------------------------------------- numbers of a grid
 
 
@@ -144,32 +116,21 @@ def test_half_space__is_the_same_by_both(boundary, kind, shape, monkeypatch):
         np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
 
 
-def test_sliding__is_the_same_by_both_and_goes_by_the_one_that_is_stated(monkeypatch):
-    pressure, body, calls, found = np.random.default_rng(0).random((15, 12)), Body(rv.zener(1e6, 1e6, 1e5)), [], []
-    sound = grids.ducc0.fft.r2c
+def test_results__are_the_same_by_both_and_go_by_the_one_that_is_stated(by_ducc0, monkeypatch):
+    ball, rubber, press = rv.sphere(1e-3, 3e-4, (16, 15)), rv.zener(1e6, 1e6, 1e5), rv.Program().load(1e-3, over=0)
+    rough = rv.self_affine(1e-3, (15, 12), hurst=0.8, rms_slope=0.1, seed=1)
+    calls, sound = [], grids.ducc0.fft.r2c
     monkeypatch.setattr(grids.ducc0.fft, "r2c", lambda *a, **kw: calls.append(a) or sound(*a, **kw))
-    for engine, by_ducc0 in (("scipy", 0), ("ducc0", 3)):
-        monkeypatch.setenv("ROUGHVISC_TRANSFORMS", engine)
-        sliding = Sliding(body, pressure.shape, (1e-6, 2e-6), 0.1)
-        found.append((sliding.displacement(pressure), sliding.full_contact(pressure)))
-        assert sliding.convolutions == 3
-        assert len(calls) == by_ducc0
-    for (a, b), precision in zip(zip(*found, strict=True), (1e-14, 1e-5), strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
 
+    def results():
+        pressed = rv.simulate(ball, rubber, press, progress=False)
+        return pressed, rv.friction(rough, rubber, pressure=2e4, speeds=1e-3, fields=("pressure",), progress=False)
 
-def test_result__says_by_what_it_was_computed(by_ducc0, monkeypatch, tmp_path):
-    study = tmp_path / "study.toml"
-    study.write_text(
-        '[surface]\ngenerate = "sphere"\nradius = "1 mm"\nsize = "0.3 mm"\nshape = [16, 15]\n'
-        '[material]\nmodel = "elastic"\nshear_modulus = "1 MPa"\n[[program]]\nload = "1 mN"\nover = 0\n'
-    )
-    fast = rv.run(rv.read_study(study), tmp_path / "fast", progress=False)
+    fast, by_ducc0 = results(), len(calls)
     monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
-    plain = rv.run(rv.read_study(study), tmp_path / "plain", progress=False)
-    assert "; ducc0 " in fast.attrs["source"]
-    assert "; scipy.fft " in plain.attrs["source"]
-    np.testing.assert_allclose(fast.pressure, plain.pressure, rtol=0, atol=1e-9 * float(plain.pressure.max()))
+    for one, other in zip(fast, results(), strict=True):
+        np.testing.assert_allclose(one.pressure, other.pressure, rtol=0, atol=1e-9 * float(other.pressure.max()))
+    assert len(calls) == by_ducc0 > 0
 
 
 def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):

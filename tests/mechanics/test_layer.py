@@ -10,7 +10,6 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.layer import effective_compliance
-from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
 
 X = np.geomspace(1e-3, 50, 23)
@@ -86,24 +85,6 @@ def test_body_of_the_users_own__that_does_not_separate_is_refused():
     ball, press = rv.sphere(1e-3, 2e-4, 45), rv.Program().load(1e-4, over=0.1)
     with pytest.raises(InputError, match=r"Aged in which space and time do not separate.*expected the body"):
         rv.simulate(ball, Aged(rv.zener(3e6, 1e6, 1e5)), press, progress=False)
-
-
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("speed", [2e-3, 0.1])
-def test_friction__in_full_contact_is_that_of_the_effective_compliance(speed, turned):
-    layer, base = rv.zener(3e6, 1e6, 1e5, poisson=0.3), rv.power_law(1e-8, 3e-7, 0.4, poisson=0.45)
-    thickness, period, amplitude, pressure = 2e-4, 1e-3, 1e-7, 1e5
-    height = rv.wavy(amplitude=amplitude, wavelength=period, size=period, shape=(45, 3), waves=1)
-    direction = "x"
-    if turned:
-        height, direction = height.rename(x="y", y="x").transpose("x", "y"), "-y"
-    body = rv.layer(layer, thickness, on=base)
-    found = rv.friction(height, body, pressure=pressure, speeds=[speed], direction=direction, tolerance=1e-6)
-    k = 2 * math.pi / period
-    shear = [2 / (1 - one.poisson) * complex_compliance(one, k * speed) for one in (layer, base)]
-    modulus = 1 / complex(effective_compliance(k, (thickness,), (0.3, 0.45), shear))
-    expected = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
-    assert float(found["friction_coefficient"][0]) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -67,29 +67,6 @@ def test_equal_materials__have_the_memory_of_a_half_space(boundary, material, ru
         np.testing.assert_allclose(one, other, rtol=0, atol=2e-7 * abs(other).max())
 
 
-@pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic", "mirror"])
-@pytest.mark.parametrize("pair", PAIRS)
-def test_steps__of_linear_pressure_are_the_hereditary_integral(boundary, pair):
-    """The sum over all past steps of the mean compliance since, with the operator of the elastic body of that age."""
-    memory, fields = memory_of(PAIRS[pair], boundary), pressures(5)
-    steps, grid = np.array([0.01, 0.02, 0.005, 0.2, 0.1]), memory.grid
-    fields[0] = 0  # at rest first
-    found, _ = marched(memory, steps, fields, grid, "linear")
-    waves, times = memory.waves, np.cumsum(steps)
-
-    def mean_crept(age, length):
-        nodes, weights = np.polynomial.legendre.leggauss(30)
-        return sum(w / 2 * waves.crept(age + length * (1 + x) / 2) for x, w in zip(nodes, weights, strict=True))
-
-    expected, jumps = np.zeros(SHAPE), np.diff(fields, axis=0)
-    for jump, end, length in zip(jumps, times[1:], steps[1:], strict=True):
-        kernel = waves.kernel(mean_crept(times[-1] - end, length))
-        expected += grid.answering(grid.symbol_of(kernel), kernel).displacement(jump)
-    # in free space the images of a sum are not quite the sum of the images
-    accuracy = 1e-5 if boundary == "free" else 1e-8
-    np.testing.assert_allclose(found[-1], expected, rtol=0, atol=accuracy * abs(expected).max())
-
-
 def test_at_once__is_the_response_to_a_jump():
     memory, [pressure] = memory_of(PAIRS["rubber on polymer"]), pressures(1)
     [found], history = marched(memory, [0.0], [pressure], memory.grid)

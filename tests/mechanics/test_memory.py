@@ -60,21 +60,6 @@ def test_bdf2__converges_at_second_order(name):
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.3)
 
 
-@pytest.mark.parametrize("name", SERIES)
-def test_rest__decays_with_the_retardation_times(name):
-    memory = Memory(SERIES[name], 10.0)
-    pressed = history_after(memory, [0.2, 0.3], lambda t: t, "linear")
-    released = memory.advance(pressed, memory.predict(pressed, 0.0), 0 * FIELD, 0 * FIELD)
-    slowly = history_after(memory, [0.2, 0.3, 1e-9], lambda t: t if t <= 0.5 else 0.0, "linear")
-    for later in (0.0, 0.1, 5.0):
-        np.testing.assert_allclose(memory.after_rest(released, later), memory.after_rest(slowly, later), rtol=1e-6)
-    expected = sum(
-        c * np.exp(-(1.0 / t if np.isfinite(t) else 0.0)) * mode[0]
-        for c, t, mode in zip(memory.compliances, memory.times, released.modes, strict=True)
-    )
-    np.testing.assert_allclose(memory.after_rest(released, 1.0), expected, rtol=1e-12)
-
-
 def test_error__relaxes_faster_than_it_creeps():
     """One mode at a held displacement decays with the relaxation time, C(0)/C(inf) of the retardation time."""
     memory = Memory(rv.zener(1.0, 0.25, 0.25), 10.0)  # retarded in 1 s, five times as compliant in the end

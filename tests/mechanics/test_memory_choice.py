@@ -13,21 +13,6 @@ ROWS = np.geomspace(1e-3, 10.0, 40)
 NOISY = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
 
 
-@pytest.mark.parametrize(
-    ("material", "note"),
-    [
-        (rv.elastic(1.0), "no memory: elastic"),
-        (rv.zener(1.0, 1.0, 1.0), "1 exponential"),
-        (rv.maxwell(1.0, 1.0), "a fluidity"),
-        (rv.Prony(1.0, 1.0, (1.0, 2.0), (1.0, 3.0)), "2 exponentials and a fluidity"),
-    ],
-)
-def test_series__is_its_own_memory(material, note):
-    choice = choose_memory(material, 10.0, 1e-3)
-    assert choice.memory.series is material
-    assert (choice.series_error, choice.note) == (0.0, note)
-
-
 @pytest.mark.parametrize("exponent", [0.1, 0.5])
 @pytest.mark.parametrize("glassy", [0.0, 0.01, 0.3])
 def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glassy):

@@ -5,13 +5,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from references import OnSheet, Paraboloid
 from support import refused
 
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.sheet import Sheet, complement, reduction
 
 BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
@@ -79,17 +75,6 @@ def test_influence__of_a_short_cell_is_that_of_its_parts(base, poisson, sides):
 
 
 @pytest.mark.parametrize(("base", "poisson"), BODIES)
-def test_influence__adds_up_to_uniform_pressure(base, poisson):
-    """Under pressure everywhere: the sum over cells is exact, whatever their size."""
-    for sides in ((0.4, 0.3), (1.7, 2.1), (0.3, 21.0), (50.0, 40.0)):
-        reach = [math.ceil(50 / side) + 3 for side in sides]
-        influence = Sheet(1.0, poisson, base).influence(tuple(reach), sides)
-        influence[1:] *= 2
-        influence[:, 1:] *= 2
-        assert influence.sum() == pytest.approx(float(Sheet(1.0, poisson, base).transfer(0.0, 0.0)), abs=2e-8)
-
-
-@pytest.mark.parametrize(("base", "poisson"), BODIES)
 @pytest.mark.parametrize(
     "side", [0.4, 1.0, 50.0, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0.51, 0.8, 2.0, 4.0, 16.0, 400.0))]
 )
@@ -102,45 +87,6 @@ def test_influence__answers_long_waves_as_plane_strain_does(base, poisson, side)
     influence[:, 1:] *= 2
     answer = float(influence.sum(axis=1) @ np.cos(q * side * np.arange(reach[0])))
     assert answer == pytest.approx(2 / q * wave_on_sheet(q, poisson, base)[0], rel=5e-3)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("ratio", [0.51, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 50.0])
-def test_ball_on_an_incompressible_sheet__agrees_with_the_integral_equation_on_long_cells(ratio):
-    """Thin sheets tend to lubrication theory, ``F = pi E* a^6 / 128 h^3 R`` and ``d = a^2 / 4 R``.
-
-    The series in ``h/a`` from there is that of the integral equation at radii of 8 to 20 thicknesses.
-    """
-    sheet, a, radii = Sheet(1.0), 8.3 * ratio, np.array([8.0, 11.0, 15.0, 20.0])
-    contact = OnSheet(Paraboloid(1.0), sheet)
-
-    def of(values, lubricated):
-        powers = np.vander(1 / radii, 5, increasing=True)[:, 1:]
-        series = np.linalg.solve(powers, values(radii) / lubricated(radii) - 1)
-        return lubricated(a) * (1 + float(series @ (1 / a) ** np.arange(1, 5)))
-
-    if a < 10:
-        force, approach = float(contact.scaled_force(a)), float(contact.reduced(a))
-    else:
-        force = of(contact.scaled_force, lambda a: math.pi * a**6 / 128)
-        approach = of(contact.reduced, lambda a: a**2 / 4)
-    x, y = (ratio * (np.arange(n) - (n - 1) / 2) for n in (23, 25))
-    body = Grid((23, 25), (ratio, ratio), kernel=sheet)
-    found = solve_contact(body, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
-    assert found.approach == pytest.approx(approach, rel=3e-3)
-    periodic = Grid((23, 25), (ratio, ratio), "periodic", kernel=sheet)
-    same = solve_contact(periodic, (x[:, None] ** 2 + y**2) / 2, load=force / ratio**2, tolerance=1e-6)
-    if ratio > 4:  # waves as long as the grid hardly move it, and its images are not felt
-        assert found.approach == pytest.approx(same.approach, rel=3e-3)
-
-
-@pytest.mark.parametrize(("base", "coefficient"), [("bonded", 1.7702), ("slipping", 1.16758)])
-def test_influence__near_the_load_on_a_thick_sheet_is_the_half_space_less_a_constant(base, coefficient):
-    """At a Poisson's ratio of a half; first order in distance over thickness."""
-    sides, area = (1e-3, 0.8e-3), 0.8e-6
-    less = love_kernel((5, 6), sides) - Sheet(10.0, 0.5, base).influence((5, 6), sides)
-    np.testing.assert_allclose(less, area * coefficient / (math.pi * 10.0), rtol=2e-5)
-    assert Sheet(10.0, 0.5, base).relief == pytest.approx(coefficient / (10 * math.pi), rel=2e-5)
 
 
 @pytest.mark.parametrize(("base", "poisson"), BODIES)

@@ -4,26 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from support import displaced, refused
+from references.dense import PERIOD, TIME, rubber
+from support import displaced
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.frequency import complex_compliance
 from roughvisc.mechanics.memory import Memory
-from roughvisc.mechanics.program import Slide
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 from roughvisc.mechanics.stepping import Scene, march
 from roughvisc.mechanics.tangential import slope, tangential_force
 
-PERIOD, TIME, AMPLITUDE = 1e-3, 1e-3, 1e-6
+AMPLITUDE = 1e-6
 WAVE = 2 * math.pi / PERIOD
-LOSSY = {0.2: 0.48, 0.9: 4.4, 2.2: 20.0}  # the largest loss tangent: retarded over instantaneous compliance
-
-
-def rubber(ratio=3.0):
-    """Modulus 1 MPa at once, and so many times the compliance retarded."""
-    return rv.zener(1e6, 1e6 / ratio, 1e6 / ratio * TIME)
 
 
 def wave(cells, across=1):
@@ -67,23 +61,6 @@ def steady(found, material, speed, load):
     operator = found.grid
     sliding = Sliding(Body(material, HALF_SPACE), operator.shape, operator.spacing, speed)
     return steady_state(sliding, found.gap, load, tolerance=1e-6)
-
-
-@pytest.mark.parametrize("loss", LOSSY)
-def test_full_contact_of_a_wave__is_right_to_second_order_in_the_cell(loss):
-    """mu = k^2 A^2 Im E* / (4 p0), at the speed of the largest loss."""
-    material = rubber(LOSSY[loss])
-    speed = math.sqrt(1 + LOSSY[loss]) / (TIME * WAVE)
-    lost = modulus(material, WAVE * speed)
-    assert lost.imag / lost.real == pytest.approx(loss, rel=0.06)
-    pressure, errors = 3 * AMPLITUDE * WAVE * abs(lost), []
-    for cells in (24, 48):
-        load = pressure * PERIOD * PERIOD / cells
-        found, steps = settled(wave(cells), material, speed, load, periods=8)
-        exact = WAVE**2 * AMPLITUDE**2 * lost.imag / (4 * pressure)
-        errors.append(force(found, steps[-1]) / load / exact - 1)
-    assert abs(errors[1]) < 3e-3
-    assert errors[0] / errors[1] == pytest.approx(4, rel=0.1)
 
 
 def test_soft_body__slides_by_the_two_step_rule():
@@ -183,20 +160,6 @@ def test_force_across__of_an_oblique_wave_in_full_contact_is_that_along_by_its_d
             assert sideways == pytest.approx(across * force(found, step), rel=1e-9)
 
 
-@pytest.mark.parametrize("direction", ["-x", "y", pytest.param("-y", marks=pytest.mark.long)])
-def test_turned_surface__slides_as_well_in_the_turned_direction(direction):
-    height, material = rough((30, 24)), rubber()
-
-    def slid(height, direction):
-        program = rv.Program().load(2e-3, over=0).slide(0.4e-3, speed=0.1, direction=direction)
-        found = scene(height, material, program, tolerance=1e-6)
-        last = list(march(found))[-1]
-        return force(found, last) / 2e-3, last.point.approach
-
-    turned = {"-x": height[::-1], "y": height.T, "-y": height.T[:, ::-1]}[direction]
-    assert slid(turned, direction) == pytest.approx(slid(height, "x"), rel=1e-5)
-
-
 def test_held_approach__keeps_it_and_finds_the_force():
     program = rv.Program().load(2e-3, over=0).hold(1e-3, control="approach").slide(PERIOD, speed=0.1)
     found = scene(rough((36, 30)), rubber(), program, times=None)
@@ -221,17 +184,10 @@ def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():
     )
     found = scene(rough((20, 21)), rubber(), program, times=(1e-3, 2e-3, program.duration))
     whole = list(march(found))
-    for at in [number for number, step in enumerate(whole[:-1]) if step.is_end][1::3]:
+    for at in [number for number, step in enumerate(whole[:-1]) if step.is_end][2::7]:
         again = list(march(found, whole[at].state))
         assert len(again) == len(whole) - at - 1
         assert [step.point.time for step in again] == [step.point.time for step in whole[at + 1 :]]
         np.testing.assert_array_equal(again[-1].point.history.modes, whole[-1].point.history.modes)
         assert again[-1].state.distance == whole[-1].state.distance
         assert again[-1].difference == whole[-1].difference
-
-
-def test_slide__is_of_whole_cells():
-    assert Slide(1.04e-3).cells((1e-4, 1.0)) == 10
-    assert Slide(1.05e-3, "-y").cells((1.0, 1e-4)) == 11
-    with refused("slide", 4e-5):
-        Slide(4e-5).cells((1e-4, 1e-4))

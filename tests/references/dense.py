@@ -1,9 +1,4 @@
-"""Steady sliding of line contacts by dense matrices and active sets: the oracle of the iterative solver.
-
-``PYTHONPATH=tests python -m references.dense 256 512`` prints stated over true errors.
-"""
-
-import sys
+"""Line contacts by dense matrices and active sets: steady sliding, and one instant of a history."""
 
 import numpy as np
 
@@ -117,34 +112,3 @@ def strong_errors(height, ratio, load, speeds, tolerance, exact=None):
         error = np.abs(found.pressure[:, 0] - pressure).sum() / pressure.sum()
         rows.append((error, found.residual, found.converged, found.iterations))
     return np.array(rows)
-
-
-def main():
-    print("| cells | moduli | tolerance | error / tolerance | stated / true | iterations |")
-    print("|---|---|---|---|---|---|")
-    speeds = np.geomspace(1e-4, 10, 10)
-    for cells in map(int, sys.argv[1:]):
-        for ratio in (3.0, 30.0, 300.0, 3000.0):
-            scenes = [
-                (height, load, dense_speeds(height, ratio, load, speeds))
-                for height in line_profiles(cells).values()
-                for load in (3e-6, 1e-4)
-            ]
-            for tolerance in (1e-2, 1e-3, 1e-4):
-                rows = np.concatenate(
-                    [strong_errors(height, ratio, load, speeds, tolerance, exact) for height, load, exact in scenes]
-                )
-                errors, stated, converged, iterations = rows.T
-                assert converged.all()
-                large = errors > tolerance / 50
-                part = stated[large] / errors[large]
-                print(
-                    f"| {cells} | {ratio:g} | {tolerance:g} | {np.max(errors) / tolerance:.2f} "
-                    f"| {part.min():.2f} to {part.max():.2f} ({large.sum()} of {len(rows)}) "
-                    f"| {np.median(iterations):.0f}, at most {iterations.max():.0f} |",
-                    flush=True,
-                )
-
-
-if __name__ == "__main__":
-    main()

@@ -98,17 +98,6 @@ def test_full_contact__is_the_fourier_series(shape, roughness):
     assert state.approach == pytest.approx(gap.mean(), rel=1e-12, abs=1e-14)
 
 
-def test_absent_cells__carry_nothing():
-    shape = (41, 40)
-    x, y = np.indices(shape)
-    present = np.hypot(x - 20, y - 19.5) < 12
-    operator, gap = Grid(shape, (0.5, 0.5)), np.where(present, 0.0, np.nan)
-    by_load = solve_contact(operator, gap, load=20.0, present=present, tolerance=1e-8)
-    check_optimal(operator, np.where(present, 0.0, 9.0), by_load, 1e-7, present)
-    by_approach = solve_contact(operator, gap, approach=by_load.approach, present=present, tolerance=1e-8)
-    assert by_approach.load == pytest.approx(20.0, rel=1e-8)
-
-
 # ------------------------------------------------------------------------------------------------------ optimality
 
 
