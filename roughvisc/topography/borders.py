@@ -115,12 +115,13 @@ def recipe_name(h: xr.DataArray) -> str:
 
 def is_mirrored(height: NDArray[np.float64]) -> bool:
     """Return whether a surface equals its mirror images along x and y; the numbers of cells must be even."""
-    if height.shape[0] % 2 or height.shape[1] % 2:
+    nx, ny = (n // 2 for n in height.shape)
+    if height.shape != (2 * nx, 2 * ny):
         return False
-    allowed = _ROUNDING * np.nanmax(np.abs(height))
+    allowed = _ROUNDING * max(np.nanmax(height), -np.nanmin(height))
     return all(
-        np.allclose(half, image, rtol=0, atol=allowed, equal_nan=True)
-        for half, image in ((height, height[::-1]), (height, height[:, ::-1]))
+        bool((np.abs(half - image) <= allowed).all() or np.allclose(half, image, 0, allowed, equal_nan=True))
+        for half, image in ((height[:nx], height[: nx - 1 : -1]), (height[:, :ny], height[:, : ny - 1 : -1]))
     )
 
 
