@@ -82,9 +82,8 @@ _STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
 _MOST_CONVOLUTIONS, _MOST_STEPS = 2500, 500
 #: Largest number of speeds of a coarse friction curve, spread evenly over the speeds of the case.
 _FEW_SPEEDS = 7
-#: Steps of a ramp, of a hold and of an eighth of a cycle, for comparison with the steps of a slide, one per cell; first
-#: step of a hold over the length of the hold, after which steps grow in proportion to the time.
-_SEGMENT, _FIRST_STEP = 30.0, 0.005
+#: First step of a hold over the length of the hold. Later steps grow in proportion to the time.
+_FIRST_STEP = 0.005
 #: Iterations of a timed solve.
 _ITERATIONS = 3
 #: Time for the coarse runs of a sweep: this time, or this part of the expected time of all cases. [s, 1]
@@ -241,29 +240,31 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         chosen = np.unique(np.linspace(0, speeds.size - 1, min(_FEW_SPEEDS, speeds.size)).astype(int))
         experiment, share = replace(experiment, speeds=speeds[chosen]), chosen.size / speeds.size
 
-    still, moving = np.zeros(2), np.zeros(2)  # steps and convolutions, outside of slides and in them
+    still, slid = np.zeros(2), list[float]()  # steps and convolutions, and convolutions of each step of a slide
     kept, contact, largest, force, before = 0, list[float](), 0.0, 0.0, 0.0
     with fft.set_workers(1):
         rows = experiment.rows(Problem(few, case.body, settings))
         began = time.thread_time()
         for row in rows:
-            tally, total = still, before  # inside a pair of steps: its convolutions are counted at its end
+            slides, total = False, before  # inside a pair of steps: its convolutions are counted at its end
             if program is None:
                 total += row.values["convolutions"]
             else:
-                if program.segments[max(bisect_left(program.corners, row.at) - 1, 0)].slide is not None:
-                    tally = moving
+                slides = program.segments[max(bisect_left(program.corners, row.at) - 1, 0)].slide is not None
                 if row.state is not None:
                     total = row.state.march.convolutions
-            tally += 1.0, total - before
+            if slides:
+                slid.append(total - before)
+            else:
+                still += 1.0, total - before
             before, kept = total, kept + bool(row.values and row.kept)
             if row.values:
                 fraction = float(np.nan_to_num(row.values["contact_fraction"]))
                 largest, force = max(largest, fraction), float(np.fmax(force, row.values["force"]))
-                if row.kept or tally is moving:  # corners alone do not represent the kept times of a slide
+                if row.kept or slides:  # corners alone do not represent the kept times of a slide
                     contact.append(fraction)
-            if program is not None and (total > _MOST_CONVOLUTIONS or still[0] + moving[0] > _MOST_STEPS):
-                share = _part_done(program, row.at, spacing(few))
+            if program is not None and (total > _MOST_CONVOLUTIONS or still[0] + len(slid) > _MOST_STEPS):
+                share = _part_done(program, row.at)
                 rest = sum(one.duration for one in program.segments if one.slide is None)
                 compliance = case.body.material.contact_compliance
                 now, end = (float(compliance(one)) for one in (min(row.at, rest), rest))
@@ -275,9 +276,13 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
             touching = float(np.mean([*contact, largest]))
             beyond = max(timed_convolution(own, touching) - timed_convolution(rows, touching), 0.0)
 
-    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(still[0] + moving[0], 1.0)
-    still, moving = still / share, moving / share
+    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(still[0] + len(slid), 1.0)
+    rate = float(np.mean(slid[len(slid) // 2 :])) if slid else still[1] / max(still[0], 1.0)
+    still /= share
     if isinstance(own, LoadingRows):
+        cells = sum(one.slide.cells(spacing(few)) for one in own.scene.program.segments if one.slide is not None)
+        left = max(cells - len(slid), 0)  # the first steps of a slide take the most convolutions
+        moving = np.array([len(slid) + left, sum(slid) + left * rate])
         growth = np.array([0.0 if own.scene.time_step else _STEPS_GROW, _WORK_GROWS])
         steps, work = (still * 2.0 ** (octaves * growth) + moving * 2.0**octaves).tolist()
         dearer = work + steps * (_STEP + _EXPONENTIAL * own.scene.memory.times.size)
@@ -337,20 +342,21 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
     return height.isel(x=slice(stride // 2, None, stride), y=slice(stride // 2, None, stride))
 
 
-def _part_done(program: Program, now: float, sides: tuple[float, float]) -> float:
-    """Return the part of the steps before a time [s] over all steps of a program, on cells with these sides [m]. [-]"""
+def _part_done(program: Program, now: float) -> float:
+    """Return the part of the steps before a time [s] over all steps of a program, without slides. [-]
+
+    The steps of a hold are shorter at its start, and a cycle has eight ramps per period.
+    """
     done = total = 0.0
     for began, segment in zip(program.corners, program.segments, strict=False):
-        if segment.duration == 0:
+        if segment.slide is not None or segment.duration == 0:
             continue
-        part, steps = min(max(now - began, 0.0) / segment.duration, 1.0), _SEGMENT
-        if segment.slide is not None:
-            steps = segment.slide.distance / sides[segment.slide.axis]
-        elif segment.amplitude:
-            steps *= 8 * segment.duration / segment.period
+        part, weight = min(max(now - began, 0.0) / segment.duration, 1.0), 1.0
+        if segment.amplitude:
+            weight = 8 * segment.duration / segment.period
         elif segment.holds:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
-        done, total = done + part * steps, total + steps
+        done, total = done + part * weight, total + weight
     return max(done / total, 1e-6) if total else 1.0
 
 
