@@ -124,10 +124,7 @@ def existing_file(where: str, file: Any, folder: Path | None) -> str:
         return str(file)
     path = (folder / Path(file).expanduser()).resolve()
     if not path.is_file():
-        problem = "is a folder" if path.is_dir() else "does not exist"
-        expected = f"a file ({path})"
-        message = f"{where}: found {str(file)!r}, which {problem}: expected {expected}"
-        raise InputError(message, key=where, found=file, expected=expected)
+        raise InputError(key=where, found=file, expected=f"an existing file, but there is none at {path}")
     return str(path)
 
 
@@ -195,11 +192,8 @@ def speeds_of(where: str, stated: Any) -> list[float]:
         return sorted({number(one, "m/s", where) for one in listed})
     table = dict(stated)
     refuse_unknown(where, table, ("from", "to", "count"))
-    for key in ("from", "to", "count"):
-        if key not in table:
-            raise InputError(f"{where}.{key}: missing: expected from, to and count", key=f"{where}.{key}")
-    first, last = (number(table[key], "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
-    count = table["count"]
+    first, last = (number(table.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
+    count = table.get("count")
     if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= _MOST_SPEEDS:
         raise InputError(key=f"{where}.count", found=count, expected=f"a whole number from 2 to {_MOST_SPEEDS}")
     if not first < last:
@@ -261,9 +255,8 @@ def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     material = call(MODELS[model], where, arguments)
     factor = shift_factor(thermal, where)
     material = material if factor == 1 else shift(material, factor)
-    if scaling.get("modulus_factor", 1) == 1:
-        return material
-    return stiffened(material, number(scaling["modulus_factor"], "1", f"{where}.modulus_factor", above=0))
+    stiffer = number(scaling.get("modulus_factor", 1), "1", f"{where}.modulus_factor", above=0)
+    return material if stiffer == 1 else stiffened(material, stiffer)
 
 
 def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
@@ -347,7 +340,8 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Sett
     times, late = settings.times, ()
     if isinstance(experiment, Loading) and isinstance(times, tuple):
         end = experiment.program.duration * (1 + _ROUNDING)
-        late, times = (tuple(time for time in times if (time > end) is is_late) for is_late in (True, False))
+        late = tuple(time for time in times if time > end)
+        times = times[: len(times) - len(late)]
         if late and not times:
             raise InputError(key="keep.times", found=list(late), expected="a time up to the end of the program")
     settings = replace(settings, boundary=boundary, times=times)

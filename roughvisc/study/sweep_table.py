@@ -205,24 +205,19 @@ def place(tables: Any, key: str, value: Any, above: str = "") -> Any:
     {'program': [{'load': 2}]}
     """
     part, _, below = key.partition(".")
-    whole = dotted(above, key)
-    at: Any = part
-    if isinstance(tables, list):
-        if not part.isdecimal() or int(part) >= len(tables):
-            message = f"{whole}: found {part!r}: {above} has entries 0 to {len(tables) - 1}"
-            raise InputError(message, key=whole, found=value, expected=f"an entry of {above}")
-        at, changed = int(part), list(tables)
-    elif isinstance(tables, Mapping):
-        changed = dict(tables)
-        if value is None and not below:
-            changed.pop(part, None)
-            return changed
-    else:
-        message = f"{whole}: {above} is {short_repr(tables)}, which has no keys"
-        raise InputError(message, key=whole, found=value, expected=f"a table {above}")
-    inner = changed[at] if isinstance(tables, list) else changed.get(part, {})
-    changed[at] = place(inner, below, value, dotted(above, part)) if below else value
-    return changed
+
+    def changed(inner: Any) -> Any:
+        return place(inner, below, value, dotted(above, part)) if below else value
+
+    if isinstance(tables, Mapping):
+        entries = {**tables, part: changed(tables.get(part, {}))}
+        return {name: one for name, one in entries.items() if one is not None}
+    if isinstance(tables, list) and part.isdecimal() and int(part) < len(tables):
+        at = int(part)
+        return [*tables[:at], changed(tables[at]), *tables[at + 1 :]]
+    whole, expected = dotted(above, key), f"an entry or a key of {above}"
+    message = f"{whole}: {above} is {short_repr(tables)}, which has no {part!r}: expected {expected}"
+    raise InputError(message, key=whole, found=value, expected=expected)
 
 
 def value_at(tables: Any, key: str, default: Any) -> Any:
