@@ -24,7 +24,7 @@ from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
-from roughvisc.variables import STEPPED, VARIABLES
+from roughvisc.variables import STEP, STEPPED, VARIABLES
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
@@ -227,26 +227,29 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     if not len(steps) or not steps["kept"].any():
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     kept = steps[steps["kept"]].sort_values("place", kind="stable")
-    dataset = xr.Dataset.from_dataframe(kept.drop(columns=["kept", "place"]).set_index(axis))
-    dataset = dataset.assign_coords(x=height["x"].values, y=height["y"].values)
+    attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
+    variables: dict[str, Any] = {
+        name: (axis, kept[name].to_numpy()) for name in kept if name not in ("kept", "place", axis)
+    }
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
-        dataset[name] = (axis, "x", "y"), field
-    dataset["height"] = ("x", "y"), np.asarray(height.values, dtype=float), {"highest": highest(height)}
-    for name in _ORIGIN:
-        if name in height.attrs:
-            dataset["height"].attrs[name] = height.attrs[name]
+        variables[name] = (axis, "x", "y"), field
+    variables["height"] = ("x", "y"), np.asarray(height.values, dtype=float), attributes
     if "filled" in height.coords:
-        dataset["filled"] = ("x", "y"), height["filled"].values
-    dataset.attrs = {
-        "Conventions": "CF-1.11",
-        "boundary": settings.boundary,
-        "tolerance": settings.tolerance,
-        "history": str(height.attrs.get("history", "")),
-    }
+        variables["filled"] = ("x", "y"), height["filled"].values
+    dataset = xr.Dataset(
+        variables,
+        {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values},
+        {
+            "Conventions": "CF-1.11",
+            "boundary": settings.boundary,
+            "tolerance": settings.tolerance,
+            "history": str(height.attrs.get("history", "")),
+        },
+    )
     dataset = rows.finish(dataset)
     if axis != "time":
         return dataset
-    stepped = steps.set_index("time")[pd.Index(STEPPED).intersection(steps.columns)]
-    histories = label(xr.Dataset.from_dataframe(stepped)).assign_attrs(title=TITLE)
-    return with_steps(dataset, histories.drop_indexes("time").rename_dims(time="step"))
+    stepped = {name: (STEP, steps[name].to_numpy()) for name in STEPPED if name in steps and name != "time"}
+    histories = label(xr.Dataset(stepped, {"time": (STEP, steps["time"].to_numpy())}, {"title": TITLE}))
+    return with_steps(dataset, histories)
