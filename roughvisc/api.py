@@ -187,7 +187,7 @@ def friction(
     Returns
     -------
     xarray.Dataset
-        Variables over ``speed``, in the given order, as declared in :data:`roughvisc.variables.sliding.VARIABLES`.
+        Variables over ``speed``, in the given order, as declared in :data:`roughvisc.variables.VARIABLES`.
 
     Raises
     ------
