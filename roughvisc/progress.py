@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from importlib.util import find_spec
 
 from rich.console import Console
@@ -19,11 +18,6 @@ from roughvisc.errors import printable
 LINE_EVERY = 10.0
 #: Time from which the speed of a computation is estimated. [s]
 _RECENT = 600.0
-
-
-def time_reached(now: float, end: float) -> str:
-    """Describe the progress of a program; both times in seconds."""
-    return f"t = {now:.3g} of {end:.3g} s"
 
 
 class Bars(Progress):
@@ -60,14 +54,6 @@ class Bars(Progress):
                 self._labels[label] = self.add_task(printable(label), at="")
             self.update(self._labels[label], completed=now, total=end or None, at=at or "starting")
 
-    def only(self, label: str, now: float, end: float, at: str = "") -> None:
-        """Move the bar of a measurement, and close the bars of earlier measurements."""
-        for other in [other for other in self._labels if other != label]:
-            self.close(other)
-        if label not in self._labels and self.disable:
-            self.say(f"measuring {label}")
-        self.reached(label, now, end, at)
-
     def close(self, label: str) -> None:
         """Remove the bar of a computation, if there is one."""
         with self._moving:
@@ -89,37 +75,26 @@ class Bars(Progress):
 
 @contextmanager
 def reporting(
-    progress: bool | Callable[..., None],
-    label: str = "",
-    console: Console | None = None,
-    at: Callable[[float, float], str] = time_reached,
-) -> Iterator[Callable[..., None]]:
+    label: str, at: Callable[[float, float], str], console: Console | None = None
+) -> Iterator[Callable[[float, float], None]]:
     """Yield ``report(now, end)``, which moves a progress bar; the bar closes at the end of the block.
 
     Parameters
     ----------
-    progress : bool or callable
-        Whether to draw a bar; or a function that takes the place of ``report``.
     label : str
-        Name of the computation. Default: each report begins with a label, ``report(label, now, end)``.
-    console : rich.console.Console, optional
-        Default: the standard error.
+        Name of the computation.
     at : callable
         Description of ``(now, end)``.
+    console : rich.console.Console, optional
+        Default: the standard error.
     """
-    if callable(progress):
-        yield progress
-        return
-    if not progress:
-        yield lambda *_: None
-        return
     with Bars(console) as bars:
 
-        def report(move: Callable[..., None], name: str, now: float, end: float) -> None:
-            move(name, now, end, at(now, end) if end else "")
-            bars.line(name)
+        def report(now: float, end: float) -> None:
+            bars.reached(label, now, end, at(now, end) if end else "")
+            bars.line(label)
 
-        yield partial(report, bars.reached, label) if label else partial(report, bars.only)
+        yield report
 
 
 def clock(seconds: float) -> str:

@@ -153,7 +153,7 @@ def solve(
                 from roughvisc.progress import reporting  # slow to import
 
                 doing = "pressing" if experiment.axis == "time" else "sliding"
-                report = bar.enter_context(reporting(True, doing, at=experiment.progress))
+                report = bar.enter_context(reporting(doing, experiment.progress))
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         for subject, text in warnings_of(dataset.attrs).items():
             if subject not in (*ISSUED, "accuracy"):

@@ -36,7 +36,7 @@ def test_time_left__follows_the_pace(pace, shown):
 def test_quiet__shows_nothing(shown):
     for terminal in (False, True):
         console = shown(terminal, quiet=True)
-        with reporting(True, "pressing", console) as report:
+        with reporting("pressing", "{} of {}".format, console) as report:
             report(0.5, 2.0)
         assert console.file.getvalue() == ""
 

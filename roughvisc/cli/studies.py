@@ -144,7 +144,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
 
     path = result_path(folder, case.key)
     if not is_result_of(case, path):
-        with reporting(True, label, console, case.experiment.progress) as report:
+        with reporting(label, case.experiment.progress, console) as report:
             run_case(case, folder, progress=report, threads=threads or threads_each(1))
     else:
         say(console, "Already finished: nothing to compute")

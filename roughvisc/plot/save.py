@@ -197,7 +197,7 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: 
     if method == "forkserver":
         context.set_forkserver_preload([__name__])
     with (
-        reporting(True, label, at=lambda done, count: f"{done:.0f} of {count:.0f} cases") as report,
+        reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report,
         ProcessPoolExecutor(max(processes, 1), mp_context=context) as pool,
     ):
         results = []
