@@ -12,9 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.cli.tables import readable, two_columns
-from roughvisc.experiment.resources import amount, byte_unit
-from roughvisc.units import unit_for
+from roughvisc.experiment.resources import amount
 
+#: Costs of each case of a sweep.
+_COSTS = ("steps", "convolutions", "wall_time", "memory", "disk")
 #: Largest number of cases that a plan lists one by one.
 _LISTED = 20
 
@@ -74,7 +75,7 @@ def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
 
 
 def _case_table(costs: xr.Dataset, total: int) -> Table:
-    """Return the settings and costs of each case; every column has one unit, in its heading.
+    """Return the settings and costs of each case.
 
     Parameters
     ----------
@@ -84,34 +85,25 @@ def _case_table(costs: xr.Dataset, total: int) -> Table:
         Number of all cases.
     """
     varied = [str(name) for name in costs.coords if name != "case_key"]
-    refused, copied = costs["refusal"].values != "", ~costs["marched"].values
     last = [key.rpartition(".")[2] for key in varied]
-    names = [name if last.count(name) == 1 else key for name, key in zip(last, varied, strict=True)]
-    columns = [_column(costs[key], name.replace("_", " "), 6) for key, name in zip(varied, names, strict=True)]
-    for name in ("steps", "convolutions"):
-        columns.append((name, [f"{value:.0f}" for value in costs[name].values]))
-    columns += [_column(costs[name], name.replace("_", " "), 3) for name in ("wall_time", "memory", "disk")]
     table = Table(box=None, pad_edge=False)
-    for heading, _ in columns:
-        table.add_column(Text(heading), justify="right", overflow="fold")
+    for name, short in zip([*varied, *_COSTS], [*last, *_COSTS], strict=True):
+        heading = short if last.count(short) <= 1 else name
+        table.add_column(Text(heading.replace("_", " ")), justify="right", overflow="fold")
     for i in range(costs.sizes["case"]):
-        cells = [text[i] for _, text in columns]
-        counted = [("~" if copied[i] else "") + cell for cell in cells[len(varied) :]]
-        table.add_row(*map(Text, cells[: len(varied)]), *(["cannot run"] if refused[i] else counted))
+        row = costs.isel(case=i)
+        mark = "" if row["marched"] else "~"
+        cells = ["cannot run"] if row["refusal"] != "" else [mark + _text(row[name]) for name in _COSTS]
+        table.add_row(*(Text(_text(row[key])) for key in varied), *cells)
     if total > _LISTED:
         table.add_row(f"and {total - _LISTED} more")
     return table
 
 
-def _column(values: xr.DataArray, name: str, digits: int) -> tuple[str, list[str]]:
-    """Return a heading with a unit that suits all values, and the values in this unit; texts stay unchanged."""
-    if values.dtype.kind not in "iuf":
-        return name, [str(value) for value in values.values]
-    known = values.values[np.isfinite(values.values)]
-    if values.attrs.get("units") == "byte":
-        factor, symbol = byte_unit(float(known.max(initial=0.0)))
-    else:
-        unit = unit_for(known, str(values.attrs.get("units", "")))
-        factor, symbol = unit.factor, unit.symbol
-    cells = ["half-space" if value == math.inf else f"{value / factor:.{digits}g}" for value in values.values]
-    return (f"{name}\n[{symbol}]" if symbol else name), cells
+def _text(value: xr.DataArray) -> str:
+    """Return a value with a suitable unit."""
+    if value.dtype.kind not in "iuf":
+        return str(value.values)
+    if value.attrs.get("units") == "byte":
+        return amount(float(value))
+    return "half-space" if value == math.inf else readable(float(value), str(value.attrs.get("units", "")))

@@ -284,10 +284,5 @@ def amount(size: float) -> str:
     >>> amount(2.13e9), amount(350e6), amount(-1)
     ('2.1 GB', '350 MB', '0 kB')
     """
-    factor, unit = byte_unit(size)
+    factor, unit = next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if size >= one[0]), (1e3, "kB"))
     return f"{float(f'{max(size, 0) / factor:.2g}'):g} {unit}"
-
-
-def byte_unit(size: float) -> tuple[float, str]:
-    """Return the unit that suits a number of bytes: its size in bytes, and its symbol."""
-    return next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if size >= one[0]), (1e3, "kB"))
