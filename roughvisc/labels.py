@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.variables import ERRORS, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,13 +90,6 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
 def warnings_text(warnings: Mapping[str, str]) -> str:
     """Return the text of the attribute ``warnings``, with one line per warning; empty warnings are left out."""
     return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
-
-
-def own_rows(case: xr.Dataset) -> xr.Dataset:
-    """Return one case of a sweep over its own times or speeds, without the missing rows at the end."""
-    if ROW not in case.dims:
-        return case
-    return case.isel({ROW: slice(int(case[ROWS]))}).swap_dims({ROW: axis_of(case.variables)})
 
 
 def expect_history(dataset: xr.Dataset) -> None:

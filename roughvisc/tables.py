@@ -191,8 +191,9 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     """
     path = Path(path)
     separator, rows = _rows(path)
-    above = next((at for at, (_, cells) in enumerate(rows[:_FIRST]) if _has(cells, wanted)), None)
-    if above is None:
+    needed = [one.name for one in wanted.values() if not one.optional]
+    headings = (at for at, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
+    if (above := next(headings, None)) is None:
         raise _no_heading(path, rows, separator, wanted)
     (line, heading), below = rows[above], rows[above + 1 :]
     if not below:
@@ -232,8 +233,8 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
     if not lines:
         return ",", []
     last = lines[-1][1]  # a row of numbers; the first lines may belong to no table
-    if len(_split(last)) > 1 and all(map(_BETWEEN_BLANKS.fullmatch, _split(last))):
-        return " ", [(i, _between_blanks(line)) for i, line in lines]
+    if len(_between_blanks(last)) > 1:
+        return " ", [(i, _between_blanks(line) or _HEADING_BETWEEN_BLANKS.findall(line)) for i, line in lines]
     separator = next((sign for sign in ";\t," if sign in last), ",")
     rows = []
     for i, line in lines:
@@ -246,13 +247,9 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
 
 
 def _between_blanks(line: str) -> list[str]:
-    cells = _split(line)
-    return cells if all(map(_BETWEEN_BLANKS.fullmatch, cells)) else _HEADING_BETWEEN_BLANKS.findall(line)
-
-
-def _split(line: str) -> list[str]:
-    """Split a line at blanks and tabs; a no-break space groups the digits of a number and does not separate."""
-    return re.split(r"[ \t]+", line.strip(" \t"))
+    """Split a row of numbers at blanks and tabs, but not at no-break blanks; return nothing for any other line."""
+    cells = re.split(r"[ \t]+", line.strip(" \t"))
+    return cells if all(map(_BETWEEN_BLANKS.fullmatch, cells)) else []
 
 
 def _places(heading: Sequence[str], name: str) -> list[int]:
@@ -260,10 +257,6 @@ def _places(heading: Sequence[str], name: str) -> list[int]:
     cells, plain = [_plain(cell) for cell in heading], _plain(name_and_unit(name)[0])
     exact = [at for at, cell in enumerate(cells) if cell == _plain(name)]
     return exact or [at for at, cell in enumerate(cells) if name_and_unit(cell)[0] == plain]
-
-
-def _has(cells: Sequence[str], wanted: Mapping[str, Wanted]) -> bool:
-    return all(one.optional or _places(cells, one.name) for one in wanted.values())
 
 
 def _plain(name: str) -> str:

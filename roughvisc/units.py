@@ -267,7 +267,8 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
 
     expected = _registry().Unit("" if dimensionless else unit)
     try:
-        names = _registry().parse_units_as_container(_for_pint(found))
+        known = "percent" if found == "%" else found.replace("·", "*")
+        names = _registry().parse_units_as_container(f"1{known}" if known.startswith("/") else known)
         given = _registry().Unit(names)
         same_kind = given.dimensionality == expected.dimensionality
         converted, begins = (
@@ -283,13 +284,6 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
     if difference and begins:
         raise ValueError(f"a temperature and not a difference of temperatures (such as {f'{value:g} K'!r})")
     return float(f"{converted:.15g}")
-
-
-def _for_pint(unit: str) -> str:
-    """Return a unit in the notation of pint."""
-    if unit.startswith("/"):
-        return f"1{unit}"
-    return "percent" if unit == "%" else unit.replace("·", "*")
 
 
 def _prefixed(number: str, found: str, unit: str) -> float | None:

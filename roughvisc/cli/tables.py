@@ -131,13 +131,18 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     """
     sides = spacing(height)
     counts = [height.sizes[axis] for axis in ("x", "y")]
+    listed = []
+    for number, one in enumerate(channels if len(channels) > 1 else ()):
+        kind = f"height in {one.unit}" if one.unit else "height without a unit"
+        shape = " x ".join(map(str, one.shape))
+        listed.append((f"Channel {number}", f"{one.name}: {kind if one.is_height else one.kind}, {shape} points"))
     missing, filled = int(height.isnull().sum()), int(height.attrs.get("filled_points", 0))
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
         ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
         ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
-        *(_channel_row(i, one) for i, one in enumerate(channels if len(channels) > 1 else ())),
+        *listed,
         ("Orientation", str(height.attrs.get("orientation", ""))),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),
@@ -157,13 +162,6 @@ def findings_table(found: Inspection) -> Group:
     """Return the findings in a scan, each with its recommendation."""
     rows = [(one.name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for one in found.findings.values()]
     return two_columns(rows, "Findings and recommendations")
-
-
-def _channel_row(index: int, channel: Any) -> tuple[str, str]:
-    kind = f"height in {channel.unit}" if channel.unit else "height without a unit"
-    shape = " x ".join(map(str, channel.shape))
-    described = f"{channel.name}: {kind if channel.is_height else channel.kind}, {shape} points"
-    return f"Channel {index}", described
 
 
 def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
