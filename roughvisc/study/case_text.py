@@ -69,16 +69,13 @@ def names_of(keys: Sequence[str]) -> dict[str, str]:
     >>> names_of(["program.0.load", "program.2.load"])["program.2.load"]
     'Load (program.2)'
     """
-    last = {key: _last_word(key) for key in keys}
+    last = {}
+    for key in keys:
+        above, _, word = key.rpartition(".")
+        last[key] = f"{above.rpartition('.')[2]} {word}".strip() if word.isdecimal() else word
     counts = Counter(last.values())
     names = {key: f"{name} ({key.rpartition('.')[0]})" if counts[name] > 1 else name for key, name in last.items()}
     return {key: (name[:1].upper() + name[1:]).replace("_", " ") for key, name in names.items()}
-
-
-def _last_word(key: str) -> str:
-    """Return the last part of a dotted key; if this is a number, also the part before."""
-    parts = key.split(".")
-    return " ".join(parts[-2:]) if parts[-1].isdecimal() and len(parts) > 1 else parts[-1]
 
 
 def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
@@ -132,13 +129,11 @@ def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """
     stems = {}
     for key, case in cases.items():
-        texts = varied_texts(case)
-        counts = Counter(map(_last_word, texts))
-        parts = []
+        texts, parts = varied_texts(case), []
+        names = names_of(list(texts))
         for dotted, text in texts.items():
-            name = _last_word(dotted) if counts[_last_word(dotted)] == 1 else dotted
             value = PurePath(text).stem if dotted.rpartition(".")[2] == "file" else text
-            parts.append(f"{_safe(name)}_{_safe(value)}")
+            parts.append(f"{_safe(names[dotted].lower())}_{_safe(value)}")
         stem = "-".join(parts)
         stems[key] = (stem if len(stem) <= _LONGEST else f"{stem[: _LONGEST - _KEY - 1]}-{key[:_KEY]}") or key
     counts = Counter(stem.casefold() for stem in stems.values())

@@ -39,7 +39,7 @@ def test_file_stems__are_safe_and_tell_cases_apart():
     assert stems["d" * 16] == "load_5MN-dddddddd"
     assert stems["e" * 16] == "file_a-eeeeeeee"
     assert stems["2" * 16] == "2" * 16
-    assert stems["3" * 16] == "program.0.load_1N-program.2.load_2N"
+    assert stems["3" * 16] == "load_program.0_1N-load_program.2_2N"
     assert len({stem.casefold() for stem in stems.values()}) == len(cases)
     assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,89}", stem) for stem in stems.values()), stems
     alone = file_stems({"a" * 16: cases["a" * 16]})
