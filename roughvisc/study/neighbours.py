@@ -78,7 +78,7 @@ def shortest_wave(height: xr.DataArray) -> float:
     The grid resolves waves shorter than two cells along its diagonals only.
     """
     level = height.values - float(height.mean())
-    q_x, q_y, power, count = modes(level, spacing(height), "forward")
+    q_x, q_y, power, count = modes(level, spacing(height))
     q = np.hypot(q_x, q_y)
     begins = last_octave(q, count * power * q**2)
     return max(math.pi / begins, 2 * max(spacing(height))) if begins else 0.0

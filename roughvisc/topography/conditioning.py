@@ -14,25 +14,10 @@ import xarray as xr
 from roughvisc.arguments import DataNeeded, a_table, call, dotted, located, refuse_unknown
 from roughvisc.errors import InputError
 from roughvisc.topography.bandwidth import gaussian_filter, level
-from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
+from roughvisc.topography.framing import crop, invert, rotate90
 from roughvisc.topography.missing_points import fill, mask_outliers
 from roughvisc.topography.resampling import resample, without_short_waves
 from roughvisc.topography.surrogates import surrogate
-
-__all__ = [
-    "combine",
-    "condition",
-    "crop",
-    "fill",
-    "gaussian_filter",
-    "invert",
-    "level",
-    "mask_outliers",
-    "mirror",
-    "resample",
-    "rotate90",
-    "without_short_waves",
-]
 
 
 class Step(NamedTuple):

@@ -273,10 +273,10 @@ def require_heights(h: xr.DataArray, step: str) -> None:
         raise InputError(f"{step}: all {h.size} points are missing: expected at least one height")
 
 
-def require_complete(h: xr.DataArray, step: str, wanted: str = "none (see fill)") -> None:
+def require_complete(h: xr.DataArray, step: str) -> None:
     """Refuse a grid with missing points."""
     if missing := int(h.size - np.isfinite(h.values).sum()):
-        raise InputError(f"{step}: {missing} points are missing: expected {wanted}")
+        raise InputError(f"{step}: {missing} points are missing: expected none (see fill)")
 
 
 def pair(name: str, value: Any) -> tuple[float, float]:

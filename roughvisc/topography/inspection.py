@@ -10,10 +10,12 @@ import numpy as np
 import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
+from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.borders import border_mismatch
-from roughvisc.topography.conditioning import STEPS, crop, fill, gaussian_filter, level, mask_outliers
+from roughvisc.topography.conditioning import STEPS
+from roughvisc.topography.framing import crop
 from roughvisc.topography.grid import cell_edges, checked, filled_points, nominal_area, spacing
-from roughvisc.topography.missing_points import in_large_holes
+from roughvisc.topography.missing_points import fill, in_large_holes, mask_outliers
 from roughvisc.topography.parameters import parameters
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for

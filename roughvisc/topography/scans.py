@@ -17,10 +17,11 @@ import xarray as xr
 from roughvisc.arguments import NoData, call, check, check_keys, dotted, one_key, one_of, split
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, combine, condition
+from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
+from roughvisc.topography.framing import combine
 from roughvisc.topography.readers import existing, finite, read_file, sha256
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
-from roughvisc.units import Quantity, in_si, quantities
+from roughvisc.units import Quantity, quantities
 
 #: Keys of a card that do not affect the heights.
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
@@ -80,7 +81,8 @@ def open_scan(
     ------
     InputError
         If the file is absent, damaged, of an unknown format, not an areal height scan, without unit or size, or
-        implausible: wider than 1 m, cells below 10 pm, heights beyond 1 m; or if points lie on no lattice.
+        implausible: wider than 1 m, cells below 10 pm, heights beyond 1 m; or if points lie on no lattice. For a card
+        also if it is not TOML, has unknown or missing keys or wrong values, or the checksum of its file differs.
 
     Warns
     -----
@@ -95,37 +97,10 @@ def open_scan(
         return read_file(path, format=format, **options)
     if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
         raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
-    h = open_card(path)
-    finite(h, str(path))
-    return h
-
-
-def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
-    """Return the heights that a surface card describes. [m]
-
-    Parameters
-    ----------
-    path : Path
-        The card; its ``file`` is relative to the card's folder.
-    conditioned : bool
-        Whether to condition the heights.
-
-    Returns
-    -------
-    xarray.DataArray
-        Height, with the card's title, description, licence and source among the attributes. [m]
-
-    Raises
-    ------
-    InputError
-        If the card is not TOML, has unknown or missing keys or wrong values, or the checksum of the file differs.
-    """
-    path = Path(path)
     about, table = read_card(path)
     stated = about.pop("sha256", None)
     try:
         one_key("the card", table, ("file", "generate"))
-        table |= {key: in_si(table[key], "m", key) for key in ("spacing", "grid") if key in table}
         if "file" in table and stated is not None:
             found = sha256(existing(table["file"]))
             if stated.lower() != found:
@@ -133,10 +108,10 @@ def open_card(path: Path, *, conditioned: bool = True) -> xr.DataArray:
                     f"the checksum of {Path(table['file']).name} is {found}, sha256 states {stated}: the file was "
                     "changed or damaged"
                 )
-        h = raw_height("", table)
-        h = condition(h, split(table, *STEPS)[0]) if conditioned else h
+        h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
         raise error.prefixed(str(path)) from error
+    finite(h, str(path))
     return h.assign_attrs(card=path.name, **about)
 
 

@@ -22,9 +22,7 @@ def hann(z: np.ndarray) -> np.ndarray:
     return z * along_x[:, None] * along_y
 
 
-def modes(
-    z: np.ndarray, cells: tuple[float, float], norm: Literal["backward", "forward"] = "backward"
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def modes(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the modes of periodic heights.
 
     Parameters
@@ -33,19 +31,16 @@ def modes(
         Heights. [m]
     cells : tuple of float
         Cell sides. [m]
-    norm : {"backward", "forward"}
-        Norm of the transform. "backward": amplitudes are sums over the points. "forward": amplitudes are means, whose
-        squares are variances.
 
     Returns
     -------
     q_x, q_y : ndarray, shapes (nx, 1) and (1, ny // 2 + 1)
         Wavevectors. [rad/m]
     power, count : ndarray, shape (nx, ny // 2 + 1)
-        Squared moduli [m2], and the number of modes of each entry: two if its conjugate is not stored.
+        Variance of each mode [m2], and the number of modes of each entry: two if its conjugate is not stored.
     """
     q_x, q_y, count = wavevectors(z.shape, cells)
-    power = np.abs(scipy.fft.rfft2(z, norm=norm)) ** 2
+    power = np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
     return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
 
 

@@ -8,7 +8,7 @@ import roughvisc as rv
 from roughvisc.experiment.base import boundary_of
 from roughvisc.topography.borders import is_periodic
 from roughvisc.topography.conditioning import boundary_after, condition
-from roughvisc.topography.scans import open_card, surface_boundary
+from roughvisc.topography.scans import surface_boundary
 
 SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
 BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)
@@ -87,4 +87,4 @@ def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
 def test_card__says_by_its_text_what_its_heights_say(tmp_path, steps, expected):
     path = tmp_path / "ball.toml"
     path.write_text(f'generate = "sphere"\nradius = "1 cm"\nsize = "1 mm"\nshape = [12, 10]\n{steps}\n')
-    assert surface_boundary({"file": str(path)}) == boundary_of(open_card(path)) == expected
+    assert surface_boundary({"file": str(path)}) == boundary_of(rv.open_scan(path)) == expected

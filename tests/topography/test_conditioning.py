@@ -8,20 +8,12 @@ from hypothesis import strategies as st
 from strategies import examples, shapes
 
 from roughvisc.errors import InputError
-from roughvisc.topography.conditioning import (
-    combine,
-    crop,
-    fill,
-    gaussian_filter,
-    invert,
-    level,
-    mask_outliers,
-    mirror,
-    resample,
-    rotate90,
-)
+from roughvisc.topography.bandwidth import gaussian_filter, level
+from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.grid import spacing
+from roughvisc.topography.missing_points import fill, mask_outliers
 from roughvisc.topography.readers import from_array
+from roughvisc.topography.resampling import resample
 from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
 
 CELL = (2e-6, 3e-6)

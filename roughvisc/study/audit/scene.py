@@ -99,7 +99,7 @@ class Scene:
         z = self.period.values - self.period.values.mean()
         if not np.ptp(z) > 0:
             return math.nan, math.nan, math.nan
-        q_x, q_y, power, count = modes(hann(z) if self.boundary == "free" else z, self.cells, "forward")
+        q_x, q_y, power, count = modes(hann(z) if self.boundary == "free" else z, self.cells)
         q = np.hypot(q_x, q_y)
         squares = count * q**2 * power
         begins = last_octave(q, squares)
@@ -129,7 +129,7 @@ class Scene:
             return None
         z = self.period.values
         if not is_analytic(self.period):
-            q_x, q_y, power, count = modes(z - z.mean(), self.cells, "forward")
+            q_x, q_y, power, count = modes(z - z.mean(), self.cells)
             squares = count * (q_x**2 + q_y**2) * power
             beyond = np.hypot(q_x * waves[0], q_y * waves[1]) > 2 * np.pi * (1 + _ROUNDING)
             if not squares[beyond].sum() <= _SHORTER * squares.sum():  # NaN if points are missing
