@@ -89,7 +89,9 @@ def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = ""
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is not a picture format: expected one of .png, .pdf, .svg")
     if title:
-        figure.suptitle(style.verbatim(textwrap.fill(title, int(13 * figure.get_figwidth()))))
+        text = style.verbatim(textwrap.fill(title, int(13 * figure.get_figwidth())))
+        # a title of the figure would lie on its legend
+        (figure.legends[0].set_title if figure.legends else figure.suptitle)(text)
     with atomic_write(path) as temporary:
         figure.savefig(temporary, format=kind, dpi=dpi)
     return path
