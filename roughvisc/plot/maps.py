@@ -228,7 +228,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     columns = 1 if ratio < 0.4 else min(len(frames), 4)
     rows = -(-len(frames) // columns)
     width = 4.0 if ratio < 0.4 else max(1.5, 2.9 - 0.45 * columns)
-    size = (width * columns + 1.4, (width * ratio + 0.35) * rows * len(stored) + 0.9)
+    size = (width * columns + 1.4, (0.82 * width * ratio + 0.35) * rows * len(stored) + 0.9)
     figure = style.new_figure(*size)
     axes = figure.subplots(rows * len(stored), columns, sharex=True, sharey=True, squeeze=False)
     panels = axes.reshape(len(stored), -1)

@@ -25,8 +25,8 @@ _LABEL = 26, 9
 def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
-    Each grid has a marker. Labels state the tolerances; a label that would touch another one is left out, of the front
-    last. Errors below the uncertainty of the reference lie in a grey band, and are not part of the front.
+    Each grid has a marker. Labels state the tolerances; a label without a free place is left out. Errors below the
+    uncertainty of the reference lie in a grey band, and are not part of the front.
 
     Parameters
     ----------
@@ -86,13 +86,19 @@ def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
         ax.axhspan(low, unsure, color="0.93", zorder=0, label="uncertainty of the reference")
         ax.set_ylim(low, high)
     ax.figure.draw_without_rendering()
+    points = ax.transData.transform(np.c_[time, error]) * 72 / ax.figure.dpi
     placed: list[np.ndarray] = []
-    for i in [*front, *np.flatnonzero(known)]:
-        at = ax.transData.transform((time[i], error[i])) * 72 / ax.figure.dpi
-        if all((abs(at - other) > _LABEL).any() for other in placed):
-            placed.append(at)
-            text = format_tolerance(float(dataset["tolerance"][i]))
-            ax.annotate(text, (time[i], error[i]), (5, 3), textcoords="offset points", fontsize=6.5, color="0.25")
+    for i in [*front, *np.setdiff1d(np.flatnonzero(known), front)]:
+        for side, below in ((1, 0), (-1, 0), (1, 1), (-1, 1)):
+            offset = np.array([5 * side, -9 if below else 3])
+            centre = points[i] + offset + (13 * side, 3)
+            is_clear = (np.abs(points[known] - centre) > (16, 6)).any(axis=1).all()
+            if is_clear and all((np.abs(other - centre) > _LABEL).any() for other in placed):
+                placed.append(centre)
+                text = format_tolerance(float(dataset["tolerance"][i]))
+                look = {"fontsize": 6.5, "color": "0.25", "ha": "left" if side > 0 else "right"}
+                ax.annotate(text, (time[i], error[i]), offset, textcoords="offset points", **look)
+                break
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
     ax.grid()
