@@ -17,10 +17,10 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # a shell's background jo
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import strategies  # noqa: F401  (loads the profile of the random examples)
-from matplotlib.figure import Figure
 
 from roughvisc.cli import main
 from roughvisc.mechanics.grid import Grid
+from roughvisc.plot import save as save_module
 from roughvisc.study.execution import run as run_module
 
 
@@ -70,8 +70,8 @@ def small_disk(tmp_path):
 @pytest.fixture
 def coarse_pictures(monkeypatch):
     """Pictures are written with few points, where nobody looks at them."""
-    save = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *to, **how: save(self, *to, **how | {"dpi": 40}))
+    write = save_module.write_png
+    monkeypatch.setattr(save_module, "write_png", lambda figure, file, _: write(figure, file, 40))
 
 
 @pytest.fixture
