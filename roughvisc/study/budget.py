@@ -76,9 +76,9 @@ def budget(
     xarray.Dataset
         Over ``source`` and ``time`` or ``speed``: ``half_width``, of the logarithm at 95 %, missing if a source is
         open [-]; ``direction``, 1 or -1 for an error that only raises or lowers the number. Over ``source``:
-        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, one of ``counted``, ``none`` (the source
-        does not apply) and ``open`` (an input is missing). Over the times or speeds: ``value``, ``lower`` and
-        ``upper``, in the unit of the quantity, and ``case_cost`` [s]. For several quantities also over ``quantity``.
+        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, ``counted`` or ``open`` (an input is
+        missing). Sources that do not apply are absent. Over the times or speeds: ``value``, ``lower`` and ``upper``, in
+        the unit of the quantity, and ``case_cost`` [s]. For several quantities also over ``quantity``.
 
     Raises
     ------

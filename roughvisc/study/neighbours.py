@@ -151,19 +151,19 @@ class Source:
         Method of the estimate, or the missing input of an open source.
     neighbours : tuple of Neighbour
         Cases from which the error is estimated.
-    state : {"counted", "none", "open"}
-        Whether the source is part of the total error: ``none`` if it does not apply, ``open`` if an input is missing.
+    is_open : bool
+        Whether an input is missing, so that the source is not part of the total error.
     """
 
     method: str
     neighbours: tuple[Neighbour, ...] = ()
-    state: Literal["counted", "none", "open"] = "counted"
+    is_open: bool = False
 
 
 def sources_of(
     base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0, others: float | None = None
 ) -> dict[str, Source]:
-    """Return the sources of error of the numbers of a case, by name.
+    """Return the sources of error that apply to the numbers of a case, by name.
 
     Parameters
     ----------
@@ -194,30 +194,17 @@ def sources_of(
     own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
     found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
 
-    if not sample:
-        found[SAMPLE] = Source("the surface is the whole body, and no sample", state="none")
-    elif population == "patch":
-        words = "the number is of this patch; population 'ensemble' asks for its roughness"
-        found[SAMPLE] = Source(words, state="none")
-    else:
+    if sample and population == "ensemble":
         few = [max(2, round(n / (2 * others))) for n in height.shape]
-        patches = (
-            vary(base, {"surface.resample": few, "surface.realisation": patch}) for patch in range(1, _PATCHES + 1)
-        )
-        found[SAMPLE] = Source(
-            f"{_PATCHES} Gaussian surrogates on cells twice as long",
-            tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches),
-        )
-
-    if not sample:
-        found[OCTAVE] = Source("the surface is no sample of a roughness", state="none")
-    elif cutoff is None:
-        found[OCTAVE] = Source("state cutoff, the shortest wavelength that the real surface has", state="open")
-    else:
+        patches = [vary(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
+        near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
+        found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
+    if sample and cutoff is None:
+        found[OCTAVE] = Source("state cutoff, the shortest wavelength that the real surface has", is_open=True)
+    elif sample:
         end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
-        if shortest < _SAME * cutoff:
-            found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
-        else:
+        found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
+        if shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
             words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held"
             smooth = vary(own, {"surface.shortest_wave": 2 * shortest})
@@ -225,25 +212,22 @@ def sources_of(
 
     # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
     compared, material = coarse if sample else own, base.tables["material"]
-    changes: dict[str, dict[str, Any]] = {
-        MODULUS: {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)},
-        TIME_SCALE: {f"material.{key}": None for key in TEMPERATURE if key in material}
-        | {"material.shift_factor": _CHANGE * base.shift_factor},
-    }
-    at_once, later = (float(base.material.contact_compliance(t)) for t in (0.0, math.inf))
-    for name, what in ((MODULUS, "moduli"), (TIME_SCALE, "times of the material")):
+    stiffer: dict[str, Any] = {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)}
+    slower: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if key in material}
+    slower["material.shift_factor"] = _CHANGE * base.shift_factor
+    creeps = base.material.contact_compliance(math.inf) > base.material.contact_compliance(0.0)
+    for name, what, changes in ((MODULUS, "moduli", stiffer), (TIME_SCALE, "times of the material", slower)):
         key = f"{name.replace(' ', '_')}_error"
         if (error := known.get(key)) is not None:
             error = number(error, "1", key, least=0, below=1)
-        if name == TIME_SCALE and later <= at_once:
-            found[name] = Source("the material does not creep", state="none")
-        elif error is None:
-            found[name] = Source(f"state {key}, the relative error of the {what}", state="open")
-        elif error == 0:
-            found[name] = Source(f"{what} are exact")
-        else:
+        if name == TIME_SCALE and not creeps:
+            continue
+        found[name] = Source(f"{what} are exact")
+        if error is None:
+            found[name] = Source(f"state {key}, the relative error of the {what}", is_open=True)
+        elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
-            one = Neighbour(vary(compared, changes[name]), weight, compared)
+            one = Neighbour(vary(compared, changes), weight, compared)
             found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
     return found
 
@@ -373,7 +357,7 @@ def _budget(
             if name == STEPS:
                 half_width[i] = quantity.stated_error(own, value)
             elif not change:
-                half_width[i] = math.nan if source.state == "open" else 0.0
+                half_width[i] = math.nan if source.is_open else 0.0
             elif name == SAMPLE:
                 half_width[i] = np.std(change, axis=0, ddof=1)
             else:
@@ -390,7 +374,7 @@ def _budget(
                 {"units": "1", "long_name": "half-width of the logarithm at 95 %"},
             ),
             "direction": (("source", axis), direction, _DIRECTIONS),
-            "state": ("source", [source.state for source in sources.values()]),
+            "state": ("source", ["open" if source.is_open else "counted" for source in sources.values()]),
             "method": ("source", [source.method for source in sources.values()]),
             "cost": ("source", costs, {"units": "s", "long_name": "wall time of the solves"}),
             "value": (axis, value, {"units": units}),
@@ -401,7 +385,7 @@ def _budget(
             "quantity": quantity.name,
             "case": case.to_json(),
             "title": case.title,
-            "open": "; ".join(name for name, source in sources.items() if source.state == "open"),
+            "open": "; ".join(name for name, source in sources.items() if source.is_open),
         },
     )
     for name, side in (("lower", -1), ("upper", 1)):

@@ -214,7 +214,7 @@ def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
 
     The error is infinite without rows, or if a value has no logarithm.
     """
-    part = budget if sources is None else budget.sel(source=list(sources))
+    part = budget if sources is None else budget.isel(source=budget["source"].isin(list(sources)))
     both = np.array([together(part, side) for side in (-1, 1)])
     return float(both.max()) if both.size and np.isfinite(both).all() else math.inf
 
@@ -227,10 +227,10 @@ def _refuse_missed(
         wanted, error = math.log1p(targets[name]), error_of(budget, sources)
         if error <= _ROUNDING * wanted:
             continue
-        parts = {one: error_of(budget, [one]) for one in sources}
-        largest = max(parts, key=parts.__getitem__)
-        if math.isinf(parts[largest]):
+        if math.isinf(error):
             raise InputError(key=name, found="zero, or less, which has no relative error", expected="another number")
+        parts = {one: error_of(budget, [one]) for one in sources if one in budget["source"]}
+        largest = max(parts, key=parts.__getitem__)
         lines = [f"its error on {cells} is {_percent(error, 3)}, and {_REMEDIES[largest]} would reduce it"]
         lines += [f"  {one}: {_percent(part)}" for one, part in parts.items() if part > 0.1 * wanted]
         lines += [f"  open, and not counted: {budget.attrs['open']}"] if budget.attrs["open"] else []
