@@ -52,11 +52,8 @@ class Reading(NamedTuple):
     height_scale: float | None = None
 
 
-def read_file(
-    path: Path, *, format: str | None = None, channel: int | str | None = None, **options: Any
-) -> xr.DataArray:
-    """Read one channel of an instrument or grid file, with the options of :func:`roughvisc.open_scan`."""
-    how = Reading(**options)
+def read_file(path: Path, format: str | None, channel: int | str | None, how: Reading) -> xr.DataArray:
+    """Read one channel of an instrument or grid file, see :func:`roughvisc.open_scan`."""
     for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
         if unit is not None:
             number(f"1 {unit}", "m", key)
@@ -131,30 +128,29 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
         unit: number(f"1 {unit}", "m", "the unit in the file") for unit in (channel.unit, channel.lateral_unit) if unit
     }
     sized = channel.spacing is not None or channel.positions is not None or channel.kind == "points"
-    open_xy = sized and channel.lateral_unit is None and how.spacing is None
-    open_z = channel.unit is None
+    needs_xy = sized and channel.lateral_unit is None and how.spacing is None
+    needs_z = channel.unit is None
     for key, given, serves in (
-        ("unit", how.unit, open_xy or (open_z and how.height_unit is None)),
-        ("height_unit", how.height_unit, open_z),
+        ("unit", how.unit, needs_xy or (needs_z and how.height_unit is None)),
+        ("height_unit", how.height_unit, needs_z),
     ):
         for unit, metres in stated.items() if given is not None and not serves else ():
-            if not math.isclose(metres, number(f"1 {given}", "m")):
-                scale = f"{number(f'1 {given}', 'm') / metres:.6g}"
-                hint = f"; height_scale = {scale} if its numbers are in {given}" if channel.unit else ""
+            factor = number(f"1 {given}", "m") / metres
+            if not math.isclose(factor, 1.0):
+                hint = f"; height_scale = {factor:.6g} if its numbers are in {given}" if channel.unit else ""
                 raise InputError(
                     f"it states its unit as {unit!r}: expected no {key}{hint}", key=key, found=given, expected="none"
                 )
-    lacks = ["unit of its heights"] if open_z and how.unit is how.height_unit is None else []
-    lacks += ["unit of x and y"] if open_xy and how.unit is None else []
+    lacks = ["unit of its heights"] if needs_z and how.unit is how.height_unit is None else []
+    lacks += ["unit of x and y"] if needs_xy and how.unit is None else []
     expected = ['unit, such as "um"'] if lacks else []
+    both = ", and height_unit if heights have another" if len(lacks) == 2 else ""
     if not sized and how.spacing is None:
         lacks.append("size")
         expected.append('spacing, such as "1 um"')
     if lacks:
-        key = expected[0].partition(",")[0]
-        text = f"it states no {' and no '.join(lacks)}: expected {', and '.join(expected)}"
-        both = ", and height_unit if heights have another" if len(lacks) == 2 and sized else ""
-        raise InputError(text + both, key=key, expected=f"{expected[0]}")
+        text = f"it states no {' and no '.join(lacks)}: expected {', and '.join(expected)}{both}"
+        raise InputError(text, key=expected[0].partition(",")[0], expected=expected[0])
     given = number(f"1 {how.unit}", "m") if how.unit else 1.0
     z = stated[channel.unit] if channel.unit else number(f"1 {how.height_unit or how.unit}", "m")
     return stated[channel.lateral_unit] if channel.lateral_unit else given, z

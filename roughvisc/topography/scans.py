@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
 from roughvisc.topography.framing import combine
-from roughvisc.topography.readers import existing, finite, read_file, sha256
+from roughvisc.topography.readers import Reading, existing, finite, read_file, sha256
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, quantities
 
@@ -90,12 +90,11 @@ def open_scan(
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
     """
-    options = {"channel": channel, "unit": unit, "height_unit": height_unit, "spacing": spacing, "grid": grid}
-    options |= {"no_data": no_data, "height_scale": height_scale}
-    path = existing(path)
+    how, path = Reading(unit, height_unit, spacing, grid, no_data, height_scale), existing(path)
     if not is_card(path, format):
-        return read_file(path, format=format, **options)
-    if named := ", ".join(f"{key}=" for key, value in options.items() if value is not None):
+        return read_file(path, format, channel, how)
+    given = {"channel": channel} | how._asdict()
+    if named := ", ".join(f"{key}=" for key, value in given.items() if value is not None):
         raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
     about, table = read_card(path)
     stated = about.pop("sha256", None)
