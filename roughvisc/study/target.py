@@ -20,29 +20,12 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
+from roughvisc.study import neighbours
 from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
-from roughvisc.study.neighbours import (
-    GRID,
-    KNOWN,
-    MODULUS,
-    OCTAVE,
-    SAMPLE,
-    STEPS,
-    TIME_SCALE,
-    compared,
-    is_sample,
-    on_cells,
-    shape_on,
-    shortest_wave,
-    solve,
-    sources_of,
-    together,
-    with_rows,
-)
 from roughvisc.study.quantities import QUANTITIES, quantity_of
 from roughvisc.study.storage.folder import atomic_write, require_writable, result_path
 from roughvisc.study.storage.netcdf import write_dataset
@@ -58,12 +41,12 @@ _FINEST, _FEWEST = -2, 12
 _ROUNDING = 1.005
 #: Source -> what would reduce its error. The later ones depend neither on the grid nor on the tolerance.
 _REMEDIES = {
-    STEPS: "a smaller tolerance",
-    GRID: "finer cells",
-    SAMPLE: "a larger scan, or several of them",
-    OCTAVE: "a scan with finer cells",
-    MODULUS: "moduli that are known more accurately",
-    TIME_SCALE: "times of the material, or its temperature, that are known more accurately",
+    neighbours.STEPS: "a smaller tolerance",
+    neighbours.GRID: "finer cells",
+    neighbours.SAMPLE: "a larger scan, or several of them",
+    neighbours.OCTAVE: "a scan with finer cells",
+    neighbours.MODULUS: "moduli that are known more accurately",
+    neighbours.TIME_SCALE: "times of the material, or its temperature, that are known more accurately",
 }
 
 
@@ -78,8 +61,8 @@ def targets_of(want: Mapping[str, Any]) -> dict[str, float]:
     if not isinstance(want, Mapping):
         raise InputError(key="want", found=want, expected="a dictionary such as {'contact_area': '1 %'}")
     for name in want:
-        if name not in (*QUANTITIES, *KNOWN):
-            raise InputError(key="want", found=name, expected=f"one of {', '.join((*QUANTITIES, *KNOWN))}")
+        if name not in (*QUANTITIES, *neighbours.KNOWN):
+            raise InputError(key="want", found=name, expected=f"one of {', '.join((*QUANTITIES, *neighbours.KNOWN))}")
     targets = {
         name: number(part, "1", f"want.{name}", above=0, below=1) for name, part in want.items() if name in QUANTITIES
     }
@@ -166,9 +149,9 @@ def choose(
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
-    solved = partial(solve, folder=folder / FOLDER, **computing)
+    solved = partial(neighbours.solve, folder=folder / FOLDER, **computing)
     height, smallest = case.height(), min(targets.values())
-    base = with_rows(case, [field for one in observed for field in one.fields])
+    base = neighbours.with_rows(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
         tolerance = min(tolerance, case.settings.tolerance)
@@ -178,18 +161,18 @@ def choose(
 
     # the coarsest grid resolves the waves of the surface, and leaves some cells to the third grid
     level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2
-    if is_sample(case, height) and (wave := shortest_wave(height)):
+    if neighbours.is_sample(case, height) and (wave := neighbours.shortest_wave(height)):
         level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
     level = coarsest = max(level, 0)
     while True:
         base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
-        chosen = on_cells(base, height, 2.0**level)
-        sources = sources_of(base, height, want, 2.0**level, 2.0**coarsest)
-        found = compared(chosen, sources, observed, solved, places=places, loaded=True)
-        cells = "{} x {} cells".format(*shape_on(case, height, 2.0**level))
+        chosen = neighbours.on_cells(base, height, 2.0**level)
+        sources = neighbours.sources_of(base, height, want, 2.0**level, 2.0**coarsest)
+        found = neighbours.compared(chosen, sources, observed, solved, places=places, loaded=True)
+        cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
         reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
         tell(f"{cells}: {'; '.join(reached)}")
-        steps = max(error_of(one, [STEPS]) / wanted[name] for name, one in found.items())
+        steps = max(error_of(one, [neighbours.STEPS]) / wanted[name] for name, one in found.items())
         if level == coarsest and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
             continue  # steps and solver would use more than half of the target
@@ -215,7 +198,7 @@ def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
     The error is infinite without rows, or if a value has no logarithm.
     """
     part = budget if sources is None else budget.isel(source=budget["source"].isin(list(sources)))
-    both = np.array([together(part, side) for side in (-1, 1)])
+    both = np.array([neighbours.together(part, side) for side in (-1, 1)])
     return float(both.max()) if both.size and np.isfinite(both).all() else math.inf
 
 
