@@ -169,7 +169,7 @@ def save_figures_of_files(
     folder : Path, optional
         Folder for the figures. Default: the folder of each result.
     every : bool
-        Whether all figures are drawn, a surface that several results share once, or the default ones.
+        True: all figures, and once a surface that several results share. False: the default figures.
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
     """

@@ -14,7 +14,7 @@ import roughvisc as rv
 from roughvisc import plot
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.plot.save import results_of_sweep
+from roughvisc.plot.save import results_of_sweep, save_figures_of_files
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.execution.run import run_case
 
@@ -211,7 +211,7 @@ times = "all"
 """
 
 
-def test_sweep__of_cases_with_times_of_their_own(tmp_path):
+def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
     (tmp_path / "bumps.toml").write_text(STUDY)
     for case in rv.read_cases(tmp_path / "bumps.toml"):
         run_case(case, tmp_path / "results")
@@ -230,3 +230,7 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path):
     assert [path.name for path in written] == ["sweep-area.png", "sweep-histories.png", "sweep-approach.png"]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
     assert results_of_sweep(tmp_path) is None
+    paths = sorted((tmp_path / "results").glob("*.nc"))
+    every = [path.stem.rpartition("-")[2] for path in save_figures_of_files(paths, tmp_path / "cases")]
+    assert every.count("surface") == 1, "all cases have this surface"
+    assert every.count("history") == len(paths)
