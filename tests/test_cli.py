@@ -1,6 +1,7 @@
 """The command line: what it writes, what it says, and how it ends."""
 
 import io
+import math
 import os
 import subprocess
 import sys
@@ -111,21 +112,11 @@ def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, s
     assert len(list((tmp_path / "results" / "ball").iterdir())) == 1
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key"),
-    [
-        ('"5 mN"', '"5 mm"', "program.0.load: found '5 mm'"),
-        ('radius = "10 mm"', 'radios = "10 mm"', "surface.radios: "),
-        ('"3 MPa"', '"-3 MPa"', "material.shear_modulus: found '-3 MPa'"),
-        ("[24, 21]", "[0, 21]", "surface.shape: found [0, 21]"),
-        ('"5 mN"', '"50 N"', "boundary"),
-    ],
-)
-def test_run__bad_input_is_status_2_and_one_message(invoke, tmp_path, old, new, key):
-    status, out, err = invoke("run", write_study(BALL, (old, new)), "-q")
+def test_run__of_contact_at_the_border_is_status_2_and_writes_nothing(invoke, tmp_path):
+    status, out, err = invoke("run", write_study(BALL, ('"5 mN"', '"50 N"')), "-q")
     assert (status, out) == (2, "")
     assert err.startswith("roughvisc: ball.toml: ")
-    assert key in err
+    assert "boundary" in err
     assert [p.name for p in tmp_path.rglob("*") if p.is_file()] == ["ball.toml"], "nothing is half-written"
 
 
@@ -260,12 +251,10 @@ def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):
         ("new SCAN -o mine.toml", "mine.toml"),
         ("new SCAN -o mine.txt", ".toml"),
         ("new SCAN --channel 7", "channel: found 7"),
-        ("new SCAN --contact 5um", "contact: found '5um'"),
         ("new SCAN --contact 120%", "contact: found '120%'"),
         ("scan gone.sur", "gone.sur"),
         ("scan SCAN --spacing 2N", "spacing: found '2N'"),
         ("scan SCAN --spacing 1,2,3", "spacing"),
-        ("scan SCAN --channel 7", "channel: found 7"),
         ("scan SCAN --plot x.docx", "x.docx"),
         ("scan SCAN --plot tilted.nc", "already exists"),
         ("scan SCAN --to tilted.nc", "already exists"),
@@ -336,21 +325,11 @@ def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers
     assert (alone.returncode, "expected unit" in alone.stderr) == (2, True)
 
 
-def test_scan__takes_a_unit_of_heights(invoke, tmp_path):
-    x, y = np.meshgrid(np.arange(17), np.arange(21), indexing="ij")
-    z = 0.5 * np.sin(x) * np.sin(y)
-    np.savetxt(tmp_path / "points.xyz", np.column_stack([1e-3 * x.ravel(), 1e-3 * y.ravel(), z.ravel()]))
-    assert invoke("scan", "points.xyz", "--unit", "mm", "--height-unit", "um", "--to", "points.nc")[0] == 0
-    height = rv.open_scan(tmp_path / "points.nc")
-    np.testing.assert_allclose(height, 1e-6 * z, atol=1e-15)
-    np.testing.assert_allclose(height.x, (np.arange(17) + 0.5) * 1e-6)
-    assert invoke("scan", "points.xyz", "--unit", "mm", "--height-unit", "parsec per")[0] == 2
-
-
 @pytest.mark.thorough
-def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures):
+def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures, monkeypatch):
     from sample_results import rough_creep
 
+    monkeypatch.setattr("roughvisc.progress.LINE_EVERY", math.inf)  # the machine may be slow
     path = write_result(rough_creep(shape=(24, 20), frames=4), tmp_path / "out" / "case.nc")
     for target in (path, path.parent):
         status, out, err = invoke("plot", target, "--out", "figures")
