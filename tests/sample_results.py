@@ -6,6 +6,7 @@ from scipy import ndimage
 from scipy.integrate import cumulative_trapezoid
 
 from roughvisc.labels import label
+from roughvisc.mechanics.closed_forms import hertz
 
 
 def _cells(shape, size):
@@ -57,15 +58,11 @@ def hertz_creep(shape=(61, 44), frames=30, times=None):
     times = np.asarray(times, dtype=float)
     r = np.hypot(*np.meshgrid(x - size[0] / 2, y - size[1] / 2, indexing="ij"))[None]
     compliance = (1 / 12e6) * (1 + 3 * (1 - np.exp(-times / 0.5)))
-    a = np.cbrt(0.75 * radius * force * compliance)[:, None, None]
-    approach = (a**2 / radius)[:, 0, 0]
-    inside = r < a
-    root = np.sqrt(np.clip(1 - (r / a) ** 2, 0, None))
-    pressure = np.where(inside, 1.5 * force / (np.pi * a**2) * root, 0.0)
-    ratio = np.clip(a / np.maximum(r, 1e-12), 0, 1)
-    outside = a**2 / (np.pi * radius) * ((2 - ratio**-2) * np.arcsin(ratio) + np.sqrt(1 - ratio**2) / ratio)
-    displacement = np.where(inside, a**2 / radius - r**2 / (2 * radius), outside)
-    gap = np.where(inside, 0.0, r**2 / (2 * radius) + displacement - approach[:, None, None])
+    contacts = [hertz(radius, 1 / one, force) for one in compliance]
+    approach = np.array([one.approach for one in contacts])
+    pressure = np.array([one.pressure(r[0]) for one in contacts])
+    displacement = np.array([one.displacement(r[0]) for one in contacts])
+    gap = np.where(pressure > 0, 0.0, r**2 / (2 * radius) + displacement - approach[:, None, None])
     fields = xr.Dataset(
         {
             "height": (("x", "y"), -(r[0] ** 2) / (2 * radius)),

@@ -80,14 +80,16 @@ def step_load(material, duration, tolerance=TOLERANCE):
     "exponent", [-12, 12, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-6, -3, 0, 3, 6))]
 )
 @pytest.mark.parametrize(
-    "material", [rv.maxwell(0.25, 0.25), ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=["maxwell", "zener", "kelvin_voigt"]
+    "material",
+    [pytest.param(rv.maxwell(0.25, 0.25), marks=pytest.mark.thorough), ZENER, rv.kelvin_voigt(0.25, 0.25)],
+    ids=["maxwell", "zener", "kelvin_voigt"],
 )
 def test_time_over_retardation_time(material, exponent):
     assert_follows(*step_load(material, 10.0**exponent))
 
 
 @pytest.mark.parametrize("exponent", [-8, -2, 8, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-4, 2, 4))])
-@pytest.mark.parametrize("duration", [1.0, 1e3])
+@pytest.mark.parametrize("duration", [pytest.param(1.0, marks=pytest.mark.thorough), 1e3])
 def test_shear_modulus_over_kelvin_modulus(exponent, duration):
     kelvin = 0.25 / 10.0**exponent
     assert_follows(*step_load(rv.zener(0.25, kelvin, kelvin), duration))

@@ -48,17 +48,6 @@ def test_turned_mirrored_and_scaled_problem__has_the_turned_mirrored_and_scaled_
 
 
 @of_whole_runs
-@given(surfaces(), stiffened(), boundaries, st.floats(0.05, 0.95))
-def test_split_segment__changes_nothing_beyond_the_tolerance(height, make, boundary, part):
-    load = load_for(make(1.0))
-    whole = rv.Program().load(load, over=1.0).hold(1.0)
-    split = rv.Program().load(part * load, over=part).load(load, over=1 - part).hold(part).hold(1 - part)
-    one, other = (simulate(height, make(1.0), p, boundary, times=[0.5, 1.0, 2.0]) for p in (whole, split))
-    for name in ("approach", "pressure"):
-        assert differs(one[name].values, other[name].values) < 2 * TOLERANCE
-
-
-@of_whole_runs
 @given(surfaces(), stiffened(), boundaries)
 def test_more_load__presses_every_cell_at_least_as_much(height, make, boundary):
     """Elastic contact is monotone in the load; so is a growing viscoelastic one in approach and area."""

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from references import Cone, Paraboloid, full_contact_wave, pressure_of_springs, reduced_contact
+from references import Cone, Paraboloid, pressure_of_springs, reduced_contact
 
 import roughvisc as rv
-from roughvisc import closed_forms
 
 ZENER = rv.Prony(1.0, 0.0, (2.0,), (1.0,))  # G = 1, G_K = 0.5, tau = 1
 TRIANGLE = rv.Program().load(1.0, over=1.0).load(0.0, over=1.0)
@@ -70,18 +69,3 @@ def test_relaxation__load_then_constant_approach():
     ds = rv.simulate(rv.sphere(1.0, 1.6, (101, 99)), ZENER, program, times=times, tolerance=3e-4, progress=False)
     assert ds.force.values == pytest.approx(exact.force, rel=3e-3)
     assert ds.approach.values == pytest.approx(exact.approach, rel=3e-3)
-
-
-def test_full_periodic_contact__each_wave_relaxes_with_the_modulus():
-    amplitude, wavelength = 1e-3, 1.0
-    surface = rv.wavy(amplitude, wavelength, size=(wavelength, 0.1), shape=(33, 3), waves=1)
-    load = 3 * closed_forms.full_contact_pressure(amplitude, wavelength, 4.0, waves=1) * 0.1
-    program = rv.Program().load(load, over=0).hold(2.0)
-    ds = rv.simulate(
-        surface, ZENER, program, boundary="periodic", times=[0.0, 0.5, 2.0], tolerance=1e-4, progress=False
-    )
-    assert (ds.contact_fraction == 1).all()
-    for i, t in enumerate((0.0, 0.5, 2.0)):
-        wave = full_contact_wave(amplitude, 2 * np.pi / wavelength, ZENER, t)
-        expected = load / 0.1 + wave * np.cos(2 * np.pi * ds.x.values / wavelength)
-        assert ds.pressure.values[i, :, 1] == pytest.approx(expected, rel=2e-4)

@@ -159,17 +159,6 @@ def test_scan_to_area__creeps_from_the_glassy_to_the_rubbery_contact(tmp_path, s
     figure = script("scan_to_area").main(tmp_path, coarse)
     assert (tmp_path / "area_against_load.png").stat().st_size > 10_000
     lines = {line.get_label(): line for line in figure.axes[0].lines}
-    assert list(lines) == [
-        "elastic, glassy",
-        "after 20 ms",
-        "after 60 ms",
-        "after 200 ms",
-        "elastic, rubbery",
-        "low loads, glassy",
-        "Persson, glassy",
-        "low loads, rubbery",
-        "Persson, rubbery",
-    ]
     areas = np.array([line.get_ydata() for name, line in list(lines.items())[:5]])
     assert areas.shape == (5, 3)
     assert (np.diff(areas, axis=0) > 0).all(), "the contact grows with time"

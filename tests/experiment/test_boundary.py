@@ -1,5 +1,6 @@
-"""``boundary="auto"``: as the surface was made, and a question where it was not."""
+"""``boundary="auto"``: as the surface was made; and the nominal pressure on a surface as given."""
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -32,3 +33,25 @@ def test_auto__with_an_accepted_edge_is_free(caplog):
 def test_friction__is_periodic_whatever_slides():
     ds = rv.friction(SCAN, rv.zener(1e6, 1e6, 1e5), pressure=1e3, speeds=[1e-3], progress=False)
     assert ds.attrs["boundary"] == "periodic"
+
+
+def test_pressure__is_the_load_over_the_whole_area():
+    height = rv.self_affine((3e-4, 2e-4), (15, 12), hurst=0.8, rms_slope=0.1, seed=2)
+    options = {"boundary": "periodic", "progress": False, "fields": ("pressure",)}
+    by_pressure = rv.simulate(height, STEEL, rv.Program().pressure("0.1 MPa", over=0).hold("1 s"), **options)
+    np.testing.assert_allclose(by_pressure.force, 0.1e6 * 6e-8, rtol=1e-12)
+    load = float(by_pressure.force[-1])  # to the last bit, whose rounding single-precision steps would magnify
+    by_load = rv.simulate(height, STEEL, rv.Program().load(load, over=0).hold(1.0), **options)
+    np.testing.assert_array_equal(by_pressure.pressure, by_load.pressure)
+    np.testing.assert_allclose(by_pressure.nominal_pressure, 0.1e6, rtol=1e-9)
+    np.testing.assert_allclose(by_pressure.pressure.mean(("x", "y")), 0.1e6, rtol=1e-9)
+
+
+def test_pressure__refers_to_the_surface_as_given_where_the_grid_grows():
+    ball = rv.sphere(1e-3, 1e-4, 16)
+    ds = rv.simulate(ball, STEEL, rv.Program().pressure("0.2 MPa", over=0), times=[0], progress=False)
+    assert ds.sizes["x"] > 16
+    pressure = ds.pressure.values[-1]
+    assert not any(line.any() for line in (pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]))
+    assert float(ds.force[0]) == pytest.approx(0.2e6 * 1e-8)
+    assert float(ds.nominal_pressure[0]) == pytest.approx(0.2e6)

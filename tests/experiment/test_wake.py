@@ -57,13 +57,6 @@ def test_wake_note__of_a_surface_without_a_recipe_goes_by_what_touches():
     assert "wake:" not in found.attrs.get("warnings", ""), "it is a row of ridges by its recipe"
 
 
-def test_wake_note__of_creep_without_end_says_that_nothing_recovers():
-    strip = rv.wavy(1e-6, 45 * CELL, (45 * CELL, CELL), (45, 1), waves=1)
-    ridge = strip.copy(data=ball(45).values[:, 22:23])
-    del ridge.attrs["recipe"]  # no longer the wave of its recipe
-    assert "100 % of the creep" in rv.friction(ridge, rv.maxwell(1e6, 1e3), pressure=1e3, speeds=10.0).attrs["warnings"]
-
-
 def test_wake_note__of_a_program_is_of_slides_that_come_as_far_as_the_next_wake(caplog):
     period = 45 * CELL
     press = rv.Program().load(2e-2, over=0)

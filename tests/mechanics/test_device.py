@@ -33,21 +33,26 @@ def assert_equal(one, other):
 # ------------------------------------------------------------------------------------------------------------ contact
 
 
+def solved_on_both(xp, boundary, gap, present=None, **given):
+    """Solve on NumPy and on the device, compare, and return the state of NumPy."""
+    there = None if present is None else xp.asarray(present)
+    found = solve_contact(Grid(gap.shape, SPACING, boundary), gap, present=present, **given)
+    other = solve_contact(Grid(gap.shape, SPACING, boundary, xp=xp), xp.asarray(gap), present=there, **given)
+    assert (other.convolutions, other.iterations) == (found.convolutions, found.iterations)
+    assert_equal(other.pressure, found.pressure)
+    assert_equal(other.displacement, found.displacement)
+    assert other.approach == pytest.approx(found.approach, rel=1e-12)
+    assert other.load == pytest.approx(found.load, rel=1e-12)
+    return found
+
+
 @BOUNDARIES
 @pytest.mark.parametrize("prescribed", ["load", "approach"])
 @pytest.mark.parametrize("present", [None, absent_cells()], ids=["all", "absent"])
 def test_contact__is_the_same_on_a_device(xp, boundary, prescribed, present):
     gap = support.rough_gap(SHAPE)
     given = {"load": 20.0} if prescribed == "load" else {"approach": 0.7 * float(gap.mean())}
-    there = None if present is None else xp.asarray(present)
-    found = solve_contact(Grid(SHAPE, SPACING, boundary), gap, present=present, **given)
-    other = solve_contact(Grid(SHAPE, SPACING, boundary, xp=xp), xp.asarray(gap), present=there, **given)
-    assert found.iterations > 3
-    assert (other.convolutions, other.iterations) == (found.convolutions, found.iterations)
-    assert_equal(other.pressure, found.pressure)
-    assert_equal(other.displacement, found.displacement)
-    assert other.approach == pytest.approx(found.approach, rel=1e-12)
-    assert other.load == pytest.approx(found.load, rel=1e-12)
+    assert solved_on_both(xp, boundary, gap, present, **given).iterations > 3
 
 
 @BOUNDARIES
@@ -57,14 +62,8 @@ def test_wide_contact__is_the_same_on_a_device(monkeypatch, xp, boundary):
         monkeypatch.setattr(solver, name, value)
     used, blocks = [], solver.LongWaves.pressure
     monkeypatch.setattr(solver.LongWaves, "pressure", lambda self, rest: used.append(rest) or blocks(self, rest))
-    gap = support.rough_gap((52, 41))
-    found = solve_contact(Grid(gap.shape, SPACING, boundary), gap, load=30.0)
-    of_host = len(used)
-    other = solve_contact(Grid(gap.shape, SPACING, boundary, xp=xp), xp.asarray(gap), load=30.0)
-    assert of_host > 3
-    assert len(used) == 2 * of_host
-    assert_equal(other.pressure, found.pressure)
-    assert_equal(other.displacement, found.displacement)
+    solved_on_both(xp, boundary, support.rough_gap((52, 41)), load=30.0)
+    assert len(used) > 6
 
 
 @BOUNDARIES
@@ -72,27 +71,16 @@ def test_projected_gradient_steps__are_the_same_on_a_device(monkeypatch, xp, bou
     monkeypatch.setattr(solver, "PATIENCE", 0)
     taken, projected = [], solver.onto_simplex
     monkeypatch.setattr(solver, "onto_simplex", lambda *values: taken.append(values) or projected(*values))
-    gap = support.rough_gap(SHAPE)
-    found = solve_contact(Grid(SHAPE, SPACING, boundary), gap, load=20.0, tolerance=0.1)
-    of_host = len(taken)
-    other = solve_contact(Grid(SHAPE, SPACING, boundary, xp=xp), xp.asarray(gap), load=20.0, tolerance=0.1)
-    assert of_host > 3
-    assert len(taken) == 2 * of_host
-    assert_equal(other.pressure, found.pressure)
+    solved_on_both(xp, boundary, support.rough_gap(SHAPE), load=20.0, tolerance=0.1)
+    assert len(taken) > 6
 
 
-def test_nearly_full_contact__is_the_same_on_a_device(xp):
+@pytest.mark.parametrize("given", [{"load": 100.0}, {"load": 300.0}, {"approach": 1 - 1e-5}], ids=str)
+def test_nearly_full_contact__is_the_same_on_a_device(xp, given):
     """The level is weighted by the pressure that opens the gap, and the approach needs a check of the load."""
     gap = support.rough_gap(SHAPE, slope=0.1)
-    grids = Grid(SHAPE, SPACING, "periodic"), Grid(SHAPE, SPACING, "periodic", xp=xp)
-    fields = gap, xp.asarray(gap)
-    for load in (100.0, 300.0):
-        found, other = (solve_contact(*one, load=load) for one in zip(grids, fields, strict=True))
-        assert (found.pressure > 0).mean() > 0.7
-        assert_equal(other.pressure, found.pressure)
-    approach = float(gap.mean()) * (1 - 1e-5)
-    found, other = (solve_contact(*one, approach=approach) for one in zip(grids, fields, strict=True))
-    assert_equal(other.pressure, found.pressure)
+    given = {name: value * (gap.mean() if name == "approach" else 1) for name, value in given.items()}
+    assert (solved_on_both(xp, "periodic", gap, **given).pressure > 0).mean() > 0.7
 
 
 # ------------------------------------------------------------------------------------------------------- the stand-in

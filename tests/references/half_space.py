@@ -1,4 +1,4 @@
-"""Round indenters on a viscoelastic half-space: a step load, a flat punch, full contact of a wave, and any history.
+"""Round indenters on a viscoelastic half-space: a step load, a flat punch, and any history.
 
 A rigid indenter of profile ``f(r)`` acts like the profile ``g(x) = x int_0^x f'(r) / sqrt(x^2 - r^2) dr`` on a row of
 independent springs (method of dimensionality reduction, MDR). An elastic contact of radius ``a`` has the approach
@@ -148,11 +148,6 @@ def punch_dissipation(radius, material, amplitude, period):
     relaxation = Relaxation.of(material)
     x = 2 * np.pi / period * relaxation.times
     return 2 * np.pi * radius * float(relaxation.moduli @ (x / (1 + x**2))) * amplitude**2
-
-
-def full_contact_wave(amplitude, wavenumber, material, t):
-    """Return the amplitude of the pressure that keeps a wave flat after a jump, ``E(t) q h / 2``. [Pa]"""
-    return Relaxation.of(material)(t) * wavenumber * amplitude / 2
 
 
 def sticking_stiffness(poisson):

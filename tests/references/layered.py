@@ -166,9 +166,7 @@ class OnSheet:
                 low /= 2
             while function(high) < value:
                 high *= 2
-            found.append(
-                low if low == high else brentq(lambda a, v=value: float(function(a)) - v, low, high, rtol=1e-13)
-            )
+            found.append(brentq(lambda a, v=value: float(function(a)) - v, low, high, rtol=1e-13))
         return np.array(found).reshape(np.shape(values))
 
 
