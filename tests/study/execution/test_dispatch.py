@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from functools import partial
 
 import dask
 import pytest
@@ -62,6 +63,11 @@ def worker_process(client, *options):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
         process.wait(60)
+
+
+def short_hold(study):
+    """A case that takes some seconds."""
+    return study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))[0]
 
 
 class Ear(Display):
@@ -143,7 +149,7 @@ def key_of(event):
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_restart__by_another_client_loses_nothing(study, tmp_path):
-    (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
+    case = short_hold(study)
     restarted = []
 
     class Restarter(Display):
@@ -269,55 +275,34 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
 
 
 @pytest.mark.thorough
-def test_worker_told_to_leave__writes_its_checkpoint_first(study, tmp_path):
-    """SIGTERM reaches every process of a job; another worker goes on from where the case was then."""
-    (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
-    ear, outcomes = Ear(), {}
-    with bare_cluster() as client:
-
-        def work():
-            outcomes.update(run_cases([case], tmp_path / "out", display=ear, client=client))
-
-        thread = threading.Thread(target=work)
-        with worker_process(client) as first:
-            thread.start()
-            ear.wait_until(lambda heard: any(now > 0 for _, now, _ in heard))
-            os.killpg(first.pid, signal.SIGTERM)
-            first.wait(60)
-        left_at = max(now for _, now, _ in ear.heard)
-        assert list((tmp_path / "out" / f".{case.key}.unfinished").glob("state.npz")), "long before one was due"
-        with worker_process(client):
-            thread.join(60)
-    assert [o.kind for o in outcomes.values()] == ["done"]
-    second = [end for _, _, end in ear.heard].index(0.0, 1)
-    assert ear.heard[second + 1][1] > left_at, "it did not begin anew"
-    run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
-    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
-
-
-@pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_worker_stopped_for_good__does_not_hold_the_sweep(study, tmp_path):
-    """A worker and its nanny do not answer any more, and the lock of the case is still theirs."""
-    (case,) = study(LONG.replace('hold = "0.2 s"', 'hold = "0.1 s"').replace(', "200 ms"', ""))
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGSTOP"])
+def test_worker_that_leaves__hands_its_case_over(study, tmp_path, how):
+    """Told to leave, it writes its checkpoint first; stopped for good, it still holds the lock of the case."""
+    case, out = short_hold(study), tmp_path / "out"
     ear, outcomes = Ear(), {}
     with dask.config.set({"distributed.scheduler.worker-ttl": "10s"}), bare_cluster() as client:
-
-        def work():
-            outcomes.update(run_cases([case], tmp_path / "out", display=ear, client=client))
-
-        thread = threading.Thread(target=work)
+        run = partial(run_cases, [case], out, display=ear, client=client)
+        thread = threading.Thread(target=lambda: outcomes.update(run()))
         with worker_process(client) as first:
             thread.start()
             ear.wait_until(lambda heard: any(now > 0 for _, now, _ in heard))
-            os.killpg(first.pid, signal.SIGSTOP)
+            os.killpg(first.pid, getattr(signal, how))
+            if how == "SIGTERM":
+                first.wait(60)
+                assert list((out / f".{case.key}.unfinished").glob("state.npz")), "long before one was due"
+            left_at = max(now for _, now, _ in ear.heard)
             with worker_process(client):
                 thread.join(200)
-            os.killpg(first.pid, signal.SIGKILL)
+            if how == "SIGSTOP":
+                os.killpg(first.pid, signal.SIGKILL)
     assert [o.kind for o in outcomes.values()] == ["done"]
     assert any("has gone; the case resumes on" in line for line in ear.lines)
+    if how == "SIGTERM":
+        second = [end for _, _, end in ear.heard].index(0.0, 1)
+        assert ear.heard[second + 1][1] > left_at, "it did not begin anew"
     run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
-    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
+    assert_same(numbers(out), numbers(tmp_path / "calm"))
 
 
 def test_results_folder_that_a_worker_does_not_see__fails_no_case(study, tmp_path):
