@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 __all__ = [
     "cone",
@@ -106,8 +105,8 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     >>> contact.radius, contact.approach
     (1.0, 1.0)
     """
-    curvature = check_number("sphere_radius", sphere_radius, "m")
-    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    curvature = number(sphere_radius, "m", "sphere_radius", above=0)
+    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
     a = float(np.cbrt(0.75 * curvature * force / modulus))
 
     def pressure(r: ArrayLike) -> Array:
@@ -155,8 +154,8 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 5.2.
     """
-    slope = check_number("slope", slope, "1")
-    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    slope = number(slope, "1", "slope", above=0)
+    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
     a = float(np.sqrt(2 * force / (np.pi * modulus * slope)))
 
     def pressure(r: ArrayLike) -> Array:
@@ -206,8 +205,8 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
     """
-    a = check_number("radius", radius, "m")
-    modulus, force = check_number("contact_modulus", contact_modulus, "Pa"), check_number("force", force, "N")
+    a = number(radius, "m", "radius", above=0)
+    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
     approach = force / (2 * modulus * a)
 
     def pressure(r: ArrayLike) -> Array:
@@ -288,9 +287,9 @@ def westergaard(
     >>> round(contact.contact_fraction, 12)
     0.5
     """
-    mean = check_number("mean_pressure", mean_pressure, "Pa")
+    mean = number(mean_pressure, "Pa", "mean_pressure", above=0)
     full = full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
-    period = check_number("wavelength", wavelength, "m")
+    period = number(wavelength, "m", "wavelength", above=0)
 
     def pressure(x: ArrayLike) -> Array:
         phase = np.pi * np.asarray(x, dtype=float) / period
@@ -329,8 +328,8 @@ def full_contact_pressure(
     """
     if waves not in (1, 2):
         raise InputError(key="waves", found=waves, expected="1 or 2")
-    height, period = check_number("amplitude", amplitude, "m"), check_number("wavelength", wavelength, "m")
-    return float(np.sqrt(waves) * np.pi * check_number("contact_modulus", contact_modulus, "Pa") * height / period)
+    height, period = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
+    return float(np.sqrt(waves) * np.pi * number(contact_modulus, "Pa", "contact_modulus", above=0) * height / period)
 
 
 def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
@@ -447,9 +446,9 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
     >>> float(press.radius(0.0)), float(press.radius(7.0))
     (1.0, 2.0)
     """
-    radius = check_number("sphere_radius", sphere_radius, "m")
+    radius = number(sphere_radius, "m", "sphere_radius", above=0)
     if not isinstance(load, Program):
-        load = Program().load(check_number("load", load, "N"), over=0)
+        load = Program().load(number(load, "N", "load", above=0), over=0)
     value = 0.0
     for segment in load.segments:
         end = value if segment.end is None else segment.end

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,15 +25,6 @@ def tensile_to_shear(kind: Kind, poisson: float) -> float:
     if kind not in ("shear", "tensile"):
         raise InputError(key="kind", found=kind, expected="'shear' or 'tensile'")
     return 2 * (1 + poisson) if kind == "tensile" else 1.0
-
-
-def check_number(name: str, value: Any, unit: str, *, zero: bool = False) -> float:
-    """Return the value if it is a positive number, or zero if zero is allowed."""
-    good = isinstance(value, int | float | np.number) and math.isfinite(value) and (value > 0 or (zero and value == 0))
-    if not good:
-        expected = f"a {'non-negative' if zero else 'positive'} number [{unit}]"
-        raise InputError(key=name, found=value, expected=expected)
-    return value
 
 
 def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:

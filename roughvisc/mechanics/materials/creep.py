@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number, check_poisson
+from roughvisc.mechanics.materials.checks import check_poisson
 from roughvisc.mechanics.materials.prony import Prony, known_times
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: fl
         raise InputError(key="function", found=found, expected="a function of time, the creep compliance [1/Pa]")
     check_poisson(poisson)
     if not longest > 0:
-        check_number("longest", longest, "s")
+        number(longest, "s", "longest", above=0)
     return Creep(function, (), poisson, longest)
 
 
@@ -165,9 +165,9 @@ def power_law(
     >>> float(gel.contact_compliance(4.0))  # (1 - nu)/2 J
     5e-05
     """
-    check_number("glassy", glassy, "1/Pa", zero=True)
-    check_number("coefficient", coefficient, "1/Pa")
-    check_number("time_scale", time_scale, "s")
+    number(glassy, "1/Pa", "glassy", least=0)
+    number(coefficient, "1/Pa", "coefficient", above=0)
+    number(time_scale, "s", "time_scale", above=0)
     check_poisson(poisson)
     if not 0 < exponent < 1:
         raise InputError(key="exponent", found=exponent, expected="a number above 0 and below 1")
@@ -290,7 +290,7 @@ def stiffened(material: Material, factor: float) -> Material:
     >>> stiffened(rv.elastic(1e6), 2.0).glassy
     5e-07
     """
-    check_number("modulus_factor", factor, "1")
+    number(factor, "1", "modulus_factor", above=0)
     return _scaled(check_material(material), 1.0, float(factor), f"all moduli multiplied by {factor:.6g}")
 
 

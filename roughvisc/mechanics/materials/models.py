@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number, tensile_to_shear
+from roughvisc.mechanics.materials.checks import tensile_to_shear
 from roughvisc.mechanics.materials.creep import Material, pair, power_law
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 
 @quantities(shear_modulus="Pa", young_modulus="Pa")
@@ -48,8 +48,8 @@ def elastic(
         key = "shear_modulus" if young_modulus is None else "young_modulus"
         raise InputError(key=key, found=young_modulus, expected="either shear_modulus or young_modulus")
     if shear_modulus is not None:
-        return Prony(1 / check_number("shear_modulus", shear_modulus, "Pa"), poisson=poisson)
-    young_modulus = check_number("young_modulus", young_modulus, "Pa")
+        return Prony(1 / number(shear_modulus, "Pa", "shear_modulus", above=0), poisson=poisson)
+    young_modulus = number(young_modulus, "Pa", "young_modulus", above=0)
     return Prony(1 / (young_modulus / tensile_to_shear("tensile", poisson)), poisson=poisson)
 
 
@@ -75,8 +75,8 @@ def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) 
     InputError
         If a number is not positive and finite.
     """
-    glassy = 1 / check_number("shear_modulus", shear_modulus, "Pa")
-    return Prony(glassy, 1 / check_number("viscosity", viscosity, "Pa s"), poisson=poisson)
+    glassy = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
+    return Prony(glassy, 1 / number(viscosity, "Pa s", "viscosity", above=0), poisson=poisson)
 
 
 @quantities(shear_modulus="Pa", viscosity="Pa s")
@@ -101,8 +101,8 @@ def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 
     InputError
         If a number is not positive and finite.
     """
-    retarded = 1 / check_number("shear_modulus", shear_modulus, "Pa")
-    return Prony(0.0, 0.0, (retarded,), (check_number("viscosity", viscosity, "Pa s") / shear_modulus,), poisson)
+    retarded = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
+    return Prony(0.0, 0.0, (retarded,), (number(viscosity, "Pa s", "viscosity", above=0) / shear_modulus,), poisson)
 
 
 @quantities(shear_modulus="Pa", kelvin_modulus="Pa", kelvin_viscosity="Pa s")
@@ -136,9 +136,9 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     >>> zener("4 MPa", "2 MPa", "0.1 MPa s")
     Prony(glassy=2.5e-07, fluidity=0.0, compliances=(5e-07,), times=(0.05,), poisson=0.5)
     """
-    glassy = 1 / check_number("shear_modulus", shear_modulus, "Pa")
-    retarded = 1 / check_number("kelvin_modulus", kelvin_modulus, "Pa")
-    time = check_number("kelvin_viscosity", kelvin_viscosity, "Pa s") / kelvin_modulus
+    glassy = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
+    retarded = 1 / number(kelvin_modulus, "Pa", "kelvin_modulus", above=0)
+    time = number(kelvin_viscosity, "Pa s", "kelvin_viscosity", above=0) / kelvin_modulus
     return Prony(glassy, 0.0, (retarded,), (time,), poisson)
 
 

@@ -12,8 +12,8 @@ import scipy  # which imports a submodule when it is first used: scipy.optimize 
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number, check_poisson
-from roughvisc.units import Quantity, quantities
+from roughvisc.mechanics.materials.checks import check_poisson
+from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
 
@@ -70,11 +70,11 @@ class Prony:
         if len(self.compliances) != len(self.times):
             expected = f"as many as times, {len(self.times)}"
             raise InputError(key="compliances", found=len(self.compliances), expected=expected)
-        check_number("glassy", self.glassy, "1/Pa", zero=True)
-        check_number("fluidity", self.fluidity, "1/(Pa s)", zero=True)
+        number(self.glassy, "1/Pa", "glassy", least=0)
+        number(self.fluidity, "1/(Pa s)", "fluidity", least=0)
         for i, (compliance, time) in enumerate(zip(self.compliances, self.times, strict=True)):
-            check_number(f"compliances[{i}]", compliance, "1/Pa", zero=True)
-            check_number(f"times[{i}]", time, "s")
+            number(compliance, "1/Pa", f"compliances[{i}]", least=0)
+            number(time, "s", f"times[{i}]", above=0)
         check_poisson(self.poisson)
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
             expected = "a positive compliance: a rigid material cannot be pressed"

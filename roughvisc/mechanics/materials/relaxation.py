@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import Kind, check_number, tensile_to_shear
+from roughvisc.mechanics.materials.checks import Kind, tensile_to_shear
 from roughvisc.mechanics.materials.prony import Prony, merged, secular_roots
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 #: A sum of ratios that differs from one by at most this counts as one: a fluid.
 _ONE = 1e-9
@@ -83,15 +83,15 @@ def from_relaxation(
     if len(moduli) and len(ratios):
         raise InputError(key="ratios", found=ratios, expected="moduli with equilibrium, or ratios with instantaneous")
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
-        check_number(f"{given}[{i}]", term, unit, zero=True)
-        check_number(f"times[{i}]", time, "s")
+        number(term, unit, f"{given}[{i}]", least=0)
+        number(time, "s", f"times[{i}]", above=0)
     if instantaneous is not None:
-        instantaneous = check_number("instantaneous", instantaneous, "Pa")
+        instantaneous = number(instantaneous, "Pa", "instantaneous", above=0)
         rest = 1 - math.fsum(ratios)
         if rest < -_ONE:
             raise InputError(key="ratios", found=ratios, expected=f"ratios with a sum of at most 1, not {1 - rest:g}")
         equilibrium, moduli = instantaneous * (rest if rest > _ONE else 0.0), [instantaneous * one for one in ratios]
-    equilibrium = check_number("equilibrium", equilibrium, "Pa", zero=True)
+    equilibrium = number(equilibrium, "Pa", "equilibrium", least=0)
     if len(moduli) and 0 < max(moduli) <= 1 and sum(moduli) < _RATIOS * equilibrium:
         expected = "moduli [Pa]; ratios without a unit belong to instantaneous= and ratios="
         raise InputError(key="moduli", found=moduli, expected=expected)
@@ -102,7 +102,7 @@ def from_relaxation(
         moduli = [modulus / factor for modulus in moduli]
         shear = relaxation_series(equilibrium / factor, moduli, times)
         return shear if poisson is None else dataclasses.replace(shear, poisson=poisson)
-    check_number("bulk_modulus", bulk_modulus, "Pa")
+    number(bulk_modulus, "Pa", "bulk_modulus", above=0)
     found = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
         shear = found.scaled(1.0, 1 / 3)  # 1/G = 3/E - 1/(3K)

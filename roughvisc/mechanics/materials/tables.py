@@ -16,11 +16,11 @@ import scipy  # which imports a submodule when it is first used: scipy.optimize 
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import Kind, check_number, checked_rows, tensile_to_shear
+from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.relaxation import relaxation_series
 from roughvisc.mechanics.materials.series import lattice, nonnegative
-from roughvisc.units import Quantity, format_quantity, quantities
+from roughvisc.units import Quantity, format_quantity, number, quantities
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def creep_table(
     """
     factor = tensile_to_shear(kind, poisson)
     t, values = checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
-    check_number("noise", noise, "1", zero=True)
+    number(noise, "1", "noise", least=0)
     for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
         raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
     highest = np.maximum.accumulate(values)

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.constants import R as GAS_CONSTANT
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_number
 from roughvisc.units import Quantity, number, quantities
 
 
@@ -51,11 +50,11 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     >>> wlf(298.15, 298.15, 17.44, 51.6)  # at the reference temperature nothing is shifted
     1.0
     """
-    check_number("temperature", temperature, "K")
-    check_number("reference_temperature", reference_temperature, "K")
-    check_number("wlf_c1", wlf_c1, "1")
+    number(temperature, "K", "temperature", above=0)
+    number(reference_temperature, "K", "reference_temperature", above=0)
+    number(wlf_c1, "1", "wlf_c1", above=0)
     c2 = number(wlf_c2, "K", "wlf_c2", difference=True)
-    check_number("wlf_c2", c2, "K")
+    number(c2, "K", "wlf_c2", above=0)
     above = temperature - reference_temperature
     if not c2 + above > 0:
         pole = (
@@ -101,9 +100,9 @@ def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation
     >>> round(arrhenius(283.15, 293.15, 80e3), 3)  # 10 K colder
     3.187
     """
-    check_number("temperature", temperature, "K")
-    check_number("reference_temperature", reference_temperature, "K")
-    check_number("activation_energy", activation_energy, "J/mol")
+    number(temperature, "K", "temperature", above=0)
+    number(reference_temperature, "K", "reference_temperature", above=0)
+    number(activation_energy, "J/mol", "activation_energy", above=0)
     return _power(math.e, activation_energy / GAS_CONSTANT * (1 / temperature - 1 / reference_temperature))
 
 
