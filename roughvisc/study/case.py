@@ -252,7 +252,8 @@ def read_study(path: str | Path) -> Case:
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
-        raise InputError(f"{path}: sweep: found {len(cases)} cases: expected one; read_cases() reads them all")
+        found, expected = f"{len(cases)} cases", "one; read_cases() reads them all"
+        raise InputError(key="sweep", found=found, expected=expected).prefixed(str(path))
     return cases[0]
 
 

@@ -18,7 +18,7 @@ def test_product__of_all_lists(read, tmp_path):
     ]
     assert [case.program.segments[0].end for case in cases] == [1, 1, 2, 2]
     assert len({case.key for case in cases}) == 4
-    with refused(""):
+    with refused("sweep", "4 cases"):
         read_study(tmp_path / "study.toml")
 
 
