@@ -19,6 +19,21 @@ def final(steps):
 TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
 
 
+@pytest.mark.parametrize("name", MATERIALS)
+def test_chosen_steps__keep_the_tolerance(name):
+    """The grid's error drops out: the reference runs on the same grid at a fiftieth of the tolerance."""
+    times, tolerance = (0.2, 1.0, 2.0), 1e-3
+    program = rv.Program().load(5e-4 if name == "zener_soft" else 0.05, over=0).hold(2.0)
+    found, exact = (
+        [s.point for s in march(scene(MATERIALS[name], program, times=times, tolerance=one)) if s.point.time in times]
+        for one in (tolerance, tolerance / 50)
+    )
+    for one, other in zip(found, exact, strict=True):
+        assert one.time == other.time
+        assert abs(one.approach / other.approach - 1) < tolerance
+        assert np.abs(one.pressure - other.pressure).sum() < tolerance * other.pressure.sum()
+
+
 def test_memory_of_both_fields__knows_the_pressure_that_causes_the_displacement():
     settings = scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, keeps_pressure=True, tolerance=1e-8)
     alone = scene(MATERIALS["two_branches"], TRIANGLE, time_step=0.1, tolerance=1e-8)
