@@ -56,6 +56,8 @@ _INSIDE = 0.995
 _START = 0.3
 # Vectors of GMRES before a restart, and in total.
 _RESTART, _MOST_VECTORS = 60, 300
+# Largest residual of a solution over the residual at which GMRES stops, because of rounding.
+_REACHED = 1.5
 # A vector is orthogonalised a second time if its length falls below this fraction of its projection.
 _REPEATED = 0.1
 
@@ -241,7 +243,7 @@ def steady_state(
         return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, True, 0, 0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
-    vectors = 0
+    vectors, converged = 0, False
     for iteration in range(max_iterations + 1):
         products = float((pressure * separation).sum())
         energy = sliding.self_influence * float((pressure**2).sum())
@@ -251,17 +253,19 @@ def steady_state(
 
         # Predictor: Newton's step to the solution. It gives the error of the pressure restricted to the contact.
         right = approach - opening
-        step, approach_step, count = system.solve(right, enough)
+        step, approach_step, count, is_accurate = system.solve(right, enough)
         vectors += count
+        if not bool(xp.isfinite(step).all()):  # the tolerance is below rounding
+            break
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
         found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
         force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
         if max(errors) <= tolerance:
-            step, approach_step, count = system.solve(right, enough, _STATED, start=step)
+            step, approach_step, count, is_accurate = system.solve(right, enough, _STATED, start=step)
             vectors += count
             force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
-        converged = max(errors) <= tolerance
+        converged = max(errors) <= tolerance and is_accurate
         if converged or iteration == max_iterations:
             break
         widening = -separation - diagonal * step
@@ -271,7 +275,7 @@ def steady_state(
 
         # Corrector: the second-order term that the predictor leaves out, and a step towards equal products.
         right = (centring - step * widening) / pressure
-        added, approach_added, count = system.solve(right, enough)
+        added, approach_added, count, _ = system.solve(right, enough)
         vectors += count
         step += added
         widening += right - diagonal * added
@@ -319,8 +323,8 @@ class _NewtonSystem:
 
     def solve(
         self, right: Array, enough: float, relative: float = _LOOSEST, start: Array | None = None
-    ) -> tuple[Array, float, int]:
-        """Return the changes of pressure and approach for a right-hand side, and the number of GMRES vectors.
+    ) -> tuple[Array, float, int, bool]:
+        """Return the changes of pressure and approach, the number of GMRES vectors, and whether they are accurate.
 
         Parameters
         ----------
@@ -331,8 +335,9 @@ class _NewtonSystem:
         start : array, shape (nx, ny), optional
             First guess of the change of the pressure. [Pa]
         """
-        scaled = self._scaled(right)
-        enough = min(enough, relative * math.sqrt(float((scaled**2).sum())))
+        scaled, step, vectors = self._scaled(right), start, 0
+        norm = whole = math.sqrt(float((scaled**2).sum()))
+        enough = min(enough, relative * norm)
         if start is not None:
             right = right - self._product(start)
             scaled = self._scaled(right)
@@ -340,11 +345,18 @@ class _NewtonSystem:
         def multiply(vector: Array) -> Array:
             return self._scaled(self._product(self._precondition(vector)))
 
-        # Preconditioned from the right: GMRES sees the residual of the system itself.
-        solution, count = gmres(multiply, scaled, enough)
-        step = self._precondition(solution)
-        approach_step = self._rigid_part(self._product(step) - right)
-        return step if start is None else start + step, approach_step, count
+        # Preconditioned from the right: GMRES sees the residual of the system itself. It starts again if rounding of
+        # the preconditioner, in single precision, hides that the residual is larger.
+        while True:
+            solution, count = gmres(multiply, scaled, enough)
+            change = self._precondition(solution)
+            step, vectors = change if step is None else step + change, vectors + count
+            right = right - self._product(change)
+            scaled, before = self._scaled(right), norm
+            norm = math.sqrt(float((scaled**2).sum()))
+            if not _REACHED * enough < norm < before / 2 or vectors >= _MOST_VECTORS:
+                break
+        return step, -self._rigid_part(right), vectors, norm <= _REACHED * max(enough, _STATED * whole)
 
     def _product(self, step: Array) -> Array:
         """Return ``(K + D) dp``. [m]"""
@@ -408,7 +420,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
         # The first direction is the residual; each further direction is the image of the last one, orthonormalised.
         directions = xp.empty((_RESTART + 1, right.size))
         directions[0] = residual / norm
-        triangle, along_residual = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART)
+        triangle, along_residual, size = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART), 0
         for k in range(_RESTART):
             image = operator(directions[k].reshape(shape)).reshape(-1)
             for _ in range(2):  # Gram-Schmidt, a second time if little is left
@@ -418,7 +430,9 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
                 length = math.sqrt(float(xp.einsum("i,i->", image, image)))
                 if length > _REPEATED * math.sqrt(float((along**2).sum())):
                     break
-            triangle[k, k] = length
+            if not 0 < length < math.inf:  # there is no further direction
+                break
+            triangle[k, k], size = length, k + 1
             directions[k + 1] = image / length
             along_residual[k] = float(xp.einsum("i,i->", directions[k + 1], residual))
             residual = residual - along_residual[k] * directions[k + 1]
@@ -426,8 +440,10 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
             count += 1
             if norm <= enough or count == _MOST_VECTORS:
                 break
-        weights = xp.asarray(np.linalg.solve(triangle[: k + 1, : k + 1], along_residual[: k + 1]))
-        solution += xp.einsum("ki,k->i", directions[: k + 1], weights)
+        if size == 0:
+            break
+        weights = xp.asarray(np.linalg.solve(triangle[:size, :size], along_residual[:size]))
+        solution += xp.einsum("ki,k->i", directions[:size], weights)
     return solution.reshape(shape), count
 
 
