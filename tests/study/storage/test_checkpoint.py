@@ -2,7 +2,10 @@
 
 import errno
 import logging
+import os
 import shutil
+import subprocess
+import sys
 import threading
 from contextlib import nullcontext
 
@@ -224,6 +227,91 @@ def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path):
     shutil.copy(unfinished / "rows-0000.npz", unfinished / f"rows-{number:04d}.npz")
     (unfinished / ".rows-0009.0f0f0f0f.part.npz").write_bytes(b"torn off while it was written")
     assert values(run_case(case, tmp_path)) == expected
+
+
+_KILLED = """
+import os, random, signal, sys, time
+from pathlib import Path
+from roughvisc.study.case import read_study
+from roughvisc.study.execution.run import run_case
+study, out, kills, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
+case, draw, done = read_study(study), random.Random(seed), 0
+for warm in ("imports", "timed"):
+    began, told = time.perf_counter(), []
+    run_case(case, out.parent / warm, checkpoint_steps=2, progress=lambda now, end: told.append(now))
+    step = (time.perf_counter() - began) / len(told)
+
+def work(pipe):
+    def report(now, end):
+        os.write(pipe, f"{now!r}\\n".encode())
+    run_case(case, out, progress=report, checkpoint_steps=2)
+
+def after(reports, pipe):
+    "What a run has told by then, or before it ended; at a random instant of the next step."
+    told = b""
+    while told.count(b"\\n") < reports and (more := os.read(pipe, 1000)):
+        told += more
+    time.sleep(draw.uniform(0.0, step))
+    return told.decode().split()
+
+def begun(pipe):
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            work(pipe)
+            code = 0
+        finally:
+            os._exit(code)
+    return pid
+
+while done < kills:
+    near, far = os.pipe()
+    pid = begun(far)
+    os.close(far)
+    came = after(draw.randrange(int(0.6 * len(told))), near)
+    os.kill(pid, signal.SIGKILL)
+    _, status = os.waitpid(pid, 0)
+    print(*came[:1] or "-", os.WIFSIGNALED(status), flush=True)
+    os.close(near)
+    if os.WIFSIGNALED(status):
+        done += 1
+    elif status:
+        sys.exit("failed")
+    else:  # it was through before: begin anew
+        (out / f"{case.key}.nc").unlink()
+near, far = os.pipe()
+_, status = os.waitpid(begun(far), 0)
+sys.exit(status)
+"""
+
+
+def killed(folder, kills, seed):
+    """Times at which the killed runs began, as far as they came."""
+    arguments = [folder / "study.toml", folder / "out", kills, seed]
+    command = [sys.executable, "-c", _KILLED, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return [line.split()[0] for line in done.stdout.splitlines()]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
+@pytest.mark.parametrize(
+    ("name", "kills"),
+    [
+        ("modes", 2),
+        *(pytest.param(name, 3, marks=pytest.mark.thorough) for name in ("sliding", "pulled", "layer", "curve")),
+        *(pytest.param(name, 24, marks=pytest.mark.long) for name in CASES),
+    ],
+)
+def test_killed_at_random_instants__ends_with_the_same_bits(whole, tmp_path, name, kills):
+    _, expected, _ = whole(CASES[name])
+    case = case_of(CASES[name], tmp_path)
+    began = killed(tmp_path, kills, seed=kills)
+    assert len(began) >= kills
+    assert any(first not in ("-", "0.0") for first in began), "some went on from a checkpoint"
+    assert values(tmp_path / "out" / f"{case.key}.nc") == expected
+    assert names(tmp_path / "out") == [f"{case.key}.nc"]
 
 
 @pytest.mark.parametrize("size", ["16k", "500k", "1200k"])
