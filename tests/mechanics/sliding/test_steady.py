@@ -148,6 +148,18 @@ def test_material_without_compliance_at_once__slides(speed):
     assert found.power_force == pytest.approx(tight.power_force, rel=2e-3)
 
 
+def test_loss_tangent_of_three_thousand__is_solved_despite_a_preconditioner_in_single_precision():
+    height = rv.from_array(1e-7 * np.random.default_rng(0).standard_normal((16, 12)), spacing=1e-6)
+    settings = {"speeds": [0.1], "pressure": 1e3, "boundary": "periodic", "fields": ("pressure",), "progress": False}
+    found, tight = (
+        rv.friction(height, rv.kelvin_voigt(1e6, 1e4), tolerance=tolerance, grid_error=False, **settings)
+        for tolerance in (1e-3, 1e-7)
+    )
+    apart = float(np.abs(found.pressure - tight.pressure).sum() / tight.pressure.sum())
+    assert apart < float(found.stated_error[0]) < 1e-3
+    assert float(found.friction_force[0]) == pytest.approx(float(tight.friction_force[0]), rel=1e-3)
+
+
 def test_units__do_not_matter():
     metres = slid(ROUGH, rubber(), 0.1, LOAD)
     microns = slid(ROUGH * 1e6, rubber(), 0.1e6, LOAD * 1e12, side=PERIOD * 1e6)
