@@ -148,9 +148,10 @@ def test_material_without_compliance_at_once__slides(speed):
     assert found.power_force == pytest.approx(tight.power_force, rel=2e-3)
 
 
-def test_loss_tangent_of_three_thousand__is_solved_despite_a_preconditioner_in_single_precision():
-    height = rv.from_array(1e-7 * np.random.default_rng(0).standard_normal((16, 12)), spacing=1e-6)
-    settings = {"speeds": [0.1], "pressure": 1e3, "boundary": "periodic", "fields": ("pressure",), "progress": False}
+@pytest.mark.parametrize("seed", range(4))
+def test_loss_tangent_of_ten_thousand__is_solved_despite_a_preconditioner_in_single_precision(seed):
+    height = rv.from_array(1e-7 * np.random.default_rng(seed).standard_normal((16, 12)), spacing=1e-6)
+    settings = {"speeds": [0.4], "pressure": 1e5, "boundary": "periodic", "fields": ("pressure",), "progress": False}
     found, tight = (
         rv.friction(height, rv.kelvin_voigt(1e6, 1e4), tolerance=tolerance, grid_error=False, **settings)
         for tolerance in (1e-3, 1e-7)
