@@ -134,7 +134,7 @@ def test_material__is_added_in_one_file(added):
     edits = {
         "mechanics/materials/models.py": {
             "MODELS: dict[str, Callable[..., Material]] = {\n": '    "gel": gel,\n',
-            "from roughvisc.units import Quantity, quantities\n": """
+            "from roughvisc.units import Quantity, number, quantities\n": """
 
 @quantities(modulus="Pa", drainage="s")
 def gel(modulus: Quantity, drainage: Quantity) -> Prony:

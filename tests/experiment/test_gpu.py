@@ -140,7 +140,7 @@ def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeyp
     said = " ".join(capsys.readouterr().err.split())
     assert "device" in said
     assert expected in said
-    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["study.toml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 
 def test_device__of_an_unknown_name_is_refused():

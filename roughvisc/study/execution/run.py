@@ -10,7 +10,7 @@ import re
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -166,8 +166,9 @@ def run_case(
     if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
         return path  # finished, without leftovers to remove
     require_writable(folder, "since the case is not finished")
-    folder.mkdir(parents=True, exist_ok=True)
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with (
             lock_case(lock_path(folder, case.key)),
             closing(
@@ -204,6 +205,10 @@ def run_case(
             raise
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
+    finally:
+        for place in made:  # rmdir removes only empty folders
+            with suppress(OSError):
+                place.rmdir()
     return path
 
 
