@@ -247,6 +247,8 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     if (every := block_side(dataset)) > 1:
         notes.append(f"One cell drawn for {every} × {every}, with its largest pressure and smallest gap.")
     style.note_below(figure, " ".join(notes))
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)  # panels of a fixed aspect find their place in the second pass, when they are drawn
     return figure
 
 
