@@ -58,17 +58,17 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
     """
     if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())
-    declared = {
-        name: VARIABLES[str(name)] for name in dataset.variables if name in VARIABLES or name in dataset.data_vars
-    }
-    found = {name: dataset.variables[name] for name in declared}
-    labelled = dataset.assign(  # once: each assignment merges the whole
-        {name: one.astype(declared[name].dtype) for name, one in found.items() if one.dtype.kind not in "fUO"}
-    )
+    declared, converted = {}, {}
+    for name, variable in dataset.variables.items():
+        if name in VARIABLES or name in dataset.data_vars:
+            declared[name] = VARIABLES[str(name)]
+            if variable.dtype.kind not in "fUO":
+                converted[name] = variable.astype(declared[name].dtype)
+    labelled = dataset.assign(converted)  # once: each assignment merges the whole
     for name, one in declared.items():
         attributes = labelled.variables[name].attrs
         attributes.update(one.attributes)
-        if errors := " ".join(error for error in ERRORS[str(name)] if error in dataset):
+        if errors := " ".join(filter(dataset.__contains__, ERRORS[str(name)])):
             attributes["ancillary_variables"] = errors
         if name in _CARTESIAN:
             attributes["cartesian_axis"] = _CARTESIAN[str(name)]
@@ -83,8 +83,11 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
     >>> warnings_of({"warnings": "slope: too steep"})
     {'slope': 'too steep'}
     """
-    lines = str(attributes.get("warnings", "")).splitlines()
-    return dict(line.split(": ", 1) for line in lines)
+    found = {}
+    for line in str(attributes.get("warnings", "")).splitlines():
+        subject, text = line.split(": ", 1)
+        found[subject] = text
+    return found
 
 
 def warnings_text(warnings: Mapping[str, str]) -> str:

@@ -237,14 +237,14 @@ class SlidingRows(Rows):
         for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
             speed = self._curve.speeds[number]
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
-            slides, states = [], []
+            states, across, convolutions, creep = [], 0.0, 0, 0.0
             for cells in self._grids:
-                slides.append(Sliding(law, cells.gap.shape, cells.spacing, speed, xp))
-                states.append(steady_state(slides[-1], xp.asarray(cells.gap), self._force, tolerance=tolerance))
-            across, creep = slides[0].force(states[0].pressure, axis=1), 0.0
-            states = [
-                replace(one, pressure=to_host(one.pressure), displacement=to_host(one.displacement)) for one in states
-            ]
+                sliding = Sliding(law, cells.gap.shape, cells.spacing, speed, xp)
+                found = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=tolerance)
+                if not states:  # the grid of the surface
+                    across, convolutions = sliding.force(found.pressure, axis=1), sliding.convolutions
+                pressure, displacement = to_host(found.pressure), to_host(found.displacement)
+                states.append(replace(found, pressure=pressure, displacement=displacement))
             found = states[0]
             row, fields = self._row(found)
             row["friction_force_across"] = across
@@ -257,7 +257,7 @@ class SlidingRows(Rows):
                 for one in law.materials:
                     crept = float(one.contact_compliance(grid.period / speed))
                     creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
-            row["convolutions"] = slides[0].convolutions
+            row["convolutions"] = convolutions
             row["creep_left"] = creep  # left when the next contact arrives
             yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
 
@@ -291,7 +291,7 @@ class SlidingRows(Rows):
         """Return the result with the direction, numbers for an audit, and warnings."""
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
-        longest = max(float(np.ptp(height[axis].values)) for axis in ("x", "y"))
+        longest = max(float(np.ptp(height["x"].values)), float(np.ptp(height["y"].values)))
         warnings = {
             "slope": slope_warning(height, "periodic", np.inf),
             "border": border_warning(height, xr.Dataset()),
