@@ -74,7 +74,7 @@ NEARLY_NOTHING = 0.02
 SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
 #: Least number of pairs in a period of a cycle.
 PAIRS_OF_A_CYCLE = 8
-#: Least part of a pair that each step takes where force and approach are parabolas over the pair.
+#: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
 LEAST_PART = 0.1
 #: A pair of steps is soft if less than this part of its compliance is instantaneous.
 SOFT = 0.1

@@ -54,7 +54,7 @@ class SweepCase:
 
 
 def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
-    """Return keys and JSON of some cases, in their order, without duplicates of key and labels."""
+    """Return key and JSON of each case, in the given order; cases of equal key and labels count once."""
     distinct: dict[Any, Case] = {}
     for case in cases:
         distinct.setdefault((case.key, json.dumps(dict(case.varied))), case)
