@@ -154,11 +154,9 @@ class LoadingRows(Rows):
         self._border = self._start.border
 
         profile, cells = surface.profile, surface.domain.cells
-        gap, present = np.ascontiguousarray(profile.gap[cells]), None
-        if not profile.all_present:
-            present = profile.present[cells]
-        self._gap, self._present, shape = gap, present, (gap.shape[0], gap.shape[1])
-        grid = Grid(shape, profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
+        gap = np.ascontiguousarray(profile.gap[cells])
+        present = None if profile.all_present else profile.present[cells]
+        grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
         options = memory_options(program, settings)
         self.choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
         log.info("memory: %s", self.choice.note)
@@ -239,23 +237,24 @@ class LoadingRows(Rows):
             Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
         """
         scene, profile, domain, point = self.scene, self._profile, self.domain, step.point
-        grid, is_whole, displaced = scene.grid, domain.is_whole, scene.memory.displacement(point.history)
-        pressure, on_host = to_host(point.pressure), to_host(displaced)
-        contact, displacement, effective = pressure > 0, on_host[0], on_host[-1]
-        gap = np.maximum(self._gap + displacement - point.approach, 0.0)
+        grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
+        displaced, pressure = scene.memory.displacement(point.history), point.pressure
+        contact, displacement = pressure > 0, displaced[0]
+        gap = xp.maximum(scene.gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0
 
         # Counting cells overestimates the area by a part of the strip along the perimeter, where contact ends within
         # the material. If the material itself ends, at an absent cell or at the border of a scan in free space, the
         # edge of the contact is known and the count is exact. A mirror plane is not an edge: cells adjoin their images.
-        free, goes_on = ~contact if self._present is None else self._present & ~contact, not is_whole
+        free, goes_on = ~contact if present is None else present & ~contact, not is_whole
         counted, area = contact_area(contact, free, grid.cell_area, grid.boundary == "periodic", goes_on, goes_on)
 
-        is_full = is_whole and np.count_nonzero(contact) == np.count_nonzero(profile.present)
+        is_full = is_whole and not bool(free.any())
         status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
         if is_whole:
-            mean_gap = float(np.mean(gap, where=profile.present))
+            mean_gap = float((gap if present is None else gap[present]).mean())
         else:
+            effective = to_host(displaced[-1])
             mean_gap = profile.mean_gap + domain.mean_displacement(effective) - point.approach
         row: dict[str, Any] = {
             "force": point.force,
@@ -281,23 +280,24 @@ class LoadingRows(Rows):
             }
         if not kept:
             return row, {}
-        area_off = area_error(step, scene, pressure, gap, self._present, counted, area)
+        area_off = area_error(step, scene, pressure, gap, counted, area)
         row |= stated | {"contact_area_error": area_off}
 
-        names, kept_fields = self.problem.settings.fields, {}
+        names, found = self.problem.settings.fields, {"pressure": pressure, "displacement": displacement, "gap": gap}
+        kept_fields = {name: to_host(found[name]) for name in names}
         if is_whole:
-            gap = np.where(profile.present, gap, np.nan)
-        else:
-            pressure = domain.padded(pressure)
-            if "displacement" in names or "gap" in names:
-                whole = domain.displacement(effective)
-                whole[domain.cells] = displacement
-                opening = np.maximum(profile.gap + whole - point.approach, 0.0)
-                opening[domain.cells] = gap
-                displacement, gap = whole, opening
-        for name in names:
-            kept_fields[name] = {"pressure": pressure, "displacement": displacement, "gap": gap}[name]
-        return row, kept_fields
+            if "gap" in names:
+                kept_fields["gap"] = np.where(profile.present, kept_fields["gap"], np.nan)
+            return row, kept_fields
+        if "displacement" in names or "gap" in names:
+            whole = domain.displacement(effective)
+            whole[domain.cells] = to_host(displacement)
+            opening = np.maximum(profile.gap + whole - point.approach, 0.0)
+            opening[domain.cells] = to_host(gap)
+            kept_fields |= {"displacement": whole, "gap": opening}
+        if "pressure" in names:
+            kept_fields["pressure"] = domain.padded(kept_fields["pressure"])
+        return row, {name: kept_fields[name] for name in names}
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result with the cost of each row, the nominal pressure and the attributes.

@@ -59,8 +59,9 @@ class Available:
 def memory_available(device: str = "cpu") -> Available:
     """Return the memory of a device that is available to this process, and the origin of the limit."""
     if device == "gpu":
-        free, _ = arrays_of(device).cuda.runtime.memGetInfo()
-        return Available(float(free), "free on the GPU")
+        xp = arrays_of(device)
+        kept = xp.get_default_memory_pool().free_bytes()  # of earlier runs in this process, which this one reuses
+        return Available(float(xp.cuda.runtime.memGetInfo()[0] + kept), "free on the GPU")
     import psutil
     from distributed import get_worker  # slow to import
     from distributed.system import MEMORY_LIMIT

@@ -215,9 +215,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     }
 
 
-def area_error(
-    step: Step, scene: Scene, pressure: Array, gap: Array, present: Array | None, counted: float, area: float
-) -> float:
+def area_error(step: Step, scene: Scene, pressure: Any, gap: Any, counted: float, area: float) -> float:
     """Return the error of the contact area due to time steps and contact solver. [m2]
 
     The solver may misjudge a contact cell if its pressure is below the error of the pressure at the edge. It may
@@ -227,24 +225,22 @@ def area_error(
     ----------
     step, scene : Step, Scene
         An accepted step.
-    pressure, gap : ndarray, shape (nx, ny)
+    pressure, gap : array, shape (nx, ny)
         Pressure [Pa] and gap between the surfaces. [m]
-    present : ndarray of bool or None
-        Cells with material; None: all.
     counted, area : float
         Contact area, counted and corrected for the grid. [m2]
     """
-    point, apart, contact = step.point, step.difference, pressure > 0
+    point, apart, xp = step.point, step.difference, scene.grid.xp
     inside, outside = apart.inside, apart.outside
-    if contact.any() and point.solver_error > 0:
-        off = SOLVER_AT_EDGE * point.solver_error * float(pressure[contact].mean())
+    if counted > 0 and point.solver_error > 0:
+        off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
         closed = off * scene.grid.self_influence * scene.memory.compliance(length_of(step, scene))
-        closing = ~contact & (gap <= closed)
-        if present is not None:
-            closing &= present
-        opening = contact & (pressure <= off)
-        inside += scene.grid.cell_area * float(np.count_nonzero(opening))
-        outside += scene.grid.cell_area * float(np.count_nonzero(closing))
+        closing = (pressure == 0) & (gap <= closed)
+        if scene.present is not None:
+            closing &= scene.present
+        opening = (pressure > 0) & (pressure <= off)
+        inside += scene.grid.cell_area * int(xp.count_nonzero(opening))
+        outside += scene.grid.cell_area * int(xp.count_nonzero(closing))
     lower, upper = area_bounds(counted, area, inside, outside)
     return float(max(area - lower, upper - area))
 

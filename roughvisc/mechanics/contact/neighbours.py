@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.grid import Boundary
+from roughvisc.mechanics.grid import Boundary, namespace
 
-Array = Any  # a float or an array
+Array = Any  # an array of NumPy or CuPy, or a float
 Mask = NDArray[np.bool_]
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
@@ -46,22 +46,22 @@ def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: boo
         yield from (lower.T, upper.T) if turned else (lower, upper)
 
 
-def faces_between(contact: Mask, free: Mask, periodic: bool, before: bool = False, beyond: bool = False) -> int:
+def faces_between(contact: Array, free: Array, periodic: bool, before: bool = False, beyond: bool = False) -> int:
     """Return the number of faces between contact cells and free cells, see :func:`neighbours`.
 
     With mirror boundaries the border has no such faces: use ``periodic=False`` and the default values beyond it.
     """
-    count = 0
+    count, xp = 0, namespace(contact)
     for own, other in ((contact, free), (contact.T, free.T)):
         below = other[-1] if periodic else before
         above = other[0] if periodic else beyond
         for cells, beside in (own[1:], other[:-1]), (own[:-1], other[1:]), (own[0], below), (own[-1], above):
-            count += int(np.count_nonzero(cells & beside))
+            count += int(xp.count_nonzero(cells & beside))
     return count
 
 
 def contact_area(
-    contact: Mask, free: Mask, cell_area: float, periodic: bool, before: bool = False, beyond: bool = False
+    contact: Array, free: Array, cell_area: float, periodic: bool, before: bool = False, beyond: bool = False
 ) -> tuple[float, float]:
     """Return the area of the cells in contact, counted and corrected for the grid. [m2]
 
@@ -69,14 +69,14 @@ def contact_area(
 
     Parameters
     ----------
-    contact, free : ndarray of bool, shape (nx, ny)
+    contact, free : array of bool, shape (nx, ny)
         Contact cells, and cells with material out of contact.
     cell_area : float
         Area of a cell. [m2]
     periodic, before, beyond
         See :func:`neighbours`.
     """
-    counted = int(np.count_nonzero(contact)) * cell_area
+    counted = int(namespace(contact).count_nonzero(contact)) * cell_area
     # a face across x is dy long and lies in a strip dx wide, and the other way round
     strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, periodic, before, beyond)
     return counted, max(counted - strip, 0.0)
