@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.half_space import check_grid, love_kernel
+from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
@@ -156,8 +156,6 @@ def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[fl
     as a preconditioner.
     """
     offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
-    if padded[0] % 2 or padded[1] % 2:
-        raise ValueError(f"padded is {padded}: expected even numbers of points")
     symbol: Array = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
     return symbol
 
@@ -182,9 +180,8 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
     Raises
     ------
     InputError
-        If the grid is impossible, or the transfer function is not positive.
+        If the transfer function is not positive.
     """
-    check_grid(shape, spacing)
     waves = periodic_waves(shape, spacing)
     symbol = np.array(kernel.transfer(*waves), dtype=float)
     wrong = ~(np.isfinite(symbol) & (symbol > 0))

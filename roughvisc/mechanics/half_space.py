@@ -12,8 +12,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
-
 Array = NDArray[np.float64]
 
 # Rings of distances in longer cell sides, and number of Gauss points per side for an error of 1e-15 in each ring. The
@@ -38,11 +36,6 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
         compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
 
-    Raises
-    ------
-    InputError
-        If a side is not positive and finite, or a number of cells is not positive.
-
     Notes
     -----
     Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
@@ -54,7 +47,6 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
     .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
     """
-    check_grid(shape, spacing)
     longer = max(spacing)
     dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
     x = np.arange(shape[0], dtype=float)[:, None] * dx
@@ -127,12 +119,3 @@ def cell_mean(
 
 
 _gauss_rule = cache(np.polynomial.legendre.leggauss)
-
-
-def check_grid(shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-    """Check the number of cells and the cell sides of a grid."""
-    (nx, ny), (dx, dy) = shape, spacing
-    if int(nx) != nx or int(ny) != ny or min(nx, ny) < 1:
-        raise InputError(f"shape is {shape}: expected two positive whole numbers of cells")
-    if not (0 < dx < math.inf and 0 < dy < math.inf):
-        raise InputError(f"spacing is {spacing}: expected two positive lengths [m]")

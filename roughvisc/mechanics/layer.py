@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
-from roughvisc.mechanics.half_space import cell_mean, check_grid, corner_sum, love_kernel
+from roughvisc.mechanics.half_space import cell_mean, corner_sum, love_kernel
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
@@ -313,7 +313,6 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
     """
     from scipy.interpolate import CubicSpline  # slow to import
 
-    check_grid(shape, spacing)
     (dx, dy), unit = spacing, float(depths[0])
     x, y = dx * np.arange(shape[0])[:, None], dy * np.arange(shape[1])[None, :]
     near = np.hypot(x, y) <= _NEAR_CELLS * max(spacing)
@@ -503,7 +502,7 @@ class LayeredBody(Body):
 
     def __repr__(self) -> str:
         text = repr(self.below[-1])
-        for material, h in zip((self.material, *self.below[:-1])[::-1], self.thicknesses[::-1], strict=True):
+        for material, h in zip(self.materials[-2::-1], self.thicknesses[::-1], strict=True):
             text = f"layer({material!r}, thickness={format_quantity(h, 'm')}, on={text})"
         return text
 
@@ -513,29 +512,23 @@ class LayeredBody(Body):
         return (self.material, *self.below)
 
     @property
-    def poissons(self) -> tuple[float, ...]:
-        """Poisson's ratios from the top."""
-        return tuple(material.poisson for material in self.materials)
-
-    @property
     def separates(self) -> bool:
         """Whether space and time separate: the compliances of all materials are in proportion."""
         return all(in_proportion(one, self.materials[0]) for one in self.materials)
 
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> LayeredBody:
         """Return the body with materials that represent its own at some frequencies. [1/s]"""
-        top, *below = (over_frequencies(one, frequency, tolerance) for one in (self.material, *self.below))
+        top, *below = (over_frequencies(one, frequency, tolerance) for one in self.materials)
         return replace(self, material=top, below=tuple(below))
 
     def waves(self, qx: Array, qy: Array, frequency: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return the kernel of a half-space [m], and the effective contact compliance of each wave. [1/Pa]"""
         q = np.hypot(qx, qy)
-        contact = [complex_compliance(one, frequency) for one in (self.material, *self.below)]
+        contact = [complex_compliance(one, frequency) for one in self.materials]
+        poissons = [one.poisson for one in self.materials]
         flows = np.any([~np.isfinite(one) for one in contact], axis=0)
-        shear = [
-            2 / (1 - poisson) * np.where(flows, 1.0, one) for poisson, one in zip(self.poissons, contact, strict=True)
-        ]
-        found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, shear)
+        shear = [2 / (1 - poisson) * np.where(flows, 1.0, one) for poisson, one in zip(poissons, contact, strict=True)]
+        found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, poissons, shear)
         return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
 
     def facts(self, end: float) -> dict[str, Any]:
@@ -596,7 +589,17 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
         _check("on", below[0])
     if thickness == math.inf:
         return Body(material)
-    return LayeredBody(material, _final_kernel((material, *below), thicknesses), below, thicknesses)
+    # the kernel is of the final state, or of an earlier one if it is unknown or infinite, per unit of the top
+    materials = (material, *below)
+    for age in _AGES:
+        with suppress(InputError):  # a table ends earlier
+            shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]
+            if all(0 < one < math.inf for one in shear):
+                break
+    unit = 0.5 * (1 - material.poisson) * shear[0]
+    elastic = tuple(Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, materials, strict=True))
+    kernel = layer_series(Layers(thicknesses, elastic), 0.0, 0.0, _ELASTIC).kernel()
+    return LayeredBody(material, kernel, below, thicknesses)
 
 
 def _check(name: str, material: Any) -> None:
@@ -609,18 +612,6 @@ def _check(name: str, material: Any) -> None:
     poisson = material.poisson
     if not 0 <= poisson <= 0.5:
         raise InputError(key=name, found=poisson, expected="Poisson's ratio from 0 to 1/2 in a layered body")
-
-
-def _final_kernel(materials: tuple[Material, ...], thicknesses: tuple[float, ...]) -> LayerKernel:
-    """Return the kernel of the final state, or of an earlier one if it is unknown or infinite, per unit of the top."""
-    for age in _AGES:
-        with suppress(InputError):  # a table ends earlier
-            shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]
-            if all(0 < one < math.inf for one in shear):
-                break
-    unit = 0.5 * (1 - materials[0].poisson) * shear[0]
-    elastic = tuple(Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, materials, strict=True))
-    return layer_series(Layers(thicknesses, elastic), 0.0, 0.0, _ELASTIC).kernel()
 
 
 def in_proportion(material: Material, other: Material) -> bool:

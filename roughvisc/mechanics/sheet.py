@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel
-from roughvisc.mechanics.half_space import cell_mean, check_grid, love_kernel
+from roughvisc.mechanics.half_space import cell_mean, love_kernel
 from roughvisc.mechanics.materials.creep import Material, check_material
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
 Base = Literal["bonded", "slipping"]
@@ -81,14 +82,13 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     return Body(material) if endless else Body(material, kernel)
 
 
-@quantities(thickness="m")
 @dataclass(frozen=True)
 class Sheet(Kernel):
     r"""Kernel of a homogeneous sheet on a rigid base.
 
     Parameters
     ----------
-    thickness : float or str
+    thickness : float
         Thickness. [m]
     poisson : float
         Poisson's ratio, from 0 to 1/2. On a slipping base the kernel does not depend on it.
@@ -117,17 +117,14 @@ class Sheet(Kernel):
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.8.
     """
 
-    thickness: Quantity
+    thickness: float
     poisson: float = 0.5
     base: Base = BASE
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.thickness, int | float) and 0 < self.thickness < math.inf):
-            raise InputError(key="thickness", found=self.thickness, expected="a positive number [m]")
-        if not 0 <= self.poisson <= 0.5:
-            raise InputError(key="poisson", found=self.poisson, expected="0 to 1/2 in a sheet")
-        if self.base not in get_args(Base):
-            raise InputError(key="base", found=self.base, expected=" or ".join(map(repr, get_args(Base))))
+        number(self.thickness, "m", "thickness", above=0)
+        number(self.poisson, "1", "poisson", least=0, most=0.5)
+        one_of("base", self.base, get_args(Base))
 
     @property
     def uniform_displacement(self) -> float:
@@ -157,7 +154,6 @@ class Sheet(Kernel):
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel less the correction, to 1e-13 of the largest value; or the kernel of long cells. [m]"""
-        check_grid(shape, spacing)
         dx, dy = (side / self.thickness for side in spacing)
         if max(dx, dy) > _LONG:
             return self._influence_of_long_cells(shape, spacing)

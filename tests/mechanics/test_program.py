@@ -6,7 +6,7 @@ import pytest
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.program import Segment, Slide
+from roughvisc.mechanics.program import Slide
 
 PRESSED = rv.Program().load(1.0, over=1.0)
 
@@ -52,15 +52,19 @@ def test_cycle__is_a_sine_about_its_mean():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Segment("load", 1, -1.0), r"load reaches -1\.0 N: expected no negative load"),
-        (lambda: Segment("pressure", 1, -1.0), r"pressure reaches -1\.0 Pa: expected no negative pressure"),
-        (lambda: Segment("load", -1, 1.0), r"duration of a load segment is -1"),
-        (lambda: Segment("load", 1, math.nan), r"load is nan: expected a finite number \[N\]"),
+        (lambda: rv.Program.table([0, 1], [0, -1.0]), r"load reaches -1\.0 N: expected no negative load"),
+        (
+            lambda: rv.Program.table([0], [-1.0], "pressure"),
+            r"pressure reaches -1\.0 Pa: expected no negative",
+        ),
+        (lambda: rv.Program().load(1.0, over=-1), "over: found -1"),
+        (lambda: rv.Program().load(math.nan, over=1), "load: found nan"),
         (lambda: rv.Program().pressure("1 kPa", over=0).largest_load, "nominal pressure: expected loads"),
         (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), r"load reaches -1\.0 N"),
-        (lambda: Segment("load", 1.0, 2.0, slide=Slide(1e-3)), "a slide keeps the controlled quantity"),
-        (lambda: Slide(-1e-3), "distance: found -0.001"),
-        (lambda: Slide(1e-3, "z"), "direction: found 'z'"),
+        (lambda: rv.Program().slide(-1e-3, speed=1.0), "slide: found -0.001"),
+        (lambda: rv.Program().slide(1e-3, speed=1.0, direction="z"), "direction: found 'z'"),
+        (lambda: rv.Program().slide(1e-300, speed=1e300), "over: found 0"),
+        (lambda: rv.Program.cycle(1.0, 0.5, 1e305, 1e6), "cycles: found inf"),
     ],
 )
 def test_bad_programs__are_named(make, message):
@@ -107,4 +111,4 @@ def test_pressure__is_a_load_on_an_area():
     assert on.corners == program.corners
     assert on.largest_load == pytest.approx(1.5)
     loads = rv.Program().load(1.0, over=1.0)
-    assert loads.on_area(3e-6) is loads
+    assert loads.on_area(3e-6) == loads
