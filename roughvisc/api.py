@@ -14,7 +14,7 @@ from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import ISSUED, warnings_of
-from roughvisc.mechanics.body import Body, body_of
+from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
@@ -129,7 +129,7 @@ def simulate(
         edge=edge,
         grid_error=grid_error,
     )
-    problem = Problem(height, body_of(material), settings)
+    problem = Problem(height, as_body(material), settings)
     return _warned(solve(problem, Loading(program), progress=progress, threads=threads), 3)
 
 
@@ -223,7 +223,7 @@ def friction(
     settings = Settings(
         **_stated(numerics), boundary=boundary, tolerance=tolerance, fields=fields, grid_error=grid_error
     )
-    problem = Problem(height, body_of(material), settings)
+    problem = Problem(height, as_body(material), settings)
     found = solve(problem, curve, progress=progress, threads=threads)
     return _warned(found.assign_attrs(title="Steady sliding"), 4)
 

@@ -305,6 +305,6 @@ class Body:
         return facts
 
 
-def body_of(material: Any) -> Body:
+def as_body(material: Any) -> Body:
     """Return a body itself, or the half-space of a material."""
     return material if isinstance(material, Body) else Body(material)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body, body_of
+from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.mechanics.materials.series import series
@@ -85,7 +85,7 @@ def choose_memory(
         If the material is not known over the whole program, or no memory of the body is known.
     """
     shortest = SHORTEST_AGE * duration if shortest is None else shortest
-    body = body_of(body)
+    body = as_body(body)
     if not body.separates:
         return _of_layers(body, duration, tolerance, shortest, grid)
     material = body.material

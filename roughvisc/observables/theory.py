@@ -14,7 +14,7 @@ from scipy.special import erf
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
 from roughvisc.labels import label
-from roughvisc.mechanics.body import Body, body_of
+from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.frames import need
@@ -142,7 +142,7 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     """
     if not {"height", "nominal_pressure", "speed"} <= set(dataset.variables) or "direction" not in dataset.attrs:
         raise InputError(key="dataset", found=list(dataset.variables), expected="a result of rv.friction with height")
-    body = body_of(material)
+    body = as_body(material)
     height = dataset["height"]
     grid = SlidingGrid.of(-height.values, spacing(height, "height"), dataset.attrs["direction"])
     found = []

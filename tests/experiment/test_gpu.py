@@ -12,7 +12,7 @@ import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
-from roughvisc.mechanics.body import body_of
+from roughvisc.mechanics.body import as_body
 from roughvisc.settings import Settings
 from roughvisc.solve import solve
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -102,7 +102,7 @@ def test_friction__on_a_device_is_that_of_a_cpu(gpu, boundary):
 def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name, tmp_path):
     height, body, program, settings = SCENES[name]
     settings = Settings(times=6, **({"boundary": "free"} | settings), device="gpu")
-    problem = Problem(height, body_of(body), settings)
+    problem = Problem(height, as_body(body), settings)
     whole = solve(problem, Loading(program))
     count = iter(range(1000))
     stopped = CheckpointWriter(tmp_path / "run", "key", steps=1, stop=lambda: next(count) == 4)

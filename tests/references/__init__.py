@@ -11,6 +11,7 @@ from references.half_space import (
     punch_dissipation,
     punch_force,
     reduced_contact,
+    relaxation_spectrum,
     sticking_stiffness,
 )
 from references.layered import ElasticLayer, OnSheet, PunchOnSheet
@@ -28,6 +29,7 @@ __all__ = [
     "punch_dissipation",
     "punch_force",
     "reduced_contact",
+    "relaxation_spectrum",
     "sliding_cylinder",
     "sticking_stiffness",
 ]

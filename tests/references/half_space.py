@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
 
+import mpmath
 import numpy as np
 from scipy.optimize import brentq
 
@@ -54,6 +55,24 @@ class Cone:
         return np.sqrt(np.asarray(scaled_force) * 2 / (np.pi * self.slope))
 
 
+def relaxation_spectrum(material):
+    """Equilibrium modulus, moduli and relaxation times of a series, from the eigenvalues of its Kelvin chain. [Pa], [s]
+
+    The strains of the elements under a step follow ``x' = b / J_0 - S x`` with ``b_i^2 = J_i / tau_i`` and
+    ``S = diag(1 / tau_i) + b b^T / J_0``; a dashpot is an element of rate zero.
+    """
+    compliances, times = (np.array(one) for one in (material.compliances, material.times))
+    with mpmath.workdps(45):  # the rates span many decades
+        rates = [1 / mpmath.mpf(one) for one in times] + [mpmath.mpf(0)] * bool(material.fluidity)
+        strengths = [one * rate for one, rate in zip(compliances, rates, strict=False)] + [material.fluidity]
+        root = mpmath.matrix([mpmath.sqrt(one) for one in strengths[: len(rates)]])
+        roots, vectors = mpmath.eigsy(mpmath.diag(rates) + root * root.T / material.glassy)
+        moduli = [(vectors[:, k].T * root)[0] ** 2 / material.glassy**2 / one for k, one in enumerate(roots)]
+        moduli, relaxation_times = (np.array(one, dtype=float) for one in (moduli, [1 / one for one in roots]))
+    equilibrium = 0.0 if material.fluidity else 1 / (material.glassy + compliances.sum())
+    return equilibrium, moduli, relaxation_times
+
+
 @dataclass(frozen=True)
 class Relaxation:
     """Contact modulus ``E(t) = 2 G(t) / (1 - nu)`` of an exponential series with an instantaneous compliance. [Pa]"""
@@ -64,7 +83,7 @@ class Relaxation:
 
     @classmethod
     def of(cls, material):
-        equilibrium, moduli, times = material.relaxation_spectrum()
+        equilibrium, moduli, times = relaxation_spectrum(material)
         factor = 2 / (1 - material.poisson)
         return cls(factor * equilibrium, factor * moduli, times)
 

@@ -115,35 +115,6 @@ class Prony:
         """Retarded compliances [1/Pa] and times [s]."""
         return np.array(self.compliances), np.array(self.times)
 
-    def relaxation_spectrum(self) -> tuple[float, Array, Array]:
-        r"""Return the shear relaxation modulus as ``G(t) = G_e + sum G_k exp(-t / theta_k)``.
-
-        Returns
-        -------
-        equilibrium : float
-            ``G_e``, zero for a fluid. [Pa]
-        moduli, times : ndarray
-            ``G_k`` [Pa] and ``theta_k`` [s].
-
-        Raises
-        ------
-        InputError
-            If the instantaneous compliance is zero: the relaxation modulus then contains an impulse.
-
-        Notes
-        -----
-        The relaxation rates are the zeros of ``J_0 - phi/mu + sum J_i r_i / (r_i - mu)``, ``r_i = 1/tau_i``,
-        one above each pole (the fluidity is a pole at zero).
-        """
-        if self.glassy == 0:
-            raise InputError("a material without instantaneous compliance has no finite relaxation modulus")
-        strengths, poles = self.poles()
-        roots = secular_roots(strengths, poles, self.glassy)
-        moduli = np.array([1 / (rate * float(np.sum(strengths / offset**2))) for rate, offset in roots])
-        retarded = float(np.sum(merged(self.compliances, self.times)[0]))
-        equilibrium = 0.0 if self.fluidity else 1 / (self.glassy + retarded)
-        return equilibrium, moduli, np.array([1 / rate for rate, _ in roots])
-
     def poles(self) -> tuple[Array, Array]:
         """Return strengths and poles of the transform ``J^(s) = J_0 + sum strengths / (poles + s)``. [1/s]"""
         weights, rates = merged(self.compliances, self.times)

@@ -47,11 +47,6 @@ class Flow:
     error: float
     pressure: Array
 
-    @property
-    def is_closed(self) -> bool:
-        """Whether no path connects the two sides."""
-        return self.conductance == 0.0
-
 
 def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flow:
     r"""Return the flow through a gap from one side of the map to the opposite side, along the first axis.
