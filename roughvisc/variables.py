@@ -275,10 +275,10 @@ GRID_ERROR = {
     "contact_area": "grid_error_area",
     "friction_force": "grid_error_friction",
 }
-#: Variable -> variables that may state its error.
+#: Variable -> variables that may state its error. The variable `time_error` is about the time steps, not the time.
 ERRORS = {
     name: tuple(one for one in (f"{name}_error", GRID_ERROR.get(name, "")) if one in VARIABLES) for name in VARIABLES
-}
+} | {"time": ()}
 
 
 def variables_in_table(which: Literal["last", "largest"]) -> list[str]:

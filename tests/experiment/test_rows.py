@@ -42,7 +42,8 @@ def test_ancillary_variables__exist():
         ds = result("zener", "jump", **settings)
         named = {name: variable.attrs.get("ancillary_variables", "").split() for name, variable in ds.variables.items()}
         assert {other for others in named.values() for other in others} <= set(ds.variables)
-    assert named["height"] == []
+    assert named["height"] == named["time"] == []
+    assert named["contact_area"] == ["contact_area_error"]
 
 
 def test_dent_left_by_a_load__is_as_uncertain_as_the_load_made_it():

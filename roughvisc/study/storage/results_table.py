@@ -21,7 +21,16 @@ from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.sweep_data import SweepCase, numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.units import number, number_and_unit
-from roughvisc.variables import AXES, NOT_CONVERGED, OTHER_DIMS, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import (
+    AXES,
+    ERRORS,
+    GRID_ERROR,
+    NOT_CONVERGED,
+    OTHER_DIMS,
+    VARIABLES,
+    axis_of,
+    variables_in_table,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,10 +55,10 @@ def to_table(out: str | Path) -> pd.DataFrame:
     pandas.DataFrame
         The index is the number of the case, from 0 in the order of the study, as in :func:`open_results`; the
         realisations of one case share its number. Columns: title; varied parameters under their dotted keys, in the
-        units of the study; force, approach, contact area with its bounds, contact fraction, mean gap, friction if the
-        profile slides, and observables; the largest stated error and its parts; status, message and file. The values
-        are for the last kept time, or for a friction curve at the speed of largest friction, which is also a column.
-        Units are in brackets.
+        units of the study; force, approach, contact area, contact fraction, mean gap, friction if the profile slides,
+        and observables, each followed by its error if there is one; the largest stated error and its parts; status,
+        message and file. The values are for the last kept time, or for a friction curve at the speed of largest
+        friction, which is also a column. Units are in brackets.
 
     Raises
     ------
@@ -116,9 +125,14 @@ def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase])
 
 
 def _telling(entry: Entry) -> dict[str, float]:
-    """Return the numbers of a case at its end, or at the speed of largest friction of a friction curve."""
+    """Return the numbers of a case, each with its error, at the end or at the speed of largest friction of a curve."""
     row = AXES[entry.along].telling_row(entry.arrays)
-    names = [name for name in variables_in_table("last") if len(entry.arrays.get(name, ()))]
+    names = [
+        one
+        for name in variables_in_table("last")
+        for one in (name, *ERRORS[name])
+        if one not in GRID_ERROR.values() and len(entry.arrays.get(one, ()))
+    ]
     return {name: float(entry.arrays[name][row]) for name in names}
 
 
