@@ -82,7 +82,7 @@ def gaussian_filter(
     h : xarray.DataArray
         Height over (x, y). [m]
     cutoff : float or str
-        Wavelength at which half the amplitude passes; at least three cells. [m]
+        Wavelength at which half the amplitude passes, from three cells to the longest side. [m]
     keep : {"long", "short"}, default "long"
         "long": wavelengths above the cut-off (an S-filter). "short": those below (an L-filter, the roughness).
     periodic : bool, default False
@@ -96,7 +96,7 @@ def gaussian_filter(
     Raises
     ------
     InputError
-        If the cut-off is less than three cells, or `keep` is unknown.
+        If the cut-off is less than three cells or longer than the surface, or `keep` is unknown.
 
     Notes
     -----
@@ -112,8 +112,10 @@ def gaussian_filter(
     one_of("keep", keep, ("long", "short"))
     h = checked(h, "gaussian_filter")
     sides = spacing(h)
-    if cutoff < 3 * max(sides):
-        raise InputError(key="cutoff", found=cutoff, expected=f"at least three cells, {3 * max(sides):.6g} [m]")
+    longest = max(side * count for side, count in zip(sides, h.shape, strict=True))
+    if not 3 * max(sides) <= cutoff <= longest:
+        limits = f"from three cells, {3 * max(sides):.6g} [m], to the longest side, {longest:.6g} [m]"
+        raise InputError(key="cutoff", found=cutoff, expected=f"{limits}; or text with a unit, such as '2.5 um'")
     require_heights(h, "gaussian_filter")
     heights = _long_waves(h.values, [cutoff / d for d in sides], periodic)
     if keep == "short":

@@ -63,6 +63,7 @@ def test_step__notes_what_it_did_and_leaves_its_input_alone(step):
         (lambda: fill(rough(), "magic"), "method"),
         (lambda: fill(rough() * np.nan), "missing"),
         (lambda: gaussian_filter(rough(), 8e-6), "cutoff"),
+        (lambda: gaussian_filter(rough(), 2.9), "cutoff"),  # meant in micrometres, written without a unit
         (lambda: gaussian_filter(rough(), 2e-5, keep="both"), "keep"),
         (lambda: crop(rough(), x=(1.0, 2.0)), "x"),
         (lambda: crop(rough(), y=3e-5), "y"),

@@ -265,7 +265,9 @@ def border(scene: Scene) -> Found:
     """Difference between opposite borders over that between neighbouring rows."""
     if scene.boundary == "free":
         return None
-    number = max(border_mismatch(scene.period).of_neighbours)
+    if scene.boundary == "mirror":
+        return 0.0, "The surface repeats with its mirror images: its borders meet."
+    number = max(border_mismatch(scene.height).of_neighbours)
     advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
     return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
 

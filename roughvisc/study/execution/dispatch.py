@@ -116,10 +116,15 @@ def distribute(
             if not said and time.monotonic() - seen > _ALONE_AFTER:
                 seen = time.monotonic()
                 if said := not client.nthreads():
+                    remedy = (
+                        "they are started again; if they are lost repeatedly, use fewer of them (--workers)"
+                        if own
+                        else "start workers (dask worker), or check whether their jobs are queued (squeue); the cases "
+                        "start as soon as one joins"
+                    )
                     record.warn(
-                        f"the cluster has had no worker for a while ({len(futures)} cases to go): start workers (dask "
-                        "worker), or check whether their jobs are queued (squeue); the cases start as soon as one "
-                        "joins. Ctrl-C ends the sweep; finished results are kept, and the same command resumes it"
+                        f"there has been no worker for a while ({len(futures)} cases to go): {remedy}. Ctrl-C ends "
+                        "the sweep; finished results are kept, and the same command resumes it"
                     )
     except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue turns Ctrl-C into SystemExit
         if isinstance(error, OSError) and client.status != "running":

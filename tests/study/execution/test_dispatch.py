@@ -18,6 +18,7 @@ from support import BALL, LOADS, LONG, assert_same, numbers, refused
 import roughvisc as rv
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
+from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.cluster import connect, default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
@@ -256,8 +257,10 @@ def kill_working(client, times):
 
 
 @pytest.mark.timeout(60)  # Ctrl-C waits for nobody where there is nobody
-def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch):
+@pytest.mark.parametrize("where", ["cluster", "this machine"])
+def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch, where):
     monkeypatch.setattr(dispatch, "_ALONE_AFTER", 0.3)
+    monkeypatch.setattr(sweep_module, "local_client", lambda processes: bare_cluster())
 
     class CtrlC(Ear):
         def warn(self, text):
@@ -265,11 +268,14 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
             raise KeyboardInterrupt
 
     ear = CtrlC()
-    with bare_cluster() as client, pytest.raises(KeyboardInterrupt):
-        run_cases(study(), tmp_path / "out", display=ear, client=client)
+    with bare_cluster() as cluster:
+        how = {"client": cluster} if where == "cluster" else {"workers": 2}
+        with pytest.raises(KeyboardInterrupt):
+            run_cases(study(), tmp_path / "out", display=ear, **how)
     assert ear.lines[-1].startswith("stopping")
     (message,) = ear.messages
     assert "no worker" in message
+    assert ("squeue" in message) == (where == "cluster")
     assert message in (tmp_path / "out" / "sweep.log").read_text()
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
