@@ -69,8 +69,9 @@ def simulate(
         time steps, contact solver and exponential series, over the largest force and approach of the kept rows so far.
         If rows exceed it, a ``UserWarning`` and the attribute ``warnings`` count them. The grid error is not included.
     times : int or sequence of float or str, optional
-        Output times, reached exactly: a number of times, which are the corners of the program and times at which the
-        result changes most; a list; or None for all corners and every accepted step that meets the tolerance. [s]
+        Output times, reached exactly: how many, counting time zero and the corners of the program, the others where the
+        result changes most; a list; or None, in a study ``"all"``, for all corners and every accepted step that meets
+        the tolerance. [s]
     fields : sequence of str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}

@@ -19,6 +19,8 @@ from roughvisc.study.execution import run as run_module
 from roughvisc.study.storage.netcdf import write_result
 from roughvisc.topography.scans import raw_height
 
+SPHERE = BALL[BALL.index("generate") : BALL.index("[material]")]
+
 
 def write_study(text=BALL, *replacements):
     for old, new in replacements:
@@ -80,8 +82,7 @@ def test_run__scheduler_that_is_not_there_is_status_2(invoke, tmp_path):
 
 @pytest.mark.parametrize("verb", ["plan", "run", "trade"])
 def test_study_of_a_scan_without_a_boundary__is_asked_for_it_and_nothing_is_written(invoke, tmp_path, scan_file, verb):
-    surface = BALL[BALL.index("generate") : BALL.index("[material]")]
-    text = BALL.replace(surface, f'file = "{scan_file}"\n').replace('[solve]\nboundary = "free"\n', "")
+    text = BALL.replace(SPHERE, f'file = "{scan_file}"\n').replace('[solve]\nboundary = "free"\n', "")
     status, out, err = invoke(verb, write_study(text))
     assert (status, out) == (2, "")
     assert err.startswith("roughvisc: ball.toml: solve.boundary: ")
@@ -102,6 +103,26 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
     assert status == 2
     assert "cannot run: 1 of 2 cases: at 0 s the approach jumps" in err
     assert [line.split()[-2:] for line in out.splitlines() if "cannot" in line] == [["cannot", "run"]]
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        (("scan", "mine.npy", "--unit", "N"), "--unit"),
+        (("scan", "mine.npy", "--height-scale", "-1"), "--height-scale"),
+        (("new", "mine.npy", "--contact", "3"), "--contact"),
+        (("run", "ball.toml", "--for", "much"), "--for"),
+        (("trade", "ball.toml", "--budget", "much"), "--budget"),
+        (("budget", "ball.toml", "--modulus-error", "much"), "--modulus-error"),
+        (("budget", "ball.toml", "--at", "99 s"), "--at"),
+    ],
+)
+def test_refused_option__is_named_as_it_was_typed(invoke, tmp_path, command, option):
+    np.save(tmp_path / "mine.npy", np.zeros((9, 8)))
+    write_study()
+    status, _, err = invoke(*command)
+    assert status == 2
+    assert err.startswith(f"roughvisc: {option}: found "), err
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
@@ -300,7 +321,8 @@ def test_scan__lists_channels_and_asks_for_what_a_file_does_not_state(invoke, tm
     np.save(tmp_path / "plain.npy", z[0])
     for given, missing in (([], "unit"), (["--spacing", "1um"], "unit"), (["--unit", "m"], "spacing")):
         status, _, err = invoke("scan", "plain.npy", *given)
-        assert (status, f"expected {missing}" in err) == (2, True)
+        assert (status, f"expected --{missing} " in err) == (2, True)
+    assert "expected unit = " in invoke("run", write_study(BALL, (SPHERE, 'file = "plain.npy"\n')))[2], "a key"
     assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
     assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
 
@@ -322,7 +344,7 @@ def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers
     assert float(raw_height("surface", case.surface).x[0]) == 5e-7
     (tmp_path / "plain-study.toml").unlink()
     alone = subprocess.run(command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    assert (alone.returncode, "expected unit" in alone.stderr) == (2, True)
+    assert (alone.returncode, "expected --unit" in alone.stderr) == (2, True)
 
 
 @pytest.mark.thorough

@@ -6,6 +6,7 @@ import errno
 import io
 import logging
 import os
+import re
 import signal
 import sys
 import threading
@@ -57,6 +58,22 @@ class Failure(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         complain(self.message)
+
+
+def by_options(message: str, command: click.Command | None) -> str:
+    """Return a message in which the options of a command replace the names of the arguments.
+
+    Examples
+    --------
+    >>> from roughvisc.cli import main
+    >>> by_options('plain.npy: it states no size: expected spacing = "1 um"', main.commands["scan"])
+    'plain.npy: it states no size: expected --spacing "1 um"'
+    """
+    flags = [flag for one in command.params for flag in one.opts if flag.startswith("--")] if command else []
+    for flag in flags:
+        name = flag.removeprefix("--").replace("-", "_")
+        message = re.sub(rf"(?<![\w.]){name}(?=: found )|(?<![\w.]){name} =(?= )", flag, message)
+    return message
 
 
 def complain(message: str) -> None:
@@ -138,11 +155,11 @@ def _settings_of_process() -> Iterator[None]:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
-def _failure(error: BaseException) -> Failure | None:
-    """Return the message and the exit status of a known error; None for any other error."""
+def _failure(error: BaseException, command: click.Command | None) -> Failure | None:
+    """Return the message and the exit status of a known error of a command; None for any other error."""
     match error:
         case RoughviscError():
-            return Failure(str(error), 2 if isinstance(error, InputError) else 1)
+            return Failure(by_options(str(error), command), 2 if isinstance(error, InputError) else 1)
         case OSError() if error.errno != errno.EPIPE:  # the reader of the output has closed it: click ends quietly
             place = f"{error.filename}: " if error.filename else ""
             return Failure(f"{place}{error.strerror or error}", 1)
@@ -178,7 +195,7 @@ class Commands(click.Group):
             with _settings_of_process():
                 return super().invoke(ctx)
         except BaseException as error:
-            if failure := _failure(error):
+            if failure := _failure(error, self.commands.get(ctx.invoked_subcommand or "")):
                 raise failure from error
             raise
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, number_or_text, options, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, by_options, number_or_text, options, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,7 +58,8 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
                 warnings.simplefilter("always", UserWarning)
                 height = rv.open_scan(file, **options)
             for complaint in complaints:
-                click.echo(f"Warning: {complaint.message}", err=True)
+                warning = by_options(str(complaint.message), click.get_current_context().command)
+                click.echo(f"Warning: {warning}", err=True)
             return height
         except InputError as error:
             lacks = error.key in _QUESTIONS and options[error.key] is None

@@ -130,7 +130,12 @@ def budgets(
     axis = case.experiment.axis
     given = in_si(at, VARIABLES[axis].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
-    base = with_rows(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
+    try:
+        base = with_rows(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
+    except InputError as error:
+        if error.key != "keep.times":
+            raise
+        raise InputError(key="at", found=places, expected=error.expected) from error
     own = None
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
         whole = open_result(finished)

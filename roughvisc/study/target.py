@@ -88,7 +88,7 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         amount, _, name = text.strip().rpartition(" ")
         if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
-            expected = f"one target for each number, such as '1 % contact_area', and of {', '.join(QUANTITIES)}"
+            expected = f"a target such as '1 % contact_area', once for each number, of {', '.join(QUANTITIES)}"
             raise InputError(key="for", found=text, expected=expected)
         found[name] = amount
     return found

@@ -94,7 +94,9 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     """Return the heights of a channel over x and y. [m]"""
     xy, z = _metres(channel, how)
     if how.grid is not None and (channel.kind != "points" or how.spacing is not None):
-        raise InputError("grid: expected none for a map, or with spacing", key="grid", found=how.grid, expected="none")
+        raise InputError(
+            "grid: expected none for a map, or with a spacing", key="grid", found=how.grid, expected="none"
+        )
     raw, sides = channel.load(), channel.spacing
     if channel.kind == "points":
         points = raw[np.isfinite(raw[:, :2]).all(axis=1)]
@@ -108,7 +110,7 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     if channel.positions is None or how.spacing is not None:
         spacing = how.spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
         if not all(math.isfinite(d) and d > 0 for d in spacing):
-            raise InputError('it states no size: expected spacing, such as "1 um"', key="spacing")
+            raise InputError('it states no size: expected spacing = "1 um", or another length', key="spacing")
         h = labelled(values, spacing)
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
@@ -139,18 +141,21 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
             if not math.isclose(factor, 1.0):
                 hint = f"; height_scale = {factor:.6g} if its numbers are in {given}" if channel.unit else ""
                 raise InputError(
-                    f"it states its unit as {unit!r}: expected no {key}{hint}", key=key, found=given, expected="none"
+                    f"it states its unit as {unit!r}: expected no {key} = {given!r}{hint}",
+                    key=key,
+                    found=given,
+                    expected="none",
                 )
     lacks = ["unit of its heights"] if needs_z and how.unit is how.height_unit is None else []
     lacks += ["unit of x and y"] if needs_xy and how.unit is None else []
-    expected = ['unit, such as "um"'] if lacks else []
-    both = ", and height_unit if heights have another" if len(lacks) == 2 else ""
+    both = " (and height_unit = ..., if heights have another unit)" if len(lacks) == 2 else ""
+    expected = {"unit": f'unit = "um", or another unit{both}'} if lacks else {}
     if not sized and how.spacing is None:
         lacks.append("size")
-        expected.append('spacing, such as "1 um"')
+        expected["spacing"] = 'spacing = "1 um", or another length'
     if lacks:
-        text = f"it states no {' and no '.join(lacks)}: expected {', and '.join(expected)}{both}"
-        raise InputError(text, key=expected[0].partition(",")[0], expected=expected[0])
+        text = f"it states no {' and no '.join(lacks)}: expected {'; and '.join(expected.values())}"
+        raise InputError(text, key=next(iter(expected)), expected=next(iter(expected.values())))
     given = number(f"1 {how.unit}", "m") if how.unit else 1.0
     z = stated[channel.unit] if channel.unit else number(f"1 {how.height_unit or how.unit}", "m")
     return stated[channel.lateral_unit] if channel.lateral_unit else given, z
@@ -173,7 +178,7 @@ def _of_points(
     if found is None:
         side = 2 * metres * math.sqrt(spread[0] * spread[1] / len(points))
         raise InputError(
-            f'its {len(points)} points lie on no regular lattice: expected grid, such as "{side * 1e6:.2g} um"',
+            f'its {len(points)} points lie on no regular lattice: expected grid = "{side * 1e6:.2g} um", or similar',
             key="grid",
             expected="the side of the cells into which the points are sorted",
         )
@@ -348,6 +353,6 @@ def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
     if beyond.size:
         raise InputError(
             f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} "
-            "m from zero): expected height_scale, such as 1e-6, if they are in another unit than the file or `unit` "
-            "states; no_data, or NaN in an array, if the number marks missing points"
+            "m from zero): expected height_scale = 1e-6, or another factor, if they are in another unit than stated; "
+            "no_data = the number in the file, or NaN in an array, if it marks missing points"
         )
