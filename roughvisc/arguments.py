@@ -155,12 +155,13 @@ def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
     return found[0]
 
 
-def one_of(key: str, value: Any, words: Iterable[str]) -> Any:
+def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
     """Return the value if it is one of the allowed words; refuse it otherwise."""
     words = list(words)
     if value not in words:
-        expected = f"one of {', '.join(map(str, words))}"
-        hint = nearest(value, words) if isinstance(value, str) else f": expected {expected}"
+        known = list(map(str, words))
+        expected = f"one of {', '.join(known)}"
+        hint = nearest(value, known) if isinstance(value, str) else f": expected {expected}"
         raise InputError(f"{key}: found {short_repr(value)}{hint}", key=key, found=value, expected=expected)
     return value
 

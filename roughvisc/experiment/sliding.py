@@ -39,7 +39,7 @@ from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import OVER_TIME, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
-from roughvisc.units import Quantity, quantities, unit_for
+from roughvisc.units import Quantity, number, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
@@ -108,8 +108,8 @@ class SteadySliding(Experiment):
         if self.load is not None and self.pressure is not None:
             raise InputError(key="pressure", found=self.pressure, expected=f"either this or the load, {self.load!r}")
         for name, value, unit in (("load", self.load, "N"), ("pressure", self.pressure, "Pa")):
-            if value is not None and not (isinstance(value, int | float) and 0 < value < math.inf):
-                raise InputError(key=name, found=value, expected=f"a positive number [{unit}]")
+            if value is not None:
+                number(value, unit, name, above=0)
 
     def __repr__(self) -> str:
         ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.speeds), max(self.speeds))))
@@ -234,8 +234,8 @@ class SlidingRows(Rows):
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
         grid, tolerance, xp = self._grids[0], self._settings.tolerance, arrays_of(self._settings.device)
-        for done, number in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
-            speed = self._curve.speeds[number]
+        for done, place in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
+            speed = self._curve.speeds[place]
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
             states, across, convolutions, creep = [], 0.0, 0, 0.0
             for cells in self._grids:
@@ -259,7 +259,7 @@ class SlidingRows(Rows):
                     creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
             row["convolutions"] = convolutions
             row["creep_left"] = creep  # left when the next contact arrives
-            yield Row(speed, row, fields, place=int(number), state=done, done=float(done))
+            yield Row(speed, row, fields, place=int(place), state=done, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a steady state, and its fields in the frame of the surface."""

@@ -21,9 +21,8 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.materials.creep import Creep, Material
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
-from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
 
@@ -236,9 +235,7 @@ class Body:
     kernel: Kernel = HALF_SPACE
 
     def __post_init__(self) -> None:
-        if not isinstance(self.material, Prony | Creep):
-            expected = "a material, such as rv.zener(...) or rv.creep(function)"
-            raise InputError(key="material", found=self.material, expected=expected)
+        check_material(self.material)
         for name in ("influence", "transfer"):
             if not callable(getattr(self.kernel, name, None)):
                 found = type(self.kernel).__name__

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
@@ -326,8 +327,7 @@ def full_contact_pressure(
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 13.2.
     """
-    if waves not in (1, 2):
-        raise InputError(key="waves", found=waves, expected="1 or 2")
+    one_of("waves", waves, (1, 2))
     height, period = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
     return float(np.sqrt(waves) * np.pi * number(contact_modulus, "Pa", "contact_modulus", above=0) * height / period)
 
@@ -361,9 +361,7 @@ def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
        *Int. J. Mech. Sci.* 27 (1985) 383-396.
     """
     ratio = np.asarray(mean_over_full, dtype=float)
-    if limit not in ("low", "high"):
-        raise InputError(key="limit", found=limit, expected="'low' or 'high'")
-    if limit == "low":
+    if one_of("limit", limit, ("low", "high")) == "low":
         return np.asarray(np.pi * np.cbrt(3 * ratio / (8 * np.pi)) ** 2)
     return np.asarray(1 - 3 / (2 * np.pi) * (1 - ratio))
 

@@ -150,9 +150,7 @@ def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tup
     """Return the case, the file of its result, and the folder of the further solves."""
     path = None
     if isinstance(case, xr.Dataset):
-        if "case" not in case.attrs:
-            raise InputError(key="case", found="a result without a case", expected="a result of rv.run, or its study")
-        path, case = case.encoding.get("source"), Case.from_json(case.attrs["case"])
+        path, case = case.encoding.get("source"), Case.of_result(case)
     elif not isinstance(case, Case):
         case = read_study(case)
     finished = Path(path or result_path(result_folder(case), case.key))

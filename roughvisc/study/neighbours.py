@@ -11,13 +11,14 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.arguments import one_of
+from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.display import Display
@@ -182,9 +183,8 @@ def sources_of(
     InputError
         If a stated value is invalid.
     """
-    population, cutoff = known.get("population") or "patch", known.get("cutoff")
-    if population not in ("patch", "ensemble"):
-        raise InputError(key="population", found=population, expected="'patch' or 'ensemble'")
+    population = one_of("population", known.get("population") or "patch", get_args(Population))
+    cutoff = known.get("cutoff")
     if cutoff is not None:
         cutoff = number(cutoff, "m", "cutoff", above=0)
     sample, others = is_sample(base, height), others or coarsening

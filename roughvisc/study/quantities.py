@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables.conductance import conductance, incremental_stiffness
@@ -128,6 +129,5 @@ def quantity_of(case: Case, name: str) -> Observable:
     InputError
         If the results of the case have no such quantity.
     """
-    if name not in (known := quantities_of(case)):
-        raise InputError(key="quantity", found=name, expected=f"one of {', '.join(known)}")
-    return known[name]
+    known = quantities_of(case)
+    return known[one_of("quantity", name, known)]

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.settings import Settings
 from roughvisc.study import neighbours
@@ -61,8 +62,7 @@ def targets_of(want: Mapping[str, Any]) -> dict[str, float]:
     if not isinstance(want, Mapping):
         raise InputError(key="want", found=want, expected="a dictionary such as {'contact_area': '1 %'}")
     for name in want:
-        if name not in (*QUANTITIES, *neighbours.KNOWN):
-            raise InputError(key="want", found=name, expected=f"one of {', '.join((*QUANTITIES, *neighbours.KNOWN))}")
+        one_of("want", name, (*QUANTITIES, *neighbours.KNOWN))
     targets = {
         name: number(part, "1", f"want.{name}", above=0, below=1) for name, part in want.items() if name in QUANTITIES
     }

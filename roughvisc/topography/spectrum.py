@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from roughvisc.errors import InputError
+from roughvisc.arguments import one_of
 from roughvisc.topography.grid import checked, require_complete, spacing
 
 # Share of the mean square slope in the waves down to the shortest wave of a surface.
@@ -109,8 +109,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     """
     h = checked(h, "psd", least=1)
     require_complete(h, "psd")
-    if window not in (None, "hann"):
-        raise InputError(f"psd: window is {window!r}: expected 'hann' or None")
+    one_of("window", window, (None, "hann"))
     cells, shape = spacing(h), h.shape
     q_x, q_y, stands_for = wavevectors(shape, cells)
     step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)

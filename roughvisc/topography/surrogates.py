@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
@@ -73,8 +74,7 @@ def surrogate(
     """Return one surface of :func:`surrogates`, by its number. [m]"""
     if not (isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 1):
         raise InputError(key="number", found=number, expected="the number of a surrogate, from 1")
-    if amplitudes not in ("fixed", "gaussian"):
-        raise InputError(key="amplitudes", found=amplitudes, expected="'gaussian' or 'fixed'")
+    one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
     if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
         raise InputError(key="seed", found=seed, expected="a whole number >= 0")
     h = checked(h, "surrogates")

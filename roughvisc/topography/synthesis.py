@@ -50,8 +50,7 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     """
     amplitude, wavelength = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
     size, shape = pair("size", size), counts("shape", shape, low=1)
-    if waves not in (1, 2):
-        raise InputError(key="waves", found=waves, expected="1 (along x) or 2 (along x and y)")
+    one_of("waves", waves, (1, 2))
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
@@ -142,8 +141,7 @@ def self_affine(
     .. [2] NumPy reference, "Parallel random number generation", SeedSequence spawning.
     """
     size, shape = pair("size", size), counts("shape", shape)
-    if amplitudes not in ("fixed", "gaussian"):
-        raise InputError(key="amplitudes", found=amplitudes, expected="'fixed' or 'gaussian'")
+    one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
     hurst = number(hurst, "1", "hurst", above=0, most=1.0)
     if (rms_slope is None) == (rms_height is None):
         raise InputError(

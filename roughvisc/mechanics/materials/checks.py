@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 
 Array = NDArray[np.float64]
@@ -22,9 +23,7 @@ def check_poisson(poisson: float) -> None:
 def tensile_to_shear(kind: Kind, poisson: float) -> float:
     """Return the shear compliance over the measured compliance: ``2 (1 + nu)`` in tension, one in shear."""
     check_poisson(poisson)
-    if kind not in ("shear", "tensile"):
-        raise InputError(key="kind", found=kind, expected="'shear' or 'tensile'")
-    return 2 * (1 + poisson) if kind == "tensile" else 1.0
+    return 2 * (1 + poisson) if one_of("kind", kind, get_args(Kind)) == "tensile" else 1.0
 
 
 def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:

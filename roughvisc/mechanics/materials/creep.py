@@ -169,8 +169,7 @@ def power_law(
     number(coefficient, "1/Pa", "coefficient", above=0)
     number(time_scale, "s", "time_scale", above=0)
     check_poisson(poisson)
-    if not 0 < exponent < 1:
-        raise InputError(key="exponent", found=exponent, expected="a number above 0 and below 1")
+    number(exponent, "1", "exponent", above=0, below=1)
     return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson)
 
 
@@ -290,8 +289,8 @@ def stiffened(material: Material, factor: float) -> Material:
     >>> stiffened(rv.elastic(1e6), 2.0).glassy
     5e-07
     """
-    number(factor, "1", "modulus_factor", above=0)
-    return _scaled(check_material(material), 1.0, float(factor), f"all moduli multiplied by {factor:.6g}")
+    factor = number(factor, "1", "modulus_factor", above=0)
+    return _scaled(check_material(material), 1.0, factor, f"all moduli multiplied by {factor:.6g}")
 
 
 def _scaled(material: Material, time_factor: float, modulus_factor: float, note: str) -> Material:

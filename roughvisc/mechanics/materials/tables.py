@@ -15,6 +15,7 @@ import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import NDArray
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
 from roughvisc.mechanics.materials.prony import Prony
@@ -216,8 +217,7 @@ def dynamic_table(
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
     """
-    if frequency_unit not in ("rad/s", "Hz"):
-        raise InputError(f"frequency_unit is {frequency_unit!r}: expected 'rad/s' or 'Hz'")
+    one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
     given = np.atleast_1d(np.asarray(frequencies, dtype=float))
     factors = np.ones(given.size) if shift_factors is None else np.asarray(shift_factors, dtype=float)
     factors = np.full(given.size, float(factors)) if factors.ndim == 0 else factors

@@ -53,8 +53,7 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     number(temperature, "K", "temperature", above=0)
     number(reference_temperature, "K", "reference_temperature", above=0)
     number(wlf_c1, "1", "wlf_c1", above=0)
-    c2 = number(wlf_c2, "K", "wlf_c2", difference=True)
-    number(c2, "K", "wlf_c2", above=0)
+    c2 = number(wlf_c2, "K", "wlf_c2", above=0, difference=True)
     above = temperature - reference_temperature
     if not c2 + above > 0:
         pole = (

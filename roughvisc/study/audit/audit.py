@@ -10,6 +10,7 @@ from typing import get_args
 
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.sheet import Base
@@ -189,8 +190,7 @@ def audit(
     for name, value in given.items():
         number(value, audit.quantities[name], name, **({"least": 0} if name == "work_of_adhesion" else {"above": 0}))
     if base is not None:
-        if base not in get_args(Base):
-            raise InputError(key="base", found=base, expected=" or ".join(map(repr, get_args(Base))))
+        one_of("base", base, get_args(Base))
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
         given["base"] = base
