@@ -161,7 +161,7 @@ def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
     if value not in words:
         known = list(map(str, words))
         expected = f"one of {', '.join(known)}"
-        hint = nearest(value, known) if isinstance(value, str) else f": expected {expected}"
+        hint = nearest(value, known) if isinstance(value, str) and value not in known else f": expected {expected}"
         raise InputError(f"{key}: found {short_repr(value)}{hint}", key=key, found=value, expected=expected)
     return value
 

@@ -130,19 +130,14 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     When xarray combines several Datasets, it keeps the encoding of the first. Therefore the rows are compared with the
     steps.
     """
-    steps = result.encoding.get(_CARRIED)
-    return steps if steps is not None and _are_rows_of(result, steps) else None
-
-
-def _are_rows_of(result: xr.Dataset, steps: xr.Dataset) -> bool:
-    """Return whether every row has the time and the force of a step."""
-    if not {"time", "force"} <= result.variables.keys() or result["force"].dims not in ((), ("time",)):
-        return False
+    steps, named = result.encoding.get(_CARRIED), {"time", "force"} <= result.variables.keys()
+    if steps is None or not named or result["force"].dims not in ((), ("time",)):
+        return None
     rows, known = (
         set(zip(np.ravel(one["time"]).tolist(), np.ravel(one["force"]).tolist(), strict=True))
         for one in (result, steps)
     )
-    return rows <= known
+    return steps if rows <= known else None
 
 
 def require_steps(result: xr.Dataset) -> xr.Dataset:

@@ -59,20 +59,6 @@ def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Bound
     return resample(height, shape, periodic={"periodic": True, "mirror": False}.get(boundary))
 
 
-def block_means(field: Array, cells: tuple[Array, Array], onto: tuple[Array, Array]) -> Array:
-    """Return the means of a field over the cells of another grid; the field is zero outside its grid.
-
-    Parameters
-    ----------
-    field : ndarray, shape (..., nx, ny)
-        Constant in each cell.
-    cells, onto : tuple of ndarray
-        Edges of the cells of the field and of the other grid, along x and along y. [m]
-    """
-    along_x, along_y = (_shares(a, b) for a, b in zip(cells, onto, strict=True))
-    return np.asarray(along_x @ field @ along_y.T)
-
-
 def _shares(cells: Array, onto: Array) -> Array:
     """Return the fraction of each new cell (rows) that lies in each old cell (columns)."""
     common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
@@ -93,12 +79,14 @@ def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
         Integral of the absolute difference.
     """
     grids = [tuple(cell_edges(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
-    fields = [ds["pressure"].values for ds in (found, wanted)]
     sides = [np.diff(grid[0])[0] for grid in grids]
     common = grids[int(np.argmax(sides))]
     low, high = ([reach(grid[axis][end] for grid in grids) for axis in (0, 1)] for end, reach in ((0, min), (-1, max)))
     onto = (_extended(common[0], low[0], high[0]), _extended(common[1], low[1], high[1]))
-    means = [block_means(field, grid, onto) for field, grid in zip(fields, grids, strict=True)]  # type: ignore[arg-type]
+    means = []
+    for ds, grid in zip((found, wanted), grids, strict=True):
+        along_x, along_y = (_shares(a, b) for a, b in zip(grid, onto, strict=True))
+        means.append(along_x @ ds["pressure"].values @ along_y.T)
     area = np.diff(onto[0])[:, None] * np.diff(onto[1])
     return np.asarray((np.abs(means[0] - means[1]) * area).sum(axis=(-2, -1)))
 

@@ -24,7 +24,7 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Settings
-from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import grown, highest, is_indenter
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Profile:
     Parameters
     ----------
     height : xarray.DataArray
-        Profile, peaks up. [m]
+        Profile, peaks up, as :func:`roughvisc.topography.grid.checked` returns it. [m]
     missing : {"refuse", "absent"}
         Meaning of missing heights: an error, or absent material.
     kernel : Kernel
@@ -76,7 +76,6 @@ class Profile:
     """
 
     def __init__(self, height: xr.DataArray, missing: Missing = Settings.missing, kernel: Kernel = HALF_SPACE) -> None:
-        height = checked(height, "height", least=1)
         values = height.values
         if np.isinf(values).any():
             raise InputError("height holds infinite values: expected finite heights, or NaN where missing")

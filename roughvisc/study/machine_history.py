@@ -117,12 +117,21 @@ def read_history(
             raise InputError(key=key, found=name, expected="the name of a column")
     wanted = {"time": Wanted(time, "s"), control: Wanted(column, unit)}
     found, lines = read_table(path, wanted)
-    _check_times(path, found["time"], lines)
-    start = float(found["time"][0])
-    times, values = _less(found["time"], start), _less(found[control], offset) * scale
+    measured = found["time"]
+    for at in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
+        raise InputError(
+            f"{path}, line {lines[at]}: time {measured[at]:g} s after {measured[at - 1]:g} s: expected increasing times"
+        )
+    for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
+        raise InputError(
+            f"{path}, lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s: expected at most two, "
+            "which are a jump; export the times with more digits"
+        )
+    start = float(measured[0])
+    times, values = _less(measured, start), _less(found[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
     if control in PUSHING:
-        notes += _noise_note(path, control, found["time"], values)
+        notes += _noise_note(path, control, measured, values)
         values = np.maximum(values, 0.0)
     largest = float(np.max(np.abs(values)))
     tolerance = limit * largest if is_part else limit
@@ -133,18 +142,6 @@ def read_history(
     if tolerance:
         lead += f", which pass every row within {tolerance:.3g} {unit}"
     return History(control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *notes]) + ".")
-
-
-def _check_times(path: str | Path, times: Array, lines: list[int]) -> None:
-    for at in np.flatnonzero(np.diff(times) < 0)[:1] + 1:
-        raise InputError(
-            f"{path}, line {lines[at]}: time {times[at]:g} s after {times[at - 1]:g} s: expected increasing times"
-        )
-    for at in np.flatnonzero(times[2:] == times[:-2])[:1]:
-        raise InputError(
-            f"{path}, lines {lines[at]} to {lines[at + 2]}: three rows at {times[at]:g} s: expected at most two, which "
-            "are a jump; export the times with more digits"
-        )
 
 
 def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:

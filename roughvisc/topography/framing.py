@@ -15,6 +15,7 @@ from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.grid import (
     checked,
     filled_points,
+    labelled,
     like,
     noted,
     spacing,
@@ -91,10 +92,8 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     h = checked(h, "rotate90")
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
     heights = np.rot90(h.values, turns)
-    axes = [(np.arange(n) + 0.5) * d for n, d in zip(heights.shape, sides, strict=True)]
     filled = filled_points(h)
-    filled = None if filled is None else np.rot90(filled, turns)
-    grid = with_coordinates(heights, *axes, h.attrs, filled=filled)
+    grid = with_filled_points(labelled(heights, sides, h.attrs), None if filled is None else np.rot90(filled, turns))
     kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
     return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
 
@@ -280,8 +279,3 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     }
     doubled = h.isel(there_and_back).assign_coords(axes)
     return noted(doubled, MIRRORED, period=period_of(doubled))
-
-
-def with_images(values: np.ndarray) -> np.ndarray:
-    """Return one period: a map with its mirror images."""
-    return np.pad(values, [(0, n) for n in values.shape], mode="symmetric")

@@ -65,6 +65,12 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     square = _mean(z**2)
     slope_x, slope_y = _slopes(h, periodic)
     gradient = slope_x**2 + slope_y**2
+    (dx, dy), (nx, ny) = spacing(h), h.shape
+    padded = np.pad(h.values, [(n, n) for n in (int(periodic or nx == 1), int(periodic or ny == 1))], mode="wrap")
+    middle = padded[1:-1, 1:-1]
+    laplacian = (padded[2:, 1:-1] - 2 * middle + padded[:-2, 1:-1]) / dx**2
+    laplacian += (padded[1:-1, 2:] - 2 * middle + padded[1:-1, :-2]) / dy**2
+    laplacian = laplacian[np.isfinite(laplacian)]  # where all five points are present
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
             "Sa": _mean(np.abs(z)),
@@ -76,7 +82,7 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
             "Sdr": _mean(gradient / (1 + np.sqrt(1 + gradient))),
             "rms_slope_x": np.sqrt(_mean(slope_x**2)),
             "rms_slope_y": np.sqrt(_mean(slope_y**2)),
-            "rms_curvature": np.sqrt(_mean((_laplacian(h, periodic) / 2) ** 2)),
+            "rms_curvature": np.sqrt(_mean((laplacian / 2) ** 2)),
             "missing_fraction": (h.size - known.size) / h.size,
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}
@@ -120,16 +126,6 @@ def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[n
         lowest = np.nanmax(h.values) - depth
         counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
     return slope_x[counts], slope_y[counts]
-
-
-def _laplacian(h: xr.DataArray, periodic: bool) -> np.ndarray:
-    """Return the sum of the second differences along x and y where all five points are present."""
-    (dx, dy), (nx, ny) = spacing(h), h.shape
-    z = np.pad(h.values, [(n, n) for n in (int(periodic or nx == 1), int(periodic or ny == 1))], mode="wrap")
-    middle = z[1:-1, 1:-1]
-    laplacian = (z[2:, 1:-1] - 2 * middle + z[:-2, 1:-1]) / dx**2
-    laplacian += (z[1:-1, 2:] - 2 * middle + z[1:-1, :-2]) / dy**2
-    return laplacian[np.isfinite(laplacian)]
 
 
 def _mean(values: np.ndarray) -> np.float64:

@@ -180,17 +180,17 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
 
 def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
     """Return the conditioned heights of a table ``[surface]``; for two faces, their sum. [m]"""
-    second = table.get("second")
     height = _face_height("surface", table)
-    if second is not None:
-        placing, face = split(second, "flip", "offset")
+    if "second" in table:
+        placing, face = split(table["second"], "flip", "offset")
         flip = placing.pop("flip", "x")
-        other = _face_height("surface.second", face)
         placing |= {"flip": None if flip == "none" else flip, "align": "centre"}
-        height = call(combine, "surface.second", placing, height, other)
+        height = call(combine, "surface.second", placing, height, _face_height("surface.second", face))
     steps = {name: table[name] for name in STEPS if name in table and name not in FACE_STEPS}
     if isinstance(steps.get("realisation"), int):
-        steps["realisation"] = {"number": steps["realisation"], "seed": _surrogate_seed(table)}
+        # with a common seed, the first surrogates of all scans would deviate from their mean in the same direction
+        scan = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
+        steps["realisation"] = {"number": steps["realisation"], "seed": int(sha256(scan)[:8], 16) if scan else 0}
     return condition(height, steps, "surface")
 
 
@@ -206,15 +206,6 @@ def raw_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
 
 def _face_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
     return condition(raw_height(where, table), split(table, *FACE_STEPS)[0], where)
-
-
-def _surrogate_seed(table: Mapping[str, Any]) -> int:
-    """Return the seed of the surrogates of a surface, different for each scan.
-
-    With a common seed, the first surrogates of all scans would deviate from their mean in the same direction.
-    """
-    path = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
-    return 0 if path is None else int(sha256(path)[:8], 16)
 
 
 def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:

@@ -5,7 +5,6 @@ import pytest
 from support import refused
 
 import roughvisc as rv
-from roughvisc.topography.framing import with_images
 from roughvisc.variables import FIELDS
 
 ZENER = rv.zener(1e6, 1e6, 1e5)
@@ -43,7 +42,8 @@ def test_mirror__gives_what_the_unfolded_surface_gives(name):
     assert found.attrs["boundary"] == "mirror"
     assert found.pressure.shape[1:] == height.shape
     for field in FIELDS:
-        unfolded = np.array([with_images(frame) for frame in found[field].values])
+        images = [(0, 0), *((0, count) for count in height.shape)]
+        unfolded = np.pad(found[field].values, images, mode="symmetric")
         scale = float(whole.displacement.max()) if field != "pressure" else float(whole.pressure.max())
         np.testing.assert_allclose(unfolded, whole[field], rtol=0, atol=2e-4 * scale, err_msg=field)
     for name, factor in {

@@ -112,7 +112,11 @@ def network_of(faces: Faces) -> Network | None:
     entrance, exit_ = np.zeros((2, nx, ny))
     entrance[0], exit_[-1] = faces.along[0], faces.along[-1]
     open_ = np.flatnonzero(conductance)
-    kept = _spanning(first[open_], second[open_], entrance.ravel() > 0, exit_.ravel() > 0)
+    graph = sparse.coo_array((np.ones(open_.size), (first[open_], second[open_])), shape=(nx * ny, nx * ny))
+    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    at_sides = (entrance.ravel() > 0, exit_.ravel() > 0)
+    touched = [np.bincount(part[side], minlength=part.max(initial=0) + 1) > 0 for side in at_sides]
+    kept = (touched[0] & touched[1])[part]
     if not kept.any():
         return None
     cells = np.flatnonzero(kept)
@@ -124,15 +128,6 @@ def network_of(faces: Faces) -> Network | None:
     joined = sparse.coo_array((conductance[open_], ends), shape=(len(cells), len(cells))).tocsr()
     rows = np.repeat(np.arange(len(cells), dtype=joined.indices.dtype), np.diff(joined.indptr))
     return Network(cells, rows, joined.indices, joined.data, entrance.ravel()[cells], exit_.ravel()[cells])
-
-
-def _spanning(first: Numbers, second: Numbers, entering: NDArray[np.bool_], leaving: NDArray[np.bool_]) -> NDArray:
-    """Return a mask of the cells in connected parts that touch both sides."""
-    count = len(entering)
-    graph = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
-    _, part = sparse.csgraph.connected_components(graph, directed=False)
-    touched = [np.bincount(part[side], minlength=part.max(initial=0) + 1) > 0 for side in (entering, leaving)]
-    return (touched[0] & touched[1])[part]
 
 
 def equations(network: Network) -> sparse.csr_array:

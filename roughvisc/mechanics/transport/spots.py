@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact import ContactState, solve_contact
@@ -106,7 +107,7 @@ def frozen_contact(
     beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
     rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
     if boundary == "free":  # the surface outside the spots has no influence
-        x, y = _bounds(contact)
+        [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
     body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
@@ -156,13 +157,6 @@ def _variational(punch: ContactState, cell: float) -> tuple[float, float]:
     """
     energy = float(np.sum(punch.pressure * punch.displacement))
     return cell * (2 * punch.load - energy), cell * energy * punch.bound**2
-
-
-def _bounds(contact: Mask) -> tuple[slice, slice]:
-    """Return the smallest rectangle of cells around the contact."""
-    along = [np.flatnonzero(contact.any(axis=1 - axis)) for axis in (0, 1)]
-    x, y = (slice(int(found[0]), int(found[-1]) + 1) for found in along)
-    return x, y
 
 
 def _edge_energies(

@@ -14,7 +14,6 @@ from roughvisc.mechanics.sheet import BASE, Sheet
 from roughvisc.study.audit import effects
 from roughvisc.study.audit.scene import NotKnown, Scene
 from roughvisc.topography.borders import border_mismatch, is_analytic
-from roughvisc.topography.framing import with_images
 from roughvisc.topography.parameters import parameters
 from roughvisc.units import format_quantity
 
@@ -163,7 +162,8 @@ def thickness(scene: Scene) -> Found:
         if 2 * scene.half_width * approach / (scene.late * scene.force) > _PROPORTIONAL:
             shortfall = effects.half_space_shortfall(first)
     else:
-        pressure = with_images(scene.pressure) if scene.boundary == "mirror" else scene.pressure
+        images = [(0, count if scene.boundary == "mirror" else 0) for count in scene.pressure.shape]
+        pressure = np.pad(scene.pressure, images, mode="symmetric")
         first = scene.late * effects.periodic_relief(pressure, scene.cells, sheet) / approach
     excess = effects.half_space_excess(first)
     smaller = f"On a {sheet.base} sheet of {as_text(depth, 'm', 3)} the approach would be {percent(excess)} smaller at"

@@ -6,7 +6,6 @@ Every module that opens or computes a result registers the accessor. Each functi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -53,16 +52,13 @@ class ResultAccessor:
         room = import_module(_ROOMS[start])
         if name.removeprefix(start) not in room.__all__:
             raise AttributeError(f"the accessor roughvisc has no {name!r}: expected one of {', '.join(_methods())}")
-        return _method(getattr(room, name.removeprefix(start)), self._dataset)
+        function = getattr(room, name.removeprefix(start))
+        method = partial(function, self._dataset)
+        method.__doc__ = function.__doc__
+        return method
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *_methods()]
-
-
-def _method(function: Callable[..., Any], dataset: xr.Dataset) -> partial[Any]:
-    method = partial(function, dataset)
-    method.__doc__ = function.__doc__
-    return method
 
 
 def _methods() -> list[str]:
