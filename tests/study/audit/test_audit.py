@@ -404,7 +404,7 @@ def test_study__states_values_that_change_no_key(tmp_path, invoke):
     for option, found in (("density", "3 m"), ("work_of_adhesion", "sticky"), ("base", "glue")):
         name = f"--{option.replace('_', '-')}"
         status, _, err = invoke("audit", tmp_path / "results", name, found, "--thickness", "1 mm")
-        assert (status, f"{option}: found '{found}'" in err) == (2, True)
+        assert (status, f"{name}: found '{found}'" in err) == (2, True)
     for line in ('work_of_adhesion = "5 N"', 'base = "bonded"', "hardness = 3"):
         path.write_text(f"{BALL}[audit]\n{line}\n")
         with refused(f"audit.{line.partition(' ')[0]}"):
