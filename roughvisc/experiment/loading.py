@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import math
 from collections.abc import Iterator
@@ -316,6 +317,8 @@ class LoadingRows(Rows):
             attributes["compliance_at_once"] = scene.memory.compliance(0.0)
             attributes["compliance_at_end"] = scene.memory.compliance(self.end)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
+        if cycles := scene.program.cycles:  # for the work in each cycle
+            attributes["cycles"] = json.dumps(cycles)
         if text := warnings_text(warnings):
             attributes["warnings"] = text
         return dataset.assign_attrs(attributes)

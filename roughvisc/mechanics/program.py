@@ -477,6 +477,15 @@ class Program:
         """Whether the profile slides anywhere."""
         return any(segment.slide is not None for segment in self.segments)
 
+    @cached_property
+    def cycles(self) -> list[tuple[float, float, int]]:
+        """Start [s], period [s] and number of whole cycles of each segment that oscillates."""
+        return [
+            (start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9)))
+            for start, segment in zip(self.corners, self.segments, strict=False)
+            if segment.amplitude
+        ]
+
     def gives(self, number: int) -> bool:
         """Return whether the program states the value of a segment; a hold may keep a computed value instead.
 

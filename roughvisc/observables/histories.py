@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
+import json
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import expect_history, label, steps_of
-from roughvisc.mechanics.program import Program
 from roughvisc.observables.frames import need
 from roughvisc.variables import STEPPED
 
@@ -47,7 +46,7 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     return rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
 
 
-def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
+def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
     r"""Return the work done by the force in every cycle of the program, :math:`W = \oint F \, d\delta`.
 
     If force and approach are equal at the start and the end of a cycle, the work is the energy dissipated in the cycle.
@@ -56,9 +55,7 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result with ``work``.
-    program : Program
-        The program of the result, with :meth:`Program.cycle` in it.
+        One case's result with ``work``, under a program with :meth:`Program.cycle`.
 
     Returns
     -------
@@ -79,15 +76,12 @@ def cycle_work(dataset: xr.Dataset, program: Program) -> xr.Dataset:
     steps = history(dataset)
     need(steps, "work")
     times = steps["time"].values
-    starts, periods = [], []
-    for start, segment in zip(program.corners, program.segments, strict=False):
-        if segment.amplitude:
-            whole = math.floor(segment.duration / segment.period * (1 + _SAME))
-            starts += [start + number * segment.period for number in range(whole)]
-            periods += [segment.period] * whole
-    if not starts:
-        raise InputError(key="program", found=program, expected="a program with a whole cycle, see Program.cycle")
-    begin, period = np.array(starts), np.array(periods)
+    segments = json.loads(dataset.attrs.get("cycles", "[]"))
+    begin = np.array([start + number * period for start, period, count in segments for number in range(count)])
+    period = np.repeat([one[1] for one in segments], [int(one[2]) for one in segments])
+    if not begin.size:
+        expected = "one case's result, under a program with a whole cycle: see Program.cycle"
+        raise InputError(key="cycles", found=segments, expected=expected)
     covered = (times[0] <= begin + _SAME * period) & (begin + period <= times[-1] + _SAME * period)
     begin, end = begin[covered], (begin + period)[covered]
     work = np.interp(end, times, steps["work"]) - np.interp(begin, times, steps["work"])

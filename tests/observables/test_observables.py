@@ -152,7 +152,7 @@ def test_observables__merge_with_their_result(kind):
     ds = rv.simulate(height, material, CYCLES, times=11, tolerance=1e-2, progress=False, **options)
     found = [
         rv.observables.clusters(ds),
-        rv.observables.cycle_work(ds, program=CYCLES),
+        rv.observables.cycle_work(ds),
         rv.observables.cluster_areas(ds),
         rv.observables.distribution(ds),
         rv.observables.distribution(ds, "gap"),
