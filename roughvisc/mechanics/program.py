@@ -462,7 +462,7 @@ class Program:
         Returns
         -------
         Program
-            An equal program if it prescribes no nominal pressure.
+            The same program if it prescribes no nominal pressure.
         """
         size, segments = number(area, "m^2", "area", above=0), []
         for one in self.segments:
@@ -470,7 +470,7 @@ class Program:
                 end = None if one.end is None else float(f"{one.end * size:.15g}")
                 one = replace(one, control="load", end=end, amplitude=float(f"{one.amplitude * size:.15g}"))
             segments.append(one)
-        return replace(self, segments=tuple(segments))
+        return self if tuple(segments) == self.segments else replace(self, segments=tuple(segments))
 
     @cached_property
     def slides(self) -> bool:

@@ -217,7 +217,15 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(title, str) or not title.strip():
         raise InputError(key="title", found=title, expected="a text")
     check_surface(tables["surface"])
-    body, experiment = body_of(tables["material"]), experiment_of(tables)
+    body = body_of(tables["material"])
+    if ("friction" in tables) == ("program" in tables):
+        expected = "either a list of [[program]] tables or a table [friction]"
+        found = [name for name in ("program", "friction") if name in tables]
+        raise InputError(key="program", found=found, expected=expected)
+    if "program" in tables:
+        experiment: Experiment = Loading(program_of(tables["program"]))
+    else:
+        experiment = call(SteadySliding, "friction", a_table("friction", tables["friction"]))
     settings, late_times = settings_of(tables, experiment)
     precision = tables.get("keep", {}).get("precision")
     if precision is not None:
@@ -277,17 +285,6 @@ def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
         expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
         raise InputError(key=f"{where}.{key}", found=stated[key], expected=expected)
     return factor
-
-
-def experiment_of(tables: Mapping[str, Any]) -> Experiment:
-    """Return the experiment of the tables ``[[program]]`` or the table ``[friction]``."""
-    if ("friction" in tables) == ("program" in tables):
-        expected = "either a list of [[program]] tables or a table [friction]"
-        found = [name for name in ("program", "friction") if name in tables]
-        raise InputError(key="program", found=found, expected=expected)
-    if "program" in tables:
-        return Loading(program_of(tables["program"]))
-    return call(SteadySliding, "friction", a_table("friction", tables["friction"]))
 
 
 def program_of(segments: Any) -> Program:

@@ -112,21 +112,13 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
     for axis in ("x", "y"):
         if axis in h.coords:
-            if unit_of(h[axis]) not in (None, "m"):
-                centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
-                h = h.assign_coords({axis: (axis, centres, h[axis].attrs)})
-            h[axis].attrs["units"] = "m"
+            centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
+            h = h.assign_coords({axis: (axis, centres, h[axis].attrs | {"units": "m"})})
     spacing(h, step)
     for axis in ("x", "y"):
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
     return h
-
-
-def unit_of(numbers: Any) -> str | None:
-    """Return the attribute ``units`` of a DataArray; None if it has none."""
-    stated = numbers.attrs.get("units") if isinstance(numbers, xr.DataArray) else None
-    return None if stated is None else str(stated)
 
 
 def metres_in(unit: str, name: str) -> float:
@@ -152,8 +144,9 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     InputError
         If they are not real numbers or held by pint, or their unit is not a length.
     """
-    unit = unit_of(numbers)
-    held = numbers.data if isinstance(numbers, xr.DataArray) else numbers
+    unit, held = "m", numbers
+    if isinstance(numbers, xr.DataArray):
+        unit, held = str(numbers.attrs.get("units", "m")), numbers.data
     if hasattr(held, "magnitude"):  # NumPy would drop its unit
         raise InputError(f"{name} is a pint array: expected plain numbers [m]")
     try:
@@ -163,7 +156,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     if held.dtype.kind not in "fiu":
         raise InputError(f"{name} is of {held.dtype}: expected real numbers")
     values = np.ma.filled(held.astype(float, copy=False), np.nan)
-    return values if unit in (None, "m") else values * metres_in(unit, name)
+    return values if unit == "m" else values * metres_in(unit, name)
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:

@@ -122,20 +122,19 @@ def in_large_holes(missing: np.ndarray) -> np.ndarray:
 
 def _local_median(values: np.ndarray, window: int) -> np.ndarray:
     """Return the median of the finite values in a square window about each point; smaller windows at the border."""
+
+    def median(windows: np.ndarray, axis: tuple[int, ...]) -> np.ndarray:
+        ordered = np.sort(windows.reshape(*windows.shape[:-2], -1), axis=-1)  # NaN last
+        count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
+        low, high = (
+            np.take_along_axis(ordered, np.clip(at, 0, ordered.shape[-1] - 1), axis=-1)
+            for at in ((count - 1) // 2, count // 2)
+        )
+        return np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
+
     return scipy.ndimage.vectorized_filter(
-        values, _median, size=window, mode="constant", cval=np.nan, batch_memory=_MEMORY
+        values, median, size=window, mode="constant", cval=np.nan, batch_memory=_MEMORY
     )
-
-
-def _median(windows: np.ndarray, axis: tuple[int, ...]) -> np.ndarray:
-    """Return the median of the finite values of each window, over the last two axes; NaN if a window has none."""
-    ordered = np.sort(windows.reshape(*windows.shape[:-2], -1), axis=-1)  # NaN last
-    count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
-    low, high = (
-        np.take_along_axis(ordered, np.clip(at, 0, ordered.shape[-1] - 1), axis=-1)
-        for at in ((count - 1) // 2, count // 2)
-    )
-    return np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
 
 
 def membrane(heights: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ Each format is written by the library that reads it.
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -18,6 +17,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, spacing
 from roughvisc.topography.readers import sha256
+from roughvisc.units import unit_for
 
 #: Suffixes that :func:`save_scan` writes.
 WRITABLE = (".nc", ".x3p", ".sdf")
@@ -147,10 +147,8 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
     >>> written_quantity(1.9e-5, "m"), written_quantity(7500.0, "Pa"), written_quantity(0.03, "N")
     ('19 um', '7.5 kPa', '30 mN')
     """
-    prefixes = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-    exponent = 3 * math.floor(math.log10(abs(value) * (1 + 1e-12)) / 3) if value else 0
-    exponent = min(max(exponent, -12), 0 if unit == "m" else 9)
-    return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.{digits}g} {prefixes[exponent]}{unit}"
+    shown = unit_for([value], unit)
+    return f"{value / shown.factor:.{digits}g} {shown.symbol}".replace("µ", "u")
 
 
 def _toml(value: Any) -> str:

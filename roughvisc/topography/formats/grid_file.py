@@ -15,7 +15,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 from roughvisc.errors import InputError
 from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import Channel, ScanFile
-from roughvisc.topography.grid import metres_in, unit_of
+from roughvisc.topography.grid import metres_in
 from roughvisc.units import is_quantity
 
 #: Names of the heights, in order of preference.
@@ -44,7 +44,7 @@ def read_hdf5(path: Path) -> ScanFile:
 
 def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
     gridded = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
-    unit = unit_of(variable)
+    unit = variable.attrs.get("units")
     if not gridded or (unit is not None and not is_quantity(f"1 {unit}", "m")):
         return Channel(name, variable.shape, lambda: None, unit, kind="no areal height")
 
@@ -55,7 +55,7 @@ def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
     shape = (variable.sizes["x"], variable.sizes["y"])
     if not {"x", "y"} <= set(variable.coords):
         return Channel(name, shape, load, unit)
-    units = [unit_of(variable[axis]) for axis in "xy"]
+    units = [variable[axis].attrs.get("units") for axis in "xy"]
     positions = [variable[axis].values.astype(float) for axis in "xy"]
     if None in units:
         if units[0] != units[1]:
