@@ -30,10 +30,12 @@ def audit_table(audit: Audit) -> Group:
     for heading in ("assumption", "verdict"):
         table.add_column(heading, no_wrap=True)
     table.add_column("number", justify="right", no_wrap=True)
-    table.add_column("", overflow="fold")
+    table.add_column("reason", overflow="fold")
     for one in audit:
-        verdict = Text(one.verdict, style=_STYLES.get(one.verdict, ""))
-        table.add_row(one.name, verdict, one.shown, Text(one.sentence))
+        verdict, reason = Text(one.verdict, style=_STYLES.get(one.verdict, "")), one.sentence
+        if reason.startswith("Give "):  # the missing properties are options of the command
+            reason = reason.replace("Give ", "Give --").replace(" and ", " and --").replace("_", "-")
+        table.add_row(one.name, verdict, one.shown, Text(reason))
     return titled(audit.title, table)
 
 

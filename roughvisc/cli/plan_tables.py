@@ -11,6 +11,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.cli.group import counted
 from roughvisc.cli.tables import readable, two_columns
 from roughvisc.experiment.resources import amount
 
@@ -29,8 +30,10 @@ def plan_tables(costs: xr.Dataset) -> Group:
         Result of :func:`roughvisc.plan`.
     """
     total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
+    threads = f"{counted(attrs['threads'], 'thread')} on large grids"
+    each = " per case" if total > 1 else ""
     whole = [
-        ("Cases", f"{total}, {attrs['processes']} in parallel, threads on large grids: {attrs['threads']} each"),
+        ("Cases", f"{total}, {attrs['processes']} in parallel, each with {threads}" if total > 1 else f"1, {threads}"),
         ("Model", _distinct(costs["model"].values)),
         ("Program", _distinct(costs["note"].values)),
         (
@@ -39,13 +42,13 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ),
         ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa")),
         ("Contact", _span(100 * costs["contact_fraction"], "", " % of the area")),
-        ("Steps per case", _span(costs["steps"], "")),
-        ("Convolutions per case", _span(costs["convolutions"], "")),
-        ("Wall time per case", _span(costs["wall_time"], "s")),
-        ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}"),
+        (f"Steps{each}", _span(costs["steps"], "")),
+        (f"Convolutions{each}", _span(costs["convolutions"], "")),
+        (f"Wall time{each}", _span(costs["wall_time"], "s")),
+        ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}" if total > 1 else ""),
         ("Memory", f"{amount(attrs['memory'])} of {amount(attrs['free_memory'])} free"),
         ("Disk", f"{amount(attrs['disk'])} of {amount(attrs['free_disk'])} free"),
-        ("Estimated from", f"coarse runs of {own} of {total} cases"),
+        ("Estimated from", f"coarse runs of {own} of {total} cases" if total > 1 else "a coarse run"),
     ]
     parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
     for text in dict.fromkeys(costs["warning"].values):
@@ -67,10 +70,12 @@ def _distinct(texts: Any) -> str:
 
 
 def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
-    """Return the range of the known values; empty if none is known."""
+    """Return the range of the known values, and of how many cases they are if not of all; empty if none is known."""
     known = values.values[np.isfinite(values.values)]
     ends = [f"{float(f'{one:.2g}'):g}" if not unit else readable(float(one), unit) for one in known]
     ends = list(dict.fromkeys(ends[i] for i in (known.argmin(), known.argmax()))) if known.size else []
+    if known.size < values.size:
+        after += f" in {known.size} of {values.size} cases"
     return f"about {' to '.join(ends)}{after}" if ends else ""
 
 

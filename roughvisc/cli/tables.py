@@ -57,7 +57,7 @@ def result_table(dataset: xr.Dataset) -> Group:
         if name == "contact_area" and "contact_fraction" in row:
             text += f", {100 * float(row['contact_fraction']):.3g} % of the surface"
         if f"{name}_error" in row and math.isfinite(value):
-            text += f"; error without the grid {readable(float(row[f'{name}_error']), unit)}"
+            text += f"; numerical error {readable(float(row[f'{name}_error']), unit)}"
         text += ", the largest" if name == axis.telling else ""
         rows.append((f"{VARIABLES[name].label} {where}", text))
     rows += accuracy_rows([dataset], dataset.attrs.get("tolerance"))

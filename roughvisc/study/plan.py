@@ -62,7 +62,7 @@ COLUMNS = {
     "steps": ("1", "time steps, or speeds of a friction curve"),
     "rows": ("1", "kept times or speeds"),
     "contact_fraction": ("1", "largest contact fraction, if the case had a coarse run"),
-    "nominal_pressure": ("Pa", "largest force over nominal area, if the case had a coarse run"),
+    "nominal_pressure": ("Pa", "largest force over nominal area, if it is prescribed or the case had a coarse run"),
     "convolutions": ("1", "convolutions, one forward and one inverse transform each"),
     "wall_time": ("s", "wall time in one process with one thread"),
     "memory": ("byte", "memory of the process at its peak"),
@@ -174,10 +174,11 @@ def plan(
                 for other in runs
             }
             row |= _costs(case, own, runs[min(runs, key=differing.__getitem__)], seconds, there)
+            if not is_own:
+                pressure = prescribed_pressure(case, nominal_area(height))
+                row |= {"contact_fraction": np.nan, "nominal_pressure": pressure}
         except (InputError, ConvergenceError) as error:
             row["refusal"] = str(error)
-        if not is_own:
-            row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
         rows[number] = row
     dataset = xr.Dataset({name: ("case", np.array([rows[i][name] for i in range(len(cases))])) for name in COLUMNS})
     for name, (units, long_name) in COLUMNS.items():
@@ -392,6 +393,23 @@ def timed_convolution(rows: Rows, touching: float) -> float:
 
 
 # ---------------------------------------------------------------------------------------------------------------- rows
+
+
+def prescribed_pressure(case: Case, area: float) -> float:
+    """Return the largest nominal pressure of a case; NaN if it follows from a prescribed approach. [Pa]
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    area : float
+        Nominal area. [m2]
+    """
+    if isinstance(curve := case.experiment, SteadySliding):
+        return curve.pressure if curve.load is None else curve.load / area
+    program = case.program.on_area(area)
+    moves = any(one.control == "approach" and not one.holds for one in program.segments)
+    return math.nan if moves else program.largest_load / area
 
 
 def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Available) -> dict[str, Any]:

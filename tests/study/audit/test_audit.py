@@ -397,7 +397,10 @@ def test_study__states_values_that_change_no_key(tmp_path, invoke):
     with open_result(run_case(read_study(path), tmp_path / "results")) as ds:
         stated, given = (rv.audit(ds, **more)["thickness"].number for more in ({}, {"thickness": "3 mm"}))
     assert given < stated
-    assert "600 µm" in invoke("audit", tmp_path / "results")[1]
+    out = invoke("audit", tmp_path / "results")[1]
+    assert "600 µm" in out
+    assert "--heat-conductivity" not in out, "nothing slides"
+    assert "--linear-strain" in out, "a missing property is named as the option"
     assert "6 mm" in invoke("audit", tmp_path / "results", "--thickness", "6 mm")[1]
     path.write_text(AUDITED.replace("0.6 mm", "7 mm"))
     assert "7 mm" in invoke("audit", tmp_path / "results", "--study", path)[1]
