@@ -126,7 +126,7 @@ VARIABLES: dict[str, Variable] = {
         _STEPS,
         "J",
         "work",
-        "of the force on the approach since the start, and of the friction force in a slide; over all steps; with "
+        "of the force on the approach since the start, over all steps; without the friction force of a slide; with "
         "periodic boundaries without the uniform displacement",
     ),
     "contact_area": Variable(
@@ -178,6 +178,7 @@ VARIABLES: dict[str, Variable] = {
     "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", in_table="largest"),
     "residual": Variable(_SERIES, "1", "error of the contact solver", "part of stated_error", in_table="largest"),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
+    "work_error": Variable(_SERIES, "J", "stated error of the work", "adds up over the steps; without the grid"),
     "contact_area_error": Variable(
         _SERIES,
         "m^2",

@@ -28,6 +28,8 @@ _RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
 INHERITED, INHERITED_APPROACH = 0.02, 0.005
 #: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
+#: Error of the work due to the contact solver, over its error of the pressure times the largest force and approach.
+OF_WORK = 0.2
 #: Error of the pressure at the edge of contact, over the mean error of the pressure.
 SOLVER_AT_EDGE = 3.0
 
@@ -176,23 +178,27 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     Returns
     -------
     dict
-        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``approach_error`` [m].
+        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``approach_error`` [m],
+        ``work_error`` [J].
 
     Notes
     -----
     The stated error is the sum of the errors of the time steps, of the contact solver in this and earlier steps, and
     of the series. Under a given load the solver's error of the approach is the duality gap over the load, which is of
-    second order in the error of the pressure. The error of the series is relative to the largest values of all steps:
-    values left after unloading are differences of large values.
+    second order in the error of the pressure. The errors of the series and of the work are relative to the largest
+    values of all steps: values left after unloading are differences of large values. Errors of the work add up.
     """
-    point, apart, control = step.point, step.difference, scene.program.segments[step.segment].control
+    point, state, apart = step.point, step.state, step.difference
+    control = scene.program.segments[step.segment].control
     given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
     largest_force, largest_approach = largest
-    of_force = series_error * max(step.state.largest_force, point.force)
-    reached = max(step.state.largest_approach, abs(point.approach))
+    loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
+    of_force = series_error * loaded
     of_approach = series_error * reached
     unit = scene.tolerance if largest_force > 0 else 0.0
     solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
+    work = scene.stated[0] * abs(state.work_apart) + state.work_curved
+    work += (OF_WORK * solved + series_error) * loaded * reached
     time_error, pressure, force, approach = 0.0, solved, 0.0, 0.0
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
@@ -212,6 +218,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
         "stated_error": max(pressure, relative),
         "residual": point.solver_error,
         "approach_error": approach,
+        "work_error": work,
     }
 
 

@@ -41,6 +41,9 @@ FIRST_PAIR = 0.005
 STATED, STATED_APPROACH = 0.6, 0.6
 #: The same for bodies with hardly any instantaneous compliance, whose first steps are of first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
+#: Error of the work along a straight path if the force vanishes at one end, as a part of this work: in ball and cone
+#: contacts a fifth and a third.
+STRAIGHT = 0.25
 #: Part of the tolerance that a pair may add to the error, and the part that it may add in any case.
 SHARE, LEAST_SHARE = 0.4, 0.2
 #: Part of the error so far that a pair may add in any case. The error of a slide depends on the cells and may be large.
@@ -285,6 +288,10 @@ class State:
         Largest values so far. [N, m]
     work : float
         Work of the normal force since the start. [J]
+    work_apart : float
+        Work of the coarse solution less the work of the fine one, both along straight paths. [J]
+    work_curved : float
+        Error of the quadrature of the work: root of the sum of the squares of all pairs. [J]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
@@ -299,6 +306,8 @@ class State:
     largest_force: float = 0.0
     largest_approach: float = 0.0
     work: float = 0.0
+    work_apart: float = 0.0
+    work_curved: float = 0.0
     distance: float = 0.0
     convolutions: int = 0
 
@@ -431,18 +440,14 @@ def without_past(point: Point) -> Point:
 
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
-    fine, coarse, grid, number = state.fine, state.coarse, scene.grid, state.segment
-    memory, spent = scene.memory, grid.convolutions
+    fine, coarse, number = state.fine, state.coarse, state.segment
+    memory, spent = scene.memory, scene.grid.convolutions
     rule: Rule | None = "linear" if fine.is_open else None  # exact while the surfaces are apart
     new = other = take_step(scene, fine, time, number, rule=rule)
     if coarse is not fine:
         rule = "linear" if coarse.is_open else None
         other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
-    work = trapezoid(scene, fine, new)
-    if memory.is_elastic or time == fine.time:  # the instantaneous compliance stores all work
-        before = float((fine.pressure * memory.at_once(fine.history)).sum())
-        after = float((new.pressure * memory.at_once(new.history)).sum())
-        work = 0.5 * after * grid.cell_area - 0.5 * before * grid.cell_area
+    work = work_of_step(scene, fine, new)
     shared = state.difference.shared * memory.remaining(time - fine.time)
     apart, reached, coarse = replace(difference(scene, new, other), shared=shared), new, other
     if fine.is_open and new.force == 0:
@@ -535,14 +540,19 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         del first, second, once, half, whole, other  # frees their memory while the pair is repeated
 
-    works = work_of_pair(scene, fine, first, second)
+    works, curved = work_of_pair(scene, fine, first, second)
     if scene.motions and scene.keeps(last):
         slide = scene.motions[number]
         apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
     kept = replace(apart, shared=shared)
-    after = after_steps(scene, state, [first, second], once, kept, works[1], spent, length)
-    inside = replace(state, work=state.work + works[0])
+    after = after_steps(scene, state, [first, second], once, kept, works[1], spent, length, curved=curved[1])
+    inside = replace(
+        state,
+        work=state.work + works[0],
+        work_apart=max(state.work_apart, after.work_apart, key=abs),
+        work_curved=math.hypot(state.work_curved, curved[0]),
+    )
     unsure += carried * memory.remaining(middle - fine.time)
     return [
         Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
@@ -573,7 +583,7 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
     for number in range(1, count + 1):
         here, time = points[-1], instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
-        works.append(works[-1] + trapezoid(scene, here, points[-1]))
+        works.append(works[-1] + straight_work(scene, here, points[-1]))
     last = points[-1]
     once = last
     if coarse is not fine or count == 2:
@@ -712,6 +722,7 @@ def after_steps(
     spent: int,
     length: float = 0.0,
     distance: float = 0.0,
+    curved: float = 0.0,
 ) -> State:
     """Return the state after accepted steps; at the end of a segment, the state at the start of the next one.
 
@@ -733,10 +744,15 @@ def after_steps(
         Length of the next pair. [s]
     distance : float
         Distance of a slide. [m]
+    curved : float
+        Error of the quadrature of the work. [J]
     """
     fine, force, approach = points[-1], state.largest_force, state.largest_approach
     for point in points:
         force, approach = max(force, point.force), max(approach, abs(point.approach))
+    work_apart = state.work_apart
+    if coarse is not fine:
+        work_apart += work_of_step(scene, state.coarse, coarse) - work_of_step(scene, state.fine, fine)
     reached = State(
         fine,
         None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
@@ -746,6 +762,8 @@ def after_steps(
         force,
         approach,
         state.work + work,
+        work_apart,
+        math.hypot(state.work_curved, curved),
         state.distance + distance,
         state.convolutions + scene.grid.convolutions - spent,
     )
@@ -762,33 +780,50 @@ def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
     return Difference(stated * pressure, stated * abs(fine.force - coarse.force), of_approach * approach)
 
 
-def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[float, float]:
-    """Return the work of the normal force in the first step of a pair, and in both. [J]
+def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[list[float], list[float]]:
+    """Return the work of the normal force in the first step of a pair and in both, and the errors of both values. [J]
 
     Force and approach are parabolas over time. If contact is lost in the second step, the force is a parabola over the
-    approach instead, and vanishes at the approach of last contact. After a jump the load is constant.
+    approach instead, and vanishes at the approach of last contact. After a jump the load is constant. If the steps are
+    too unequal, or the force would not fall steadily to zero, the force is linear over the approach in each step.
     """
-    force = middle.force if start.is_late else start.force
-    begin = np.array([force, touch(scene, start)])
+    forces = [middle.force if start.is_late else start.force, middle.force, end.force]
+    of_first = straight_work(scene, start, middle)
+    straight = np.array([of_first, of_first + straight_work(scene, middle, end)])
+    begin = np.array([forces[0], touch(scene, start)])
     early = np.array([middle.force, touch(scene, middle)]) - begin
     mean = np.array([end.force, touch(scene, end)]) - begin
     t = np.array([middle.time, end.time]) - start.time if end.force > 0 else np.array([early[1], mean[1]])
     first, last = t.tolist()
-    if middle.force == 0 or not LEAST_PART * last**2 < first * last < (1 - LEAST_PART) * last**2:
-        of_first = trapezoid(scene, start, middle)
-        return of_first, of_first + trapezoid(scene, middle, end)
-    bends = (mean / last - early / first) / (last - first)
-    (rise, rate), (bend, turn) = (early / first - bends * first).tolist(), bends.tolist()
-    terms = force * turn + rise * rate / 2, (2 * rise * turn + bend * rate) / 3, bend * turn / 2
-    of_first, of_both = (t * (force * rate + t * terms[0] + t**2 * terms[1] + t**3 * terms[2])).tolist()
-    return of_first, of_both
+    is_curved = middle.force > 0 and LEAST_PART * last**2 < first * last < (1 - LEAST_PART) * last**2
+    if is_curved:
+        bends = (mean / last - early / first) / (last - first)
+        (rise, rate), (bend, turn) = (early / first - bends * first).tolist(), bends.tolist()
+        is_curved = end.force > 0 or rise * (rise + 2 * bend * last) > 0
+    if not is_curved:
+        change = 1 - min(forces) / max(*forces, 1e-300)
+        return straight.tolist(), (STRAIGHT * change * straight).tolist()
+    terms = forces[0] * turn + rise * rate / 2, (2 * rise * turn + bend * rate) / 3, bend * turn / 2
+    curved = t * (forces[0] * rate + t * terms[0] + t**2 * terms[1] + t**3 * terms[2])
+    return curved.tolist(), (straight - curved).tolist()
 
 
-def trapezoid(scene: Scene, before: Point, after: Point) -> float:
-    """Return the work of a force that is linear over the approach between two points. [J]"""
+def work_of_step(scene: Scene, before: Point, after: Point) -> float:
+    """Return the work between two points, exact for a jump and an elastic body, otherwise along a straight path. [J]"""
+    memory = scene.memory
+    if not (memory.is_elastic or after.time == before.time):
+        return straight_work(scene, before, after)
+    # the instantaneous compliance stores all work
+    stored = [float((point.pressure * memory.at_once(point.history)).sum()) for point in (before, after)]
+    return 0.5 * stored[1] * scene.grid.cell_area - 0.5 * stored[0] * scene.grid.cell_area
+
+
+def straight_work(scene: Scene, before: Point, after: Point) -> float:
+    """Return the work of a force that is linear over the approach between two points, constant after a jump. [J]"""
     if before.force == 0 == after.force:
         return 0.0
-    return 0.5 * (before.force + after.force) * (touch(scene, after) - touch(scene, before))
+    force = after.force if before.is_late else before.force
+    return 0.5 * (force + after.force) * (touch(scene, after) - touch(scene, before))
 
 
 def touch(scene: Scene, point: Point) -> float:
