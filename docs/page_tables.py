@@ -1,4 +1,10 @@
-"""Tables of pages that come from the package: a mark on a page is replaced by its table when the pages are built."""
+"""Tables of pages that come from the package, when the pages are built.
+
+``python docs/page_tables.py variables`` prints a table. In a page a table is a line with this command.
+"""
+
+import re
+import sys
 
 from roughvisc.study.audit.checks import LIMITS
 from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
@@ -31,13 +37,15 @@ def limits():
     return "\n".join(lines)
 
 
-#: Mark on a page -> function that returns its table.
-TABLES = {"VARIABLES_TABLE": variables, "LIMITS_TABLE": limits}
+#: Line of a page in place of a table, and the functions that return the tables.
+MARK = re.compile(r"^`python docs/page_tables\.py (\w+)` prints this table\.$", re.M)
+TABLES = {"variables": variables, "limits": limits}
 
 
 def filled(page):
-    """Return the text of a page with its marks replaced by their tables."""
-    for mark, table in TABLES.items():
-        if mark in page:
-            page = page.replace(mark, table())
-    return page
+    """Return the text of a page with its tables."""
+    return MARK.sub(lambda found: TABLES[found[1]](), page)
+
+
+if __name__ == "__main__":
+    print(TABLES[sys.argv[1]]())

@@ -1,10 +1,12 @@
 """Tables of the keys of study files, from signatures and docstrings.
 
-``python study_keys.py`` prints the page ``study-files.md`` with its marks ``STUDY_KEYS name`` replaced by the tables.
+``python docs/study_keys.py`` prints the page ``study-files.md`` with its tables, and with the name of a table this one.
+In the page a table is a line with the command that prints it.
 """
 
 import inspect
 import re
+import sys
 from pathlib import Path
 
 import roughvisc as rv
@@ -262,10 +264,15 @@ def table(name):
     )
 
 
+#: Line of the page in place of a table.
+MARK = re.compile(r'^`python docs/study_keys.py "(.+)"` prints these keys\.$', re.M)
+
+
 def filled(page):
-    """Return a page with its marks ``STUDY_KEYS name`` replaced by the tables."""
-    return re.sub(r"^STUDY_KEYS (.+)$", lambda found: table(found[1]), page, flags=re.M)
+    """Return a page with its tables."""
+    return MARK.sub(lambda found: table(found[1]), page)
 
 
 if __name__ == "__main__":
-    print(filled(Path(__file__).with_name("study-files.md").read_text(encoding="utf-8")))
+    page = Path(__file__).with_name("study-files.md")
+    print(table(sys.argv[1]) if sys.argv[1:] else filled(page.read_text(encoding="utf-8")))

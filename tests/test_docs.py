@@ -1,9 +1,11 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
+import importlib
 import inspect
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -142,19 +144,27 @@ def test_gallery__is_what_its_script_writes(monkeypatch):
     assert make_gallery.page() == (DOCS / "gallery.md").read_text(encoding="utf-8"), "run docs/make_gallery.py"
 
 
-def test_tables__of_variables_and_limits_replace_their_marks(monkeypatch):
+@pytest.mark.parametrize(
+    ("page", "module", "table", "name"),
+    [
+        ("nomenclature.md", "page_tables", "variables", "contact_area"),
+        ("howto/audit.md", "page_tables", "limits", "border"),
+        ("study-files.md", "study_keys", "material: zener", "kelvin_modulus"),
+    ],
+)
+def test_table__is_in_the_built_page_and_printed_by_the_command_that_stands_for_it(
+    monkeypatch, page, module, table, name
+):
     monkeypatch.syspath_prepend(str(DOCS))
-    import page_tables
-
-    for page, mark, names in [
-        ("nomenclature.md", "VARIABLES_TABLE", ("contact_area", "stated_error")),
-        ("howto/audit.md", "LIMITS_TABLE", ("adhesion", "border")),
-    ]:
-        before = (DOCS / page).read_text(encoding="utf-8")
-        after = page_tables.filled(before)
-        assert mark in before
-        assert mark not in after
-        assert all(f"\n| `{name}`" in after for name in names)
+    before, row = (DOCS / page).read_text(encoding="utf-8"), f"\n| `{name}` |"
+    after = importlib.import_module(module).filled(before)
+    commands = [shlex.split(one) for one in re.findall(r"^`(python docs/.*)` prints", before, re.M)]
+    (command,) = (one for one in commands if one[-1] == table)
+    assert row in after
+    assert row not in before
+    assert "prints th" not in re.sub(r"prints this page", "", after)
+    done = subprocess.run([sys.executable, *command[1:]], cwd=ROOT, env=os.environ, capture_output=True, text=True)
+    assert row in done.stdout, done.stderr
 
 
 def test_python_files__that_pages_name_are_there():
