@@ -206,7 +206,7 @@ def sources_of(
         found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
         if shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
-            words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are not held"
+            words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are missing"
             smooth = vary(own, {"surface.shortest_wave": 2 * shortest})
             found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
 
