@@ -13,7 +13,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.units import in_si, number
 from roughvisc.variables import FIELDS
@@ -68,7 +67,8 @@ class Numerics:
     device: Device = "cpu"
 
     def __post_init__(self) -> None:
-        one_of("device", self.device, get_args(Device))
+        if self.device not in get_args(Device):
+            raise InputError(key="device", found=self.device, expected="'cpu' or 'gpu'")
         if self.time_step != "auto":
             try:
                 step = number(self.time_step, "s", "time_step", above=0)
@@ -112,7 +112,8 @@ class Settings(Numerics):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name, words in WORDS.items():
-            one_of(name, getattr(self, name), words)
+            if (found := getattr(self, name)) not in words:
+                raise InputError(key=name, found=found, expected=" or ".join(map(repr, words)))
         tolerance = number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1)
         times: Any = self.times
         expected = f"a positive number of times up to {MOST_TIMES}, a list of times [s], or None"

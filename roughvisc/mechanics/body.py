@@ -21,8 +21,9 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.creep import Creep, Material
 from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
+from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
 
@@ -235,7 +236,9 @@ class Body:
     kernel: Kernel = HALF_SPACE
 
     def __post_init__(self) -> None:
-        check_material(self.material)
+        if not isinstance(self.material, Prony | Creep):
+            expected = "a material, such as rv.zener(...) or rv.creep(function)"
+            raise InputError(key="material", found=self.material, expected=expected)
         for name in ("influence", "transfer"):
             if not callable(getattr(self.kernel, name, None)):
                 found = type(self.kernel).__name__
