@@ -95,13 +95,6 @@ def warnings_text(warnings: Mapping[str, str]) -> str:
     return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
 
 
-def expect_history(dataset: xr.Dataset) -> None:
-    """Refuse a result over another axis than time, for quantities that depend on the history."""
-    axis = axis_of(dataset.dims)
-    if axis != "time":
-        raise InputError(f"the result lies over {axis}: expected a history over time")
-
-
 def expect_declared_units(dataset: xr.Dataset) -> None:
     """Refuse a result that was converted to other units: derived quantities and figures need SI units.
 

@@ -23,7 +23,7 @@ from roughvisc.experiment.rows import (
     kept_times,
     length_of,
     meets_tolerance,
-    memory_options,
+    memory_of,
 )
 from roughvisc.experiment.warnings import loading_warnings
 from roughvisc.labels import warnings_text
@@ -33,7 +33,6 @@ from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.layer_memory import check_convergence
 from roughvisc.mechanics.memory import History
-from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
@@ -158,8 +157,8 @@ class LoadingRows(Rows):
         gap = np.ascontiguousarray(profile.gap[cells])
         present = None if profile.all_present else profile.present[cells]
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
-        options = memory_options(program, settings)
-        self.choice = choose_memory(body, **options, grid=grid, keeps_pressure=not surface.domain.is_whole)
+        keeps_pressure = not surface.domain.is_whole
+        self.choice = memory_of(body, program, settings, grid=grid, keeps_pressure=keeps_pressure)
         log.info("memory: %s", self.choice.note)
         self.scene = Scene(
             grid=grid,

@@ -15,12 +15,11 @@ import numpy as np
 from scipy import fft
 
 from roughvisc.errors import InputError, TooLargeError
-from roughvisc.experiment.rows import memory_options
+from roughvisc.experiment.rows import memory_of
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import arrays_of
 from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
-from roughvisc.mechanics.memory_choice import choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT
 from roughvisc.settings import Settings
@@ -208,7 +207,7 @@ def require_loading(
     """
     if math.prod(shape) < WORTH_ASKING:
         return
-    memory, rows = choose_memory(body, **memory_options(program, settings)).memory, least_rows(settings, program)
+    memory, rows = memory_of(body, program, settings).memory, least_rows(settings, program)
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     in_file = partial(march_bytes, settings, memory, rows=rows, part=part)

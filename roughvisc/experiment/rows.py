@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.memory_choice import SERIES_SHARE
+from roughvisc.mechanics.memory_choice import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program, instant
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings
@@ -128,8 +129,15 @@ def spread_times(program: Program, count: int) -> Array:
     return np.unique(np.concatenate(found))
 
 
-def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
-    """Return the arguments of :func:`~roughvisc.mechanics.memory_choice.choose_memory` that do not depend on the body.
+def memory_of(body: Body, program: Program, settings: Settings, **options: Any) -> Choice:
+    """Return the memory of a body for the kept rows of a program.
+
+    Parameters
+    ----------
+    body, program, settings
+        Body, program and settings of the case.
+    **options
+        Further arguments of :func:`~roughvisc.mechanics.memory_choice.choose_memory`.
 
     Notes
     -----
@@ -154,7 +162,7 @@ def memory_options(program: Program, settings: Settings) -> dict[str, Any]:
         corners, after = corners[after < times.size], after[after < times.size]
         shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
         shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
-    return {"duration": program.duration, "tolerance": settings.tolerance, "shortest": shortest}
+    return choose_memory(body, program.duration, settings.tolerance, shortest, **options)
 
 
 def length_of(step: Step, scene: Scene) -> float:

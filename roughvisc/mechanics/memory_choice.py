@@ -17,8 +17,6 @@ from roughvisc.mechanics.memory import Memory
 SERIES_SHARE = 0.1
 #: Part of this error for the series of the materials of a layered body; the rest is for the series of its waves.
 MATERIALS_SHARE = 0.3
-#: Default shortest time of a series, as a part of the length of the program.
-SHORTEST_AGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,17 +40,12 @@ class Choice:
     note: str
     misfit: float = 0.0
 
-    @property
-    def material(self) -> Prony:
-        """The Prony series that the solver uses."""
-        return self.memory.series
-
 
 def choose_memory(
     body: Body | Material,
     duration: float,
     tolerance: float,
-    shortest: float | None = None,
+    shortest: float,
     grid: Any = None,
     keeps_pressure: bool = False,
 ) -> Choice:
@@ -66,9 +59,8 @@ def choose_memory(
         Length of the program. [s]
     tolerance : float
         Relative error that the whole computation may have.
-    shortest : float, optional
-        Shortest time at which the compliance matters, apart from zero. Default: a millionth of the program's length.
-        [s]
+    shortest : float
+        Shortest time at which the compliance matters, apart from zero. [s]
     grid : Grid, optional
         Cells; needed for a layered body only.
     keeps_pressure : bool
@@ -84,7 +76,6 @@ def choose_memory(
     InputError
         If the material is not known over the whole program, or no memory of the body is known.
     """
-    shortest = SHORTEST_AGE * duration if shortest is None else shortest
     body = as_body(body)
     if not body.separates:
         return _of_layers(body, duration, tolerance, shortest, grid)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import expect_history, label, steps_of
+from roughvisc.labels import label, steps_of
 from roughvisc.observables.frames import need
 from roughvisc.variables import STEPPED
 
@@ -35,7 +35,6 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the Dataset contains several cases.
     """
-    expect_history(dataset)
     need(dataset, "time")
     if "time" not in dataset.dims or "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")

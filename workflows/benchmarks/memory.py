@@ -11,8 +11,7 @@ import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
 from roughvisc.experiment.resources import PROCESS, march_bytes
-from roughvisc.experiment.rows import memory_options
-from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.experiment.rows import memory_of
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result
@@ -53,7 +52,7 @@ def one(side, material, boundary):
             contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.settings, case.program.on_area(nominal_area(case.height()))
-    memory = choose_memory(case.body, **memory_options(program, settings)).memory
+    memory = memory_of(case.body, program, settings).memory
     stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact, rows=rows)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",

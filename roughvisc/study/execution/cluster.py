@@ -25,8 +25,7 @@ from roughvisc.experiment.resources import (
     march_bytes,
     memory_available,
 )
-from roughvisc.experiment.rows import memory_options
-from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.experiment.rows import memory_of
 from roughvisc.study.case import Case
 from roughvisc.topography.grid import counts
 
@@ -166,7 +165,7 @@ def side_by_side(cases: Sequence[Case], most: int) -> int:
         settings, experiment = case.settings, case.experiment
         if isinstance(experiment, Loading):
             program = experiment.program
-            memory = choose_memory(case.body, **memory_options(program, settings)).memory
+            memory = memory_of(case.body, program, settings).memory
             size = march_bytes(settings, memory, cells[surface], rows=least_rows(settings, program))
         else:
             size = curve_bytes(settings, cells[surface])

@@ -289,11 +289,11 @@ def _declare(
     place: netCDF4.Dataset, part: xr.Dataset, precision: float | None
 ) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
-    place.setncatts(plain_attributes(part.attrs))
+    place.setncatts(part.attrs)
     labels = {str(name): set(one.dims) for name, one in part.coords.items() if name not in part.dims}
     declared = []
     for name, variable in part.variables.items():
-        attributes = plain_attributes(variable.attrs)
+        attributes = dict(variable.attrs)
         if name in part.data_vars and (own := [one for one, dims in labels.items() if dims <= set(variable.dims)]):
             attributes["coordinates"] = " ".join(own)  # marks coordinates in CF
         if variable.dtype.kind == "U":
@@ -358,25 +358,9 @@ def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
         del values  # frees the memory before the next layer is read
 
 
-def plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return attributes in the types of NetCDF, without None, booleans and nested values."""
-    plain: dict[str, Any] = {}
-    for name, value in attributes.items():
-        if value is None:
-            continue
-        if isinstance(value, bool | np.bool_):
-            value = np.int8(value)
-        elif not isinstance(value, str | int | float | np.generic | np.ndarray | list | tuple):
-            value = str(value)
-        plain[str(name)] = value
-    return plain
-
-
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
     """Write a Dataset other than a result to one NetCDF file atomically."""
-    kept = dataset.copy()
-    kept.attrs = plain_attributes(dataset.attrs)
-    numbers = [str(name) for name in kept.variables if kept[name].dtype.kind == "f"]
+    numbers = [str(name) for name in dataset.variables if dataset[name].dtype.kind == "f"]
     with atomic_write(path) as temporary:
-        kept.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
+        dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
     return Path(path)
