@@ -213,7 +213,7 @@ class Grid:
         half-space is zero.
         """
         self.convolutions += 1
-        symbol = self._single_symbol if pressure.dtype == np.float32 else self.symbol
+        symbol = self._single_symbol if pressure.dtype == np.float32 else self._double_symbol
         return self._convolved(pressure, symbol, self.points)
 
     def inverse(self, displacement: Array) -> Array:
@@ -250,8 +250,12 @@ class Grid:
         return float((parts[0][:, None] * self.symbol * parts[1]).sum())
 
     @cached_property
+    def _double_symbol(self) -> Array:
+        return self._of_all_waves(self.symbol)
+
+    @cached_property
     def _single_symbol(self) -> Array:
-        return self.symbol.astype(np.float32)
+        return self._of_all_waves(self.symbol).astype(np.float32)
 
     @cached_property
     def _inverse_symbol(self) -> Array:
@@ -259,13 +263,31 @@ class Grid:
         if self.boundary == "free":
             symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-        return (1 / symbol).astype(np.float32)
+        return self._of_all_waves(1 / symbol).astype(np.float32)
+
+    def _of_all_waves(self, symbol: Array) -> Array:
+        """Return a symbol for a convolution.
+
+        For whole periodic fields on a device it has the waves of negative wave numbers along x too, and the factor of
+        the inverse transform if this is a power of two and thus exact: two passes less.
+        """
+        if self.xp is np or self.boundary != "periodic":
+            return symbol
+        count, first = self.shape[0], len(symbol)
+        return self.xp.concatenate([symbol, symbol[count - first : 0 : -1]]) / (self.size if self._is_power else 1)
+
+    @property
+    def _is_power(self) -> bool:
+        """Whether the number of cells is a power of two."""
+        return self.size.bit_count() == 1
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
         """Return the convolution of a field with a symbol on a number of points."""
         fft = self._transforms
         if self.boundary == "mirror":
             return fft.cosines_back(fft.cosines(field) * symbol)
+        if self.boundary == "periodic" and self.xp is not np:
+            return fft.waves_back(fft.waves(field) * symbol, points, norm="forward" if self._is_power else "backward")
         if points == self.shape and self.size < BLOCKS_FROM:
             spectrum = fft.waves(field)
             self.multiply(spectrum, symbol)
@@ -393,9 +415,11 @@ class Transforms:
         """
         return self.fft.rfftn(field, s=None if points is None else (points,), axes=axes, **self.settings)
 
-    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
-        """Return the field of a Fourier transform."""
-        return self.fft.irfftn(spectrum, s=points, axes=axes, overwrite_x=True, **self.settings)
+    def waves_back(
+        self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1), norm: str = "backward"
+    ) -> Array:
+        """Return the field of a Fourier transform; with ``norm="forward"``, times the number of points."""
+        return self.fft.irfftn(spectrum, s=points, axes=axes, norm=norm, overwrite_x=True, **self.settings)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         """Return the Fourier transform along x, or the inverse one, which may overwrite the spectrum."""
@@ -424,10 +448,12 @@ class DuccTransforms(Transforms):
             field = longer
         return self.fft.r2c(field, axes=axes, **self.settings)
 
-    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
+    def waves_back(
+        self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1), norm: str = "backward"
+    ) -> Array:
         out = _apart((len(spectrum), points[-1]), spectrum.real.dtype) if axes == (1,) else None
-        back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, **self.settings}
-        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back)
+        back = {"forward": False, "inorm": 2 if norm == "backward" else 0, "allow_overwriting_input": True}
+        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back, **self.settings)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         norm = 2 if back else 0

@@ -33,6 +33,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.mechanics.contact import passes as host
+from roughvisc.mechanics.contact.passes import inner, largest
 from roughvisc.mechanics.grid import Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
@@ -146,7 +148,7 @@ def solve_contact(
     """
     if (load is None) == (approach is None):
         raise ValueError("expected either load or approach")
-    xp, under_load, before = grid.xp, load is not None, grid.convolutions
+    xp, under_load, before, passes = grid.xp, load is not None, grid.convolutions, passes_of(grid.xp)
     present = None if present is None or present.all() else present.reshape(-1)
     start = start if start is not None and (start > 0).any() else None
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
@@ -163,7 +165,8 @@ def solve_contact(
         given[~present] = 0
     level = overlap / unit
     is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
-    has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
+    # The preconditioner may have a second level; on a GPU it takes longer than the iterations that it saves.
+    has_blocks = min(gap.shape) >= BLOCKS_FROM and passes is host
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
         raise ConvergenceError("the approach reaches full contact and does not determine the load")
 
@@ -189,9 +192,6 @@ def solve_contact(
     else:
         separation = separation_under(pressure)
 
-    def without_mean(vector: Array) -> Array:
-        return vector - vector.sum() / vector.size if under_load else vector
-
     on_grid = Scatter(xp.zeros(gap.shape))
     contact = xp.flatnonzero(pressure)
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
@@ -210,18 +210,14 @@ def solve_contact(
             free &= present
         free[contact] = True
         cells = xp.flatnonzero(free)
-        held, at = pressure[cells], separation[cells]
-        residual = without_mean(at - level)
-        size, total = largest(abs(residual)), float(held.sum())
-        least, most = (float(at.min()), float(at.max())) if at.size else (level, 0.0)
-        lowest, highest = min(least, level), max(most, -least, 0.0)
-        weighted = inner(held, at)
-        energy = max(weighted - inner(held, given[cells]), 0.0)
+        found = passes.measure(pressure, separation, given, cells, level, under_load)
+        held, residual, size, total, energy = found.held, found.residual, found.size, found.total, found.energy
+        lowest, highest = min(found.least, level), max(found.most, -found.least, 0.0)
         if under_load:
-            duality = max(weighted - lowest * total, 0.0)
+            duality = max(found.weighted - lowest * total, 0.0)
         else:
-            duality = abs(weighted - level * total) + total * (level - lowest)
-        rounding = ROUNDING * total * (highest + grid.self_influence * largest(held))
+            duality = abs(found.weighted - level * total) + total * (level - lowest)
+        rounding = ROUNDING * total * (highest + grid.self_influence * found.highest_pressure)
 
         if size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
             separation = separation_under(pressure)
@@ -249,36 +245,22 @@ def solve_contact(
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
         waves = LongWaves.of(grid, cells, held, energy) if has_blocks else None
         rest = residual if waves is None else residual - waves.means(residual)[waves.block]
-        direction = grid.inverse(on_grid((rest / size).astype(np.float32), cells)).reshape(-1)[cells].astype(float)
-        direction *= size
+        direction = passes.taken(grid.inverse(on_grid((rest / size).astype(np.float32), cells)), cells, size)
         if waves is not None:
             direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
-        direction = without_mean(direction)
+        # Conjugate to the step before, on the cells that are free now.
+        direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
-        requested_size, requested_duality = caution * float(abs(direction).sum()), max(duality, 1e-300)
+        requested_size, requested_duality = caution * requested_size, max(duality, 1e-300)
         if iteration == 0:
             is_single = gap.size >= SINGLE_FROM and requested_size > FAR * tolerance * total
-
-        # Conjugate to the step before, on the cells that are free now.
-        if previous is not None:
-            old_cells, old_change, old_response, old_curvature = previous
-            beta = inner(direction, old_response[cells]) / old_curvature
-            former = without_mean(on_grid(old_change, old_cells).reshape(-1)[cells])
-            conjugate = direction - beta * former
-            if beta > 0 and inner(conjugate, residual) > 0:
-                direction = conjugate
 
         # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15).
         slope = 0.0
         while stalled < PATIENCE and length >= SHORTEST_STEP:
-            trial = xp.maximum(held - length * direction, 0)
-            carried = float(trial.sum()) if under_load else 1.0
-            if carried > 0:
-                trial /= carried
-                change = trial - held
-                slope = inner(change, residual)
-                if slope < 0:
-                    break
+            trial, change, slope = passes.cut_step(held, direction, residual, length, under_load)
+            if slope < 0:
+                break
             length, previous = length / 4, None
         if not slope < 0:
             moved = held - residual / grid.stiffest
@@ -305,9 +287,9 @@ def solve_contact(
             response -= separation - given
         else:
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
-        curvature = inner(change, response[cells])
+        curvature = passes.inner_at(change, response, cells)
         minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
-        fraction, was_cut = admissible_fraction(held, trial, change, minimum)
+        fraction, was_cut = passes.admissible_fraction(held, trial, change, minimum)
         if is_extrapolated and not is_single:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
@@ -366,20 +348,13 @@ class Scatter:
         return self.flat.reshape(self.zeros.shape)
 
 
-def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
-    """Return the fraction of a trial to take, and whether the limit of zero pressure cut it.
+def passes_of(xp: Any) -> Any:
+    """Return the module of the passes for arrays of NumPy, or for arrays of CuPy."""
+    if not hasattr(xp, "RawKernel"):
+        return host
+    from roughvisc.mechanics.contact import kernels
 
-    A trial that empties cells is taken whole if the energy decreases up to its end, so that these cells leave the
-    contact.
-    """
-    if bool(((held > 0) & (trial == 0)).any()):
-        return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
-    if minimum <= 1:
-        return minimum, False
-    shrinking = change < 0
-    steepest = largest(-change[shrinking] / held[shrinking])
-    limit = 1 / steepest if steepest > 0 else math.inf
-    return min(minimum, limit), minimum > limit
+    return kernels
 
 
 def onto_simplex(values: Array, total: float) -> Array:
@@ -388,16 +363,6 @@ def onto_simplex(values: Array, total: float) -> Array:
     ordered = xp.sort(shifted)[::-1]
     excess = (xp.cumsum(ordered) - total) / xp.arange(1, ordered.size + 1)
     return xp.maximum(shifted - excess[int((ordered > excess).sum()) - 1], 0)
-
-
-def largest(values: Array, least: float = 0.0) -> float:
-    """Return the largest value, but at least a given one; a vector may be empty."""
-    return max(float(values.max()), least) if values.size else least
-
-
-def inner(one: Array, other: Array) -> float:
-    """Return the inner product. The last bits of the BLAS function would depend on the number of threads."""
-    return float((one * other).sum())
 
 
 def unsolved(iterations: int, error: float, tolerance: float) -> str:

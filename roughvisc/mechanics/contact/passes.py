@@ -1,0 +1,150 @@
+"""Passes over the free cells in an iteration of the contact solver: new vectors, and all sums of a pass at once.
+
+On a GPU each pass is one kernel of :mod:`roughvisc.mechanics.contact.kernels`, which has the same functions: the launch
+of a kernel and the copy of a number to the host take longer than the pass itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from roughvisc.mechanics.grid import namespace
+
+Array = Any  # an array of NumPy or CuPy
+#: Cells [index], change, response (whole field) and curvature of the last step.
+Last = tuple[Array, Array, Array, float]
+
+
+class Free(NamedTuple):
+    """Pressure and residual at the free cells, and their sums.
+
+    Attributes
+    ----------
+    held, residual : array, shape (n,)
+        Pressure, and separation without the approach.
+    size : float
+        Largest absolute residual.
+    total, highest_pressure : float
+        Sum of the pressure, and its largest value.
+    least, most : float
+        Smallest and largest separation; the approach and zero without free cells.
+    weighted, energy : float
+        Sum of pressure times separation, and of pressure times displacement.
+    """
+
+    held: Array
+    residual: Array
+    size: float
+    total: float
+    highest_pressure: float
+    least: float
+    most: float
+    weighted: float
+    energy: float
+
+
+def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
+    """Return pressure and residual at the free cells; under a load the residual has no mean."""
+    held, at = pressure[cells], separation[cells]
+    residual = without_mean(at - level) if under_load else at - level
+    least, most = (float(at.min()), float(at.max())) if at.size else (level, 0.0)
+    weighted = inner(held, at)
+    energy = max(weighted - inner(held, gap[cells]), 0.0)
+    size, highest = largest(abs(residual)), largest(held)
+    return Free(held, residual, size, float(held.sum()), highest, least, most, weighted, energy)
+
+
+def taken(field: Array, cells: Array, factor: float) -> Array:
+    """Return the values of a field at some cells, times a factor, in double precision."""
+    values = field.reshape(-1)[cells].astype(float)
+    values *= factor
+    return values
+
+
+def conjugate(
+    direction: Array,
+    residual: Array,
+    last: Last | None,
+    on_grid: Callable[[Array, Array], Array],
+    cells: Array,
+    under_load: bool,
+) -> tuple[Array, float]:
+    """Return the direction, conjugate to the last step if that descends, and the L1 norm of the direction before.
+
+    Parameters
+    ----------
+    direction, residual : array, shape (n,)
+        Preconditioned residual, and residual, at the free cells.
+    last : tuple or None
+        The last step.
+    on_grid : callable
+        Returns the field with given values at given cells.
+    cells : array of int, shape (n,)
+        The free cells.
+    under_load : bool
+        Whether the direction may not change the load.
+    """
+    direction = without_mean(direction) if under_load else direction
+    size = float(abs(direction).sum())
+    if last is not None:
+        old_cells, old_change, response, curvature = last
+        beta = inner(direction, response[cells]) / curvature
+        former = on_grid(old_change, old_cells).reshape(-1)[cells]
+        turned = direction - beta * (without_mean(former) if under_load else former)
+        if beta > 0 and inner(turned, residual) > 0:
+            direction = turned
+    return direction, size
+
+
+def cut_step(
+    held: Array, direction: Array, residual: Array, length: float, under_load: bool
+) -> tuple[Array, Array, float]:
+    """Return a step along a direction, cut at zero pressure: new pressure, its change, and the slope of the energy.
+
+    Under a load, the new pressure is scaled to a sum of one; the slope is zero if no cell carries pressure.
+    """
+    trial = namespace(held).maximum(held - length * direction, 0)
+    carried = float(trial.sum()) if under_load else 1.0
+    if carried == 0:
+        return trial, trial - held, 0.0
+    trial /= carried
+    change = trial - held
+    return trial, change, inner(change, residual)
+
+
+def inner_at(values: Array, field: Array, cells: Array) -> float:
+    """Return the inner product of a vector and the values of a field at some cells."""
+    return inner(values, field[cells])
+
+
+def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
+    """Return the fraction of a trial to take, and whether the limit of zero pressure cut it.
+
+    A trial that empties cells is taken whole if the energy decreases up to its end, so that these cells leave the
+    contact.
+    """
+    if bool(((held > 0) & (trial == 0)).any()):
+        return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
+    if minimum <= 1:
+        return minimum, False
+    shrinking = change < 0
+    steepest = largest(-change[shrinking] / held[shrinking])
+    limit = 1 / steepest if steepest > 0 else math.inf
+    return min(minimum, limit), minimum > limit
+
+
+def without_mean(values: Array) -> Array:
+    """Return a vector without its mean."""
+    return values - values.sum() / values.size
+
+
+def largest(values: Array, least: float = 0.0) -> float:
+    """Return the largest value, but at least a given one; a vector may be empty."""
+    return max(float(values.max()), least) if values.size else least
+
+
+def inner(one: Array, other: Array) -> float:
+    """Return the inner product. The last bits of the BLAS function would depend on the number of threads."""
+    return float((one * other).sum())

@@ -1,0 +1,115 @@
+"""The kernels of a GPU, compiled for the processor, give what the passes of NumPy give on random contacts."""
+
+import ctypes
+import shutil
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from roughvisc.mechanics.contact import passes
+
+#: One thread of one block, on the processor.
+SHIM = """
+#include <cmath>
+#define __global__
+#define __shared__
+static inline void __syncthreads() {}
+using std::fmax; using std::fabs;
+static struct { int x; } blockIdx = {0}, blockDim = {1}, threadIdx = {0}, gridDim = {1};
+"""
+
+
+@pytest.fixture(scope="module")
+def kernels(tmp_path_factory):
+    compiler, folder = shutil.which("c++"), tmp_path_factory.mktemp("kernels")
+    if compiler is None:
+        pytest.skip("no C++ compiler")
+
+    class RawKernel:
+        def __init__(self, source, name):
+            library = folder / f"{name}{'float' in source}.so"
+            subprocess.run(
+                [compiler, "-x", "c++", "-O1", "-ffp-contract=off", "-shared", "-fPIC", "-o", library, "-"],
+                input=(SHIM + source).encode(),
+                check=True,
+            )
+            self.call = getattr(ctypes.CDLL(str(library)), name)
+
+        def __call__(self, blocks, threads, arguments):
+            def plain(value):
+                if isinstance(value, np.ndarray):
+                    return ctypes.c_void_p(value.ctypes.data)
+                return ctypes.c_longlong(value) if isinstance(value, int) else ctypes.c_double(value)
+
+            self.call(*map(plain, arguments))
+
+    class Parts(np.ndarray):
+        def get(self):
+            return np.asarray(self)
+
+    cupy = SimpleNamespace(RawKernel=RawKernel, empty=lambda shape: np.empty(shape).view(Parts))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(sys.modules, "cupy", cupy)
+        patch.delitem(sys.modules, "roughvisc.mechanics.contact.kernels", raising=False)
+        from roughvisc.mechanics.contact import kernels
+
+        patch.setattr(kernels, "BLOCKS", 1)
+        for value in vars(kernels).values():
+            if isinstance(value, kernels.Kernel):
+                value._source = value._source.replace(f"shared[{kernels.THREADS}]", "shared[1]").replace(
+                    f"half = {kernels.THREADS} / 2", "half = 0"
+                )
+        yield kernels
+    sys.modules.pop("roughvisc.mechanics.contact.kernels", None)
+
+
+def same(found, expected):
+    for one, other in zip(found, expected, strict=True):
+        other = np.asarray(other, dtype=float)
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * float(abs(other).max(initial=0)))
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    seed=st.integers(0, 10**6),
+    size=st.integers(1, 60),
+    under_load=st.booleans(),
+    single=st.booleans(),
+    old=st.booleans(),
+)
+def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, single, old):
+    random = np.random.default_rng(seed)
+    pressure = np.maximum(random.normal(size=size), 0)
+    separation, gap = random.normal(size=size), random.random(size)
+    response = random.normal(size=size).astype(np.float32 if single else np.float64)
+    cells = np.flatnonzero((pressure > 0) | (separation < 0.2))
+    level, under_load = float(random.normal()), under_load and cells.size > 0
+    both = [one.measure(pressure, separation, gap, cells, level, under_load) for one in (kernels, passes)]
+    same(*both)
+    if not cells.size:
+        return
+    held, residual = both[1].held, both[1].residual
+    same(*([one.taken(response, cells, 3.0)] for one in (kernels, passes)))
+    old_cells = np.sort(random.choice(size, random.integers(1, size + 1), replace=False))
+    last = (old_cells, random.normal(size=old_cells.size), response, 0.7) if old else None
+
+    def on_grid(values, places):
+        field = np.zeros(size)
+        field[places] = values
+        return field
+
+    direction = random.normal(size=cells.size)
+    both = [one.conjugate(direction.copy(), residual, last, on_grid, cells, under_load) for one in (kernels, passes)]
+    same(*both)
+    direction = both[1][0]
+    both = [one.cut_step(held, direction, residual, 0.3, under_load) for one in (kernels, passes)]
+    same(*both)
+    trial, change, _ = both[1]
+    same(*([one.inner_at(change, response, cells)] for one in (kernels, passes)))
+    for minimum in (0.2, 0.8, 1.5, 20.0):
+        same(*(one.admissible_fraction(held, trial, change, minimum) for one in (kernels, passes)))
