@@ -66,7 +66,7 @@ def budget_table(dataset: xr.Dataset) -> Group:
         interval = f"at 95 % from {low} to {high}"
         if not np.isfinite(at["upper"]):
             interval = "without an interval" + (", as zero has no logarithm" if at["value"] == 0 else "")
-        parts.append(Text(f"{AXES[axis].place(float(place))}: {value}, {interval}"))
+        parts.append(Text(f"{AXES[axis].place(float(place), 3)}: {value}, {interval}"))
     parts += [Text(), table]
     spent = float(dataset["case_cost"])
     notes = [f"The case itself took {spent:.2g} s. Errors are the smallest and the largest of all {AXES[axis].rows}."]
@@ -112,7 +112,7 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column()
     table.add_column("setting", min_width=18)
-    for heading in ("time", "transf.", *(name.replace("_", "\n") for name in shown)):
+    for heading in ("time", "FFTs", *(name.replace("_", "\n") for name in shown)):
         table.add_column(heading, justify="right", no_wrap=True)
     best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
     for i in np.flatnonzero(dataset["note"] == ""):

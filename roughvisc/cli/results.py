@@ -118,9 +118,10 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
 
     stated = {} if study is None else rv.read_cases(study)[0].audit_inputs
     given = stated | {name: value for name, value in properties.items() if value is not None}
-    for path in results_at(result):
+    console = screen()
+    for number, path in enumerate(results_at(result)):
         with rv.open_result(path) as dataset:
-            screen().print(audit_table(rv.audit(dataset, **given)))
+            console.print(*([""] if number else []), audit_table(rv.audit(dataset, **given)), sep="\n")
 
 
 @click.command()

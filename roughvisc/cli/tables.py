@@ -88,8 +88,8 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
     alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
-    before = f"{reused} of them before" if reused < len(outcomes) else "all before: nothing to compute"
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(finished)}, {before}")]
+    before = f", {reused} of them before" if reused < len(outcomes) else ", all before: nothing to compute"
+    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(finished)}{before if reused else ''}")]
     kinds = Counter(outcome.kind for outcome in outcomes if outcome.kind != "done")
     rows += [(kind.capitalize(), str(count)) for kind, count in kinds.items()]
     rows += accuracy_rows([entry.arrays for entry in finished])

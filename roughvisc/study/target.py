@@ -214,11 +214,12 @@ def _refuse_missed(
             raise InputError(key=name, found="zero, or less, which has no relative error", expected="another number")
         parts = {one: error_of(budget, [one]) for one in sources if one in budget["source"]}
         largest = max(parts, key=parts.__getitem__)
-        lines = [f"its error on {cells} is {_percent(error, 3)}, and {_REMEDIES[largest]} would reduce it"]
+        reached = f"its error on {cells} is {_percent(error, 3)}: more than the target of {_percent(wanted)}"
+        lines = [f"{reached}; {_REMEDIES[largest]} would reduce it"]
         lines += [f"  {one}: {_percent(part)}" for one, part in parts.items() if part > 0.1 * wanted]
         lines += [f"  open, and not counted: {budget.attrs['open']}"] if budget.attrs["open"] else []
         where = f"{case.origin}: " if case.origin else ""
-        raise InputError(f"{where}{name}: found {_percent(wanted)}: " + "\n".join(lines), key=name, found=targets[name])
+        raise InputError(f"{where}{name}: " + "\n".join(lines), key=name, found=targets[name])
 
 
 def _percent(half_width: float, digits: int = 2) -> str:
