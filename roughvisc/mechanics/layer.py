@@ -117,13 +117,9 @@ def effective_compliance(
     q = np.asarray(q, dtype=float)
     shape = np.broadcast_shapes(q.shape, *(np.shape(compliance) for compliance in shear_compliances))
     if math.prod(shape) > _WAVES_TOGETHER and shape[0] > 1:
-        waves, *compliances = (np.broadcast_to(one, shape) for one in (q, *shear_compliances))
-        half = -(-shape[0] // 2)
-        parts = [
-            effective_compliance(waves[part], thicknesses, poissons, [one[part] for one in compliances])
-            for part in (slice(half), slice(half, None))
-        ]
-        return np.concatenate(parts)
+        halves = (np.array_split(np.broadcast_to(one, shape), 2) for one in (q, *shear_compliances))
+        parts = zip(*halves, strict=True)
+        return np.concatenate([effective_compliance(one, thicknesses, poissons, rest) for one, *rest in parts])
     layers = [np.asarray(compliance)[..., None, None] for compliance in shear_compliances]
     down, down_stress, _, _ = _partial_waves(poissons[-1])
     # displacements over tractions, the tractions over 2 q

@@ -113,16 +113,14 @@ def _of_layers(body: Body, duration: float, tolerance: float, shortest: float, g
     of_materials = max(error for _, error in found)
     layers = Layers(body.thicknesses, tuple(one for one, _ in found))
     waves = layer_series(layers, shortest, duration, share - of_materials)
-    error, count = waves.error + of_materials, len(waves.times)
+    memory, error = LayerMemory(waves, duration, grid), waves.error + of_materials
     note = "the instantaneous compliance of each wave"
     if len(waves.compliances):
-        note = (
-            f"{count} exponential{'' if count == 1 else 's'}{' and a fluidity' if waves.flows else ''} that all waves "
-            f"share, each with compliances of its own, within {error:.1e} of them from {shortest:.1g} s on"
-        )
+        within = f"within {error:.1e} of them from {shortest:.1g} s on"
+        note = f"{in_words(memory.series)} that all waves share, each with compliances of its own, {within}"
     misfit = max(one.misfit for one in given)
     notes = "; ".join(filter(None, (note, *(one.note for one in given))))
-    return Choice(LayerMemory(waves, duration, grid), error, notes, misfit)
+    return Choice(memory, error, notes, misfit)
 
 
 def at_once(material: Prony | Creep) -> Prony:
@@ -133,10 +131,6 @@ def at_once(material: Prony | Creep) -> Prony:
 
 def in_words(found: Prony) -> str:
     """Return the terms of a series in words."""
-    if not found.times and not found.fluidity:
-        return "no memory: elastic"
     count = len(found.times)
-    exponentials = f"{count} exponential{'' if count == 1 else 's'}"
-    if not count:
-        return "a fluidity"
-    return f"{exponentials} and a fluidity" if found.fluidity else exponentials
+    terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (found.fluidity > 0)
+    return " and ".join(terms) or "no memory: elastic"

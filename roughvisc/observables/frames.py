@@ -9,6 +9,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import expect_declared_units
+from roughvisc.variables import OTHER_DIMS, axis_of
 
 
 def need(dataset: xr.Dataset, *names: str) -> None:
@@ -18,6 +19,18 @@ def need(dataset: xr.Dataset, *names: str) -> None:
             stored = ", ".join(str(known) for known in dataset.data_vars)
             raise InputError(f"the result holds no {name!r} (it holds {stored}): run again with it among the fields")
     expect_declared_units(dataset)
+
+
+def expect_result(dataset: Any, *names: str) -> None:
+    """Refuse a Dataset that is not the result of one case, has no rows, or lacks variables."""
+    axis = axis_of(getattr(dataset, "variables", ()))
+    if not isinstance(dataset, xr.Dataset):
+        raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
+    if extra := [str(dim) for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]:
+        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
+    need(dataset, axis, *names)
+    if dataset[axis].size == 0:
+        raise InputError(f"the result has no {axis}: expected at least one row")
 
 
 def by_frame(field: xr.DataArray) -> xr.DataArray:

@@ -11,9 +11,10 @@ from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 
 from roughvisc.errors import InputError
+from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, plane_ratio
-from roughvisc.plot.rows import expect_result, measured_part, rows_of
+from roughvisc.plot.rows import measured_part, rows_of
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.units import unit_for
 from roughvisc.variables import FIELDS, VARIABLES

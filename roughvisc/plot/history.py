@@ -16,9 +16,9 @@ from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.observables import history as steps_of
+from roughvisc.observables.frames import expect_result
 from roughvisc.observables.theory import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.plot import style
-from roughvisc.plot.rows import expect_result
 from roughvisc.plot.sweep import sweep
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import Unit, quantities, unit_for

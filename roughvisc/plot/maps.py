@@ -19,8 +19,9 @@ from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.observables import asked, contact, leakage
+from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.rows import expect_result, frames_at, measured_part, representative_frames, rows_of
+from roughvisc.plot.rows import frames_at, measured_part, representative_frames, rows_of
 from roughvisc.topography.grid import cell_edges, cell_side
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES, axis_of

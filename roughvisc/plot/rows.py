@@ -8,25 +8,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.observables.frames import need
 from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.units import in_si
-from roughvisc.variables import AXES, OTHER_DIMS, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 
 #: Largest number of times or speeds in one figure.
 MOST = 24
-
-
-def expect_result(dataset: Any, *names: str) -> None:
-    """Refuse a Dataset that is not the result of one case, has no rows, or lacks variables."""
-    if not isinstance(dataset, xr.Dataset):
-        raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
-    axis = axis_of(dataset.variables)
-    if extra := [str(dim) for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]:
-        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
-    need(dataset, axis, *names)
-    if dataset[axis].size == 0:
-        raise InputError(f"the result holds no {axis} at all: nothing to draw")
 
 
 def rows_of(dataset: xr.Dataset) -> xr.DataArray:

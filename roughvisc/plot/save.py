@@ -17,10 +17,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.history import friction, history
 from roughvisc.plot.maps import maps
-from roughvisc.plot.rows import expect_result
 from roughvisc.plot.section import section
 from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures

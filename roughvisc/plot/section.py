@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.observables import contact
 from roughvisc.observables.deformed import deformed
+from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.maps import plane_unit
-from roughvisc.plot.rows import expect_result, frames_at, largest_contact, measured_part, rows_of
+from roughvisc.plot.rows import frames_at, largest_contact, measured_part, rows_of
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.labels import warnings_of
+from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.rows import expect_result
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, write_png
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows

@@ -217,16 +217,12 @@ def _sphere(x: np.ndarray, y: np.ndarray, radius: float, exact: bool) -> np.ndar
     return np.where(r2 <= radius**2, cap, np.nan)
 
 
-def _cone(x: np.ndarray, y: np.ndarray, slope: float) -> np.ndarray:
-    return -slope * np.hypot(x, y)
-
-
-def _flat_punch(x: np.ndarray, y: np.ndarray, radius: float) -> np.ndarray:
-    return np.where(np.hypot(x, y) <= radius, 0.0, np.nan)
-
-
 #: Profiles, defined beyond their grid: (x, y from the centre, parameters) -> height.
-_INDENTERS = {"sphere": _sphere, "cone": _cone, "flat_punch": _flat_punch}
+_INDENTERS: dict[str, Callable[..., np.ndarray]] = {
+    "sphere": _sphere,
+    "cone": lambda x, y, slope: -slope * np.hypot(x, y),
+    "flat_punch": lambda x, y, radius: np.where(np.hypot(x, y) <= radius, 0.0, np.nan),
+}
 
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:

@@ -12,12 +12,11 @@ import xarray as xr
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.labels import expect_declared_units
 from roughvisc.mechanics.sheet import Base
+from roughvisc.observables.frames import expect_result
 from roughvisc.study.audit.checks import LIMITS, Limit
 from roughvisc.study.audit.scene import NotKnown, Scene
 from roughvisc.units import Quantity, number, quantities
-from roughvisc.variables import OTHER_DIMS, axis_of
 
 #: The verdicts, from the best to the worst.
 HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN = VERDICTS = ("holds", "doubtful", "broken", "not known")
@@ -194,14 +193,7 @@ def audit(
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
         given["base"] = base
-    variables = getattr(result, "variables", {})  # a study checks the other arguments without a result
-    axis = axis_of(variables)
-    for name in (axis, "force", "approach", "contact_area", "contact_fraction"):
-        if name not in variables or not result[axis].size:
-            raise InputError(key="audit", found=[*map(str, variables)], expected=f"a result with {name!r}")
-    if extra := [str(dim) for dim in result.dims if dim not in (axis, *OTHER_DIMS)]:
-        raise InputError(key="audit", found=extra[0], expected="the result of one case, as open_result opens its file")
-    expect_declared_units(result)
+    expect_result(result, "force", "approach", "contact_area", "contact_fraction")
     case = None
     if "case" in result.attrs:
         from roughvisc.study.case import Case  # imports this module

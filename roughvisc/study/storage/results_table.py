@@ -13,7 +13,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
-from roughvisc.observables.frames import need
+from roughvisc.observables.frames import expect_result
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
@@ -26,7 +26,6 @@ from roughvisc.variables import (
     ERRORS,
     GRID_ERROR,
     NOT_CONVERGED,
-    OTHER_DIMS,
     VARIABLES,
     axis_of,
     variables_in_table,
@@ -218,9 +217,7 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
     """
     rows = axis_of(dataset)
-    if extra := [str(dim) for dim in dataset.dims if dim not in (rows, *OTHER_DIMS)]:
-        raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
-    need(dataset, rows)
+    expect_result(dataset)
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
     table = dataset[names].reset_coords(drop=True).to_dataframe()
     for name in table:

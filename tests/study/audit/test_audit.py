@@ -369,8 +369,12 @@ def test_audit__refuses_a_wrong_value(ball, given, key):
 
 
 def test_audit__refuses_what_is_no_result_of_one_case(ball):
-    for wrong in ("result.nc", ball.expand_dims("case"), ball.drop_vars("force")):
-        with refused("audit"):
+    for wrong, named in (
+        ("result.nc", "str"),
+        (ball.expand_dims("case"), "'case'"),
+        (ball.drop_vars("force"), "'force'"),
+    ):
+        with pytest.raises(rv.InputError, match=named):
             rv.audit(wrong)
 
 
