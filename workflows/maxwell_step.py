@@ -29,9 +29,17 @@ def main(cells=128, figure="maxwell_step.png"):
     return fig
 
 
+def relaxation(material):
+    """Return equilibrium modulus, relaxing moduli [Pa] and times [s] of a Maxwell or a Zener material."""
+    glassy, retarded = material.glassy, sum(material.compliances)
+    equilibrium = 0.0 if material.fluidity else 1 / (glassy + retarded)
+    time = glassy / material.fluidity if material.fluidity else material.times[0] * glassy / (glassy + retarded)
+    return equilibrium, np.array([1 / glassy - equilibrium]), np.array([time])
+
+
 def pressure_of(contact, r, t):
     """Pressure of a growing contact, ``2/(pi R) int E(t - s) d sqrt(a(s)^2 - r^2)``, as a sum over 1000 steps."""
-    equilibrium, moduli, times = contact.material.relaxation_spectrum()
+    equilibrium, moduli, times = relaxation(contact.material)
     since = t * np.linspace(0, 1, 1001) ** 2
     age = t - (since[1:] + since[:-1]) / 2
     relaxed = equilibrium + np.exp(-np.append(t, age)[:, None] / times) @ moduli  # first: the jump

@@ -14,6 +14,7 @@ import xarray as xr
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from maxwell_step import relaxation
 
 import roughvisc as rv
 
@@ -27,7 +28,7 @@ def error_of(case):
         ds = rv.simulate(case.height(), case.material, case.program, times=3, fields=(), progress=False)
     except rv.InputError:
         return np.nan
-    equilibrium, moduli, times = case.material.relaxation_spectrum()
+    equilibrium, moduli, times = relaxation(case.material)
     exact = equilibrium + np.exp(-ds.time.values[:, None] / times) @ moduli
     error = float(np.max(np.abs(ds.force.values / float(ds.force[0]) - exact / exact[0])))
     return error if np.isfinite(error) else np.inf
