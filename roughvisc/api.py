@@ -44,7 +44,7 @@ def simulate(
     threads: int | None = None,
     progress: bool | Progress = True,
 ) -> xr.Dataset:
-    """Press a rigid profile on a linear viscoelastic body: a half-space, a sheet, or a body with the user's kernel.
+    """Press a rigid profile on a linear viscoelastic body: a half-space, a sheet, layers, or a body of your own.
 
     Parameters
     ----------

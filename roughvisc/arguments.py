@@ -19,7 +19,7 @@ from roughvisc.errors import InputError, short_repr
 
 
 class DataNeeded(Exception):
-    """A function has checked its other arguments and needs the data, which are absent."""
+    """Signal that a function has checked its other arguments and needs data, which are absent."""
 
 
 class NoData:

@@ -320,11 +320,11 @@ class Unit:
     symbol: str
 
     def __call__(self, values: ArrayLike) -> NDArray[np.float64]:
-        """Values [SI] in this unit."""
+        """Return values [SI] in this unit."""
         return np.asarray(values, dtype=float) / self.factor
 
     def label(self, name: str) -> str:
-        """Axis label: the name and, in brackets, the unit."""
+        """Return an axis label: the name and, in brackets, the unit."""
         return f"{name} [{self.symbol}]" if self.symbol else name
 
     def text(self, value: float, digits: int = 3) -> str:

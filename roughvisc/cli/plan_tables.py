@@ -70,7 +70,7 @@ def _distinct(texts: Any) -> str:
 
 
 def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
-    """Return the range of the known values, and of how many cases they are if not of all; empty if none is known."""
+    """Return the range of the known values and, if some are unknown, their number; empty if none is known."""
     known = values.values[np.isfinite(values.values)]
     ends = [f"{float(f'{one:.2g}'):g}" if not unit else readable(float(one), unit) for one in known]
     ends = list(dict.fromkeys(ends[i] for i in (known.argmin(), known.argmax()))) if known.size else []

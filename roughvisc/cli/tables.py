@@ -63,7 +63,7 @@ def result_table(dataset: xr.Dataset) -> Group:
     rows += accuracy_rows([dataset], dataset.attrs.get("tolerance"))
     for name in dict.fromkeys(GRID_ERROR.values()):
         if name in dataset and (dataset[name] != 0).any():
-            rows.append((f"Accuracy: worst {VARIABLES[name].long_name}", number(dataset[name])))
+            rows.append((f"Accuracy: worst {VARIABLES[name].long_name}", largest_text(dataset[name])))
     if "convolutions" in dataset:  # a file of another program may lack its cost
         rows.append(("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"))
     if "wall_time" in dataset:
@@ -71,14 +71,14 @@ def result_table(dataset: xr.Dataset) -> Group:
     return two_columns(rows, dataset.attrs.get("title"))
 
 
-def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
+def sweep_table(outcomes: Sequence[Outcome], total: int, title: str) -> Group:
     """Return a summary of a sweep: numbers of cases, accuracy, cost.
 
     Parameters
     ----------
     outcomes : sequence of Outcome
         One for each distinct case.
-    asked : int
+    total : int
         Number of cases, including identical ones.
     title : str
         Title of the study.
@@ -87,9 +87,9 @@ def sweep_table(outcomes: Sequence[Outcome], asked: int, title: str) -> Group:
     finished = [outcome.entry for outcome in outcomes if outcome.entry]
     reused = sum(outcome.reused and outcome.entry is not None for outcome in outcomes)
     spent = [outcome.seconds for outcome in outcomes if not outcome.reused]
-    alike = f" ({asked - len(outcomes)} identical, computed once)" if asked > len(outcomes) else ""
+    identical = f" ({total - len(outcomes)} identical, computed once)" if total > len(outcomes) else ""
     before = f", {reused} of them before" if reused < len(outcomes) else ", all before: nothing to compute"
-    rows = [("Cases", f"{asked}{alike}"), ("Finished", f"{len(finished)}{before if reused else ''}")]
+    rows = [("Cases", f"{total}{identical}"), ("Finished", f"{len(finished)}{before if reused else ''}")]
     kinds = Counter(outcome.kind for outcome in outcomes if outcome.kind != "done")
     rows += [(kind.capitalize(), str(count)) for kind, count in kinds.items()]
     rows += accuracy_rows([entry.arrays for entry in finished])
@@ -170,12 +170,12 @@ def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[
     for name, label in _ERRORS.items():
         values = [np.ravel(one[name]) for one in found if name in one]
         if values:
-            asked = f", tolerance {tolerance:g}" if tolerance and not rows else ""
-            rows.append((f"Accuracy: {label}", number(np.concatenate(values)) + asked))
+            limit = f", tolerance {tolerance:g}" if tolerance and not rows else ""
+            rows.append((f"Accuracy: {label}", largest_text(np.concatenate(values)) + limit))
     return rows
 
 
-def number(values: Any) -> str:
+def largest_text(values: Any) -> str:
     """Return the largest finite number as text."""
     found = np.asarray(values)
     found = found[np.isfinite(found)]

@@ -84,12 +84,12 @@ def cores() -> int:
     return int(CPU_COUNT)
 
 
-def threads_for(asked: int | None) -> int:
+def threads_for(requested: int | None) -> int:
     """Return the number of threads of a case that this process computes.
 
     Parameters
     ----------
-    asked : int or None
+    requested : int or None
         Requested number. None: the value of ``scipy.fft.set_workers``. If it is not set either: all cores in the main
         thread of a process that ``multiprocessing`` did not start, otherwise one.
 
@@ -98,10 +98,10 @@ def threads_for(asked: int | None) -> int:
     InputError
         If the request is not a positive whole number.
     """
-    if asked is not None:
-        if isinstance(asked, bool) or not isinstance(asked, int) or asked < 1:
-            raise InputError(key="threads", found=asked, expected="a whole number of at least 1, or None")
-        return asked
+    if requested is not None:
+        if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
+            raise InputError(key="threads", found=requested, expected="a whole number of at least 1, or None")
+        return requested
     stated = int(fft.get_workers())
     alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
     return cores() if stated == 1 and alone else stated

@@ -44,7 +44,7 @@ def __dir__() -> list[str]:
 OBSERVABLES: dict[str, Callable[..., xr.Dataset]] = {"leakage": leakage, "conductance": conductance}
 
 
-def asked(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None = None) -> xr.Dataset:
+def study_observables(dataset: xr.Dataset, observe: Mapping[str, Mapping[str, Any]] | None = None) -> xr.Dataset:
     """Compute the observables that the study of a result requests.
 
     Parameters

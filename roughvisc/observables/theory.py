@@ -42,7 +42,7 @@ def persson_fraction(strain: ArrayLike) -> Any:
 
 
 def asperity_fraction(strain: ArrayLike) -> Any:
-    r"""Return this fraction by asperity theory at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`.
+    r"""Return contact area over nominal area by asperity theory at low loads, :math:`\sqrt{2\pi} \, p / (E^* h')`.
 
     The fraction is 1.57 times the fraction by Persson's theory.
     """

@@ -68,16 +68,16 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     InputError
         If the Dataset is not one case's result, or lacks a quantity.
     """
-    asked = [quantities] if isinstance(quantities, str) else quantities
+    names = [quantities] if isinstance(quantities, str) else quantities
     if isinstance(dataset, xr.Dataset) and "case" in dataset.dims:
-        if asked is not None and len(asked) != 1:
-            raise InputError(key="quantities", found=asked, expected="one quantity of several cases")
-        return sweep(dataset, asked[0] if asked else None, along=over or axis_of(dataset.variables))
+        if names is not None and len(names) != 1:
+            raise InputError(key="quantities", found=names, expected="one quantity of several cases")
+        return sweep(dataset, names[0] if names else None, along=over or axis_of(dataset.variables))
     expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
     default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _COLOURS
-    names = [name for name in default if name in dataset] if asked is None else list(asked)
+    names = [name for name in default if name in dataset] if names is None else list(names)
     expect_result(dataset, over, *names)
     if not names:
         raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")

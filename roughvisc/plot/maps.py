@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
-from roughvisc.observables import asked, contact, leakage
+from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.rows import frames_at, measured_part, representative_frames, rows_of
@@ -255,7 +255,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
 
 def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
-    stated = dataset if "leak_rate" in dataset else asked(dataset)
+    stated = dataset if "leak_rate" in dataset else study_observables(dataset)
     names = ("along", "sides", "viscosity", "pressure_drop")
     options = {name: stated["leak_rate"].attrs[name] for name in names} if "leak_rate" in stated else {}
     gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)

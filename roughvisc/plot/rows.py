@@ -25,11 +25,11 @@ def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
     """Return the numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
     rows = rows_of(dataset)
     name = str(rows.name)
-    asked = np.atleast_1d(np.asarray(in_si(places, VARIABLES[name].units, f"{name}s"), dtype=float)).ravel()
-    if not 0 < asked.size <= MOST:
-        raise InputError(key=f"{name}s", found=f"{asked.size} of them", expected=f"1 to {MOST}")
+    wanted = np.atleast_1d(np.asarray(in_si(places, VARIABLES[name].units, f"{name}s"), dtype=float)).ravel()
+    if not 0 < wanted.size <= MOST:
+        raise InputError(key=f"{name}s", found=f"{wanted.size} {name}s", expected=f"1 to {MOST}")
     frames = []
-    for place in asked:
+    for place in wanted:
         from_end = place < 0 and place == int(place) and -place <= rows.size
         if not np.isfinite(place) or (place < 0 and not from_end):
             expected = f"a {name} [{VARIABLES[name].units}], or -1 to -{rows.size} to count from the end"

@@ -102,7 +102,7 @@ def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = ""
 
 
 def write_png(figure: Figure, file: Any, dpi: float) -> None:
-    """Write a picture; ``Figure.savefig`` draws twice, which takes half as long again."""
+    """Write a picture in one drawing; ``Figure.savefig`` draws twice and takes half as long again."""
     figure.set_dpi(dpi)
     FigureCanvasAgg(figure).print_png(file)
 

@@ -149,18 +149,18 @@ def sweep(
         raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
     dotted = {name: str(one.attrs.get("long_name", name)) for name, one in results.coords.items()}
     results, keys = swept_keys(results)
-    asked = [along] if isinstance(along, str) else list(along or (["speed"] if axis == "speed" else []))
-    if asked and (asked[0] in curves or asked[0] in VARIABLES):
-        over = asked[0]
+    wanted = [along] if isinstance(along, str) else list(along or (["speed"] if axis == "speed" else []))
+    if wanted and (wanted[0] in curves or wanted[0] in VARIABLES):
+        over = wanted[0]
         if over not in curves:
             raise InputError(key="along", found=over, expected=f"one of {', '.join(sorted(curves))} in every case")
         table = results[[quantity, over]].load().to_dataframe().reset_index()
         return _draw(_known(table, quantity), results[quantity], keys, over=results[over])
     known = {name: key for key in keys for name in (key.column, dotted[key.column])}
-    for name in asked:
+    for name in wanted:
         if name not in known:
             raise InputError(key="along", found=name, expected=f"one of {', '.join([*known, axis])}")
-    chosen = [known[name] for name in asked] or keys[:1]
+    chosen = [known[name] for name in wanted] or keys[:1]
     if not chosen:
         raise InputError("nothing varies between the cases: nothing to draw against")
     keys = chosen + [key for key in keys if key not in chosen]

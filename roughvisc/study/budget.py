@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
-from roughvisc.study.neighbours import at_rows, compared, solve, sources_of, with_rows
+from roughvisc.study.neighbours import at_rows, compared, solve, sources_of, with_kept
 from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.folder import result_path
 from roughvisc.study.storage.netcdf import open_result
@@ -131,7 +131,7 @@ def budgets(
     given = in_si(at, VARIABLES[axis].units, "at")
     places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
     try:
-        base = with_rows(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
+        base = with_kept(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
     except InputError as error:
         if error.key != "keep.times":
             raise

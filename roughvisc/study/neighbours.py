@@ -108,7 +108,7 @@ def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
     return vary(case, changes)
 
 
-def with_rows(case: Case, fields: Iterable[str], times: Any = None) -> Case:
+def with_kept(case: Case, fields: Iterable[str], times: Any = None) -> Case:
     """Return a case that keeps more fields, and other times if given, without an estimate of the grid error.
 
     The changes do not count as varied values, so the title of the result does not name them.

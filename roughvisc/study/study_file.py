@@ -348,10 +348,10 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Sett
     return settings, late
 
 
-def check_observed(asked: Mapping[str, Any], settings: Settings) -> None:
+def check_observed(observe: Mapping[str, Any], settings: Settings) -> None:
     """Check the arguments of each observable of the table ``[observe]``, and that its fields are kept."""
-    refuse_unknown("observe", asked, OBSERVABLES)
-    for name, stated in asked.items():
+    refuse_unknown("observe", observe, OBSERVABLES)
+    for name, stated in observe.items():
         where, arguments = f"observe.{name}", a_table(f"observe.{name}", stated)
         check(OBSERVABLES[name], where, arguments)
         if not set(_NEEDS[name]) & set(settings.fields):

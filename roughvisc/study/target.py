@@ -151,7 +151,7 @@ def choose(
     require_writable(folder, "since what is wanted takes several solves")
     solved = partial(neighbours.solve, folder=folder / FOLDER, **computing)
     height, smallest = case.height(), min(targets.values())
-    base = neighbours.with_rows(case, [field for one in observed for field in one.fields])
+    base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
         tolerance = min(tolerance, case.settings.tolerance)

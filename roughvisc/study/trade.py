@@ -19,7 +19,7 @@ from roughvisc.experiment.rows import kept_times
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged
-from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_rows
+from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_kept
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
 from roughvisc.study.storage.netcdf import NETCDF
 from roughvisc.topography.grid import spacing
@@ -115,10 +115,10 @@ def trade(
         case = read_study(case)
     if not budget > 0:
         raise InputError(key="budget", found=budget, expected="a positive number of seconds")
-    asked = [quantity] if isinstance(quantity, str) else list(quantity)
-    observed = [quantity_of(case, name) for name in asked if name != "pressure"]
+    requested = [quantity] if isinstance(quantity, str) else list(quantity)
+    observed = [quantity_of(case, name) for name in requested if name != "pressure"]
     known = {"pressure", *quantities_of(case)}
-    names = [name for name in dict.fromkeys([*asked, *_USUAL]) if name in known]
+    names = [name for name in dict.fromkeys([*requested, *_USUAL]) if name in known]
     height = case.height()
     data, shape = is_data(case), (height.sizes["x"], height.sizes["y"])
     rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
@@ -140,7 +140,7 @@ def trade(
         sides = np.array(spacing(height)) * height.shape / np.array(shapes)
         times = kept_times(experiment.program, times, *map(tuple, sides))
     fields = ["pressure", *(field for one in observed for field in one.fields)]
-    base = with_rows(case, fields, times)
+    base = with_kept(case, fields, times)
     folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
     solved = partial(solve, folder=folder, watch=partial(Display, progress, summary=False))
 

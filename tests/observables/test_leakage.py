@@ -10,7 +10,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.observables import asked, leakage
+from roughvisc.observables import leakage, study_observables
 from roughvisc.variables import VARIABLES
 
 CELL = (2e-6, 3e-6)
@@ -108,8 +108,8 @@ def test_leakage__refuses_results_that_do_not_say():
 
 def test_asked__is_what_the_study_has():
     ds = result(plane(), wall())
-    assert not asked(ds).data_vars
+    assert not study_observables(ds).data_vars
     ds.attrs["case"] = '{"observe": {"leakage": {"viscosity": 0.002, "along": "y"}}}'
-    xr.testing.assert_identical(asked(ds), leakage(ds, viscosity=2e-3, along="y"))
+    xr.testing.assert_identical(study_observables(ds), leakage(ds, viscosity=2e-3, along="y"))
     with pytest.raises(InputError, match="observe: unknown observable 'noise': expected some of leakage"):
-        rv.observables.asked(ds, {"noise": {}})
+        rv.observables.study_observables(ds, {"noise": {}})

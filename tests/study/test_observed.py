@@ -151,17 +151,17 @@ def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     one = read_cases(study(fields + LEAKAGE))
     two = read_cases(study(fields + "[observe.conductance]\nresistivity = [1.0, 1.0]\n"))
     rv.run(one[0], tmp_path / "out", progress=False)
-    plain, refused = observed.asked, []
+    plain, refused = observed.study_observables, []
 
     def meanwhile(*given):
-        monkeypatch.setattr(observed, "asked", plain)
+        monkeypatch.setattr(observed, "study_observables", plain)
         try:
             rv.observe(two, tmp_path / "out")
         except BlockingIOError as error:
             refused.append(error)
         return plain(*given)
 
-    monkeypatch.setattr(observed, "asked", meanwhile)
+    monkeypatch.setattr(observed, "study_observables", meanwhile)
     (path,) = rv.observe(one, tmp_path / "out")
     assert refused
     rv.observe(two, tmp_path / "out")
