@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from xarray.backends import BackendArray
@@ -311,36 +312,28 @@ class _Frames(BackendArray):
 
 
 def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
-    """Return cases over (case, realisation); unchanged if some cases are not realisations, or one occurs twice."""
+    """Return cases over (case, realisation); unchanged if some cases are not realisations, or one occurs twice.
+
+    Numbers of a realisation without a result are NaN, and its texts empty.
+    """
     drawn = parameters.get(REALISATION)
     if drawn is None or drawn.dtype.kind != "i":
         return flat
-    (rows, row), (columns, column) = (np.unique(one, return_inverse=True) for one in (flat["case"].values, drawn))
-    place = np.full((len(rows), len(columns)), -1)
-    place[row, column] = np.arange(len(drawn))
-    if np.count_nonzero(place >= 0) < len(drawn):
+    pairs = pd.MultiIndex.from_arrays([flat["case"].values, drawn], names=["case", REALISATION])
+    if pairs.has_duplicates:
         return flat
-    flat = flat.drop_vars("case")
-    spread = {name: _spread(one, place) for name, one in flat.variables.items() if "case" in one.dims}
-    for key in parameters:
-        name = identifier(key)
-        if key not in (REALISATION, *DRAWN):
-            spread[name] = flat.variables[name][place.max(axis=1)]
-        elif key in DRAWN and (spread[name].values == spread[name].values[:1]).all():  # each case has the same seeds
-            spread[name] = spread[name][0]
-    attributes = {
+    settings = [identifier(key) for key in parameters if key not in (REALISATION, *DRAWN)]
+    of_cases = flat[settings].isel(case=np.unique(flat["case"].values, return_index=True)[1]).reset_coords()
+    texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind == "U"}
+    runs = flat.drop_vars(["case", REALISATION, *settings]).rename_dims(case="run")
+    runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
+    found = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
+    found = found.assign_coords({name: of_cases.variables[name] for name in settings})
+    for name in (identifier(key) for key in DRAWN if key in parameters):
+        if (found[name].values == found[name].values[:1]).all():  # each case has the same seeds
+            found = found.assign_coords({name: found.variables[name][0]})
+    found[REALISATION].attrs = {
         "long_name": "realisation",
         "comment": "number of another patch of the same roughness; 0: the measured surface itself",
     }
-    spread |= {REALISATION: xr.Variable(REALISATION, columns, attributes), "case": xr.Variable("case", rows)}
-    coords = {name: one for name, one in spread.items() if name in flat.coords or name in (REALISATION, "case")}
-    known = flat.drop_vars(spread, errors="ignore")
-    return known.assign({name: one for name, one in spread.items() if name not in coords}).assign_coords(coords)
-
-
-def _spread(variable: xr.Variable, place: NDArray[np.intp]) -> xr.Variable:
-    """Return a variable over (case, realisation, ...) from a variable over (case, ...); absent cases are missing."""
-    data = np.stack([variable[np.maximum(row, 0)].data for row in place])  # a Dask array for Dask arrays
-    spread = xr.Variable(("case", REALISATION, *variable.dims[1:]), data, variable.attrs)
-    known = xr.Variable(("case", REALISATION), place >= 0)
-    return spread if known.all() else spread.where(known, "" if variable.dtype.kind == "U" else np.nan)
+    return found
