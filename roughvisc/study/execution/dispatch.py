@@ -180,6 +180,8 @@ def on_worker(text: str, key: str, *, folder: str, name: str, threads: int | Non
     worker = get_worker()
     task, stop_file, last = worker.get_current_task(), Path(folder, f".{name}.stop"), 0.0
     worker.loop.add_callback(_take_signals, worker, own)
+    if own and not log.handlers:
+        log.addHandler(logging.NullHandler())  # the process of the sweep displays the warnings of the result
 
     def report(now: float, end: float) -> None:
         nonlocal last

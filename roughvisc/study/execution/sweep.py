@@ -7,7 +7,7 @@ import importlib.util
 import json
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext, suppress
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
+from roughvisc.labels import warnings_of
 from roughvisc.study.case import Case, program, read_cases
 from roughvisc.study.execution.cluster import (
     default_client,
@@ -180,6 +181,7 @@ def run_cases(
             record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         try:
             _compute(todo, record, client, min(workers or 0, len(todo)), threads)
+            record.warn_of_cases(todo)
         except (KeyboardInterrupt, SystemExit, OSError) as error:
             reason = str(error) or type(error).__name__
             log.warning("interrupted after %d of %d cases: %s", len(outcomes), len(distinct), reason)
@@ -269,6 +271,21 @@ class Record:
         """Display and log an urgent message."""
         log.warning("%s", text)
         self.display.warn(text)
+
+    def warn_of_cases(self, keys: Iterable[str]) -> None:
+        """Display one warning of each subject in the results of some cases, with the number of cases that have one."""
+        found: dict[str, dict[str, str]] = {}
+        for key in keys:
+            entry = self._outcomes[key].entry
+            for subject, text in warnings_of(entry.attributes).items() if entry else ():
+                if subject not in ("accuracy", "speeds"):  # the messages of the cases state unsolved speeds
+                    found.setdefault(subject, {})[key] = text
+        for texts in found.values():
+            key, text = next(iter(texts.items()))
+            if len(texts) > 1:
+                text += f" ({len(texts)} of {len(self._cases)} cases have a warning of this kind.)"
+            log.warning("%s: %s", key, text)
+            self.display.say(text, key)
 
     def save(self) -> None:
         """Write the index and the table of the folder, and take over results that another run has finished."""

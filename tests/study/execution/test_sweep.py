@@ -90,6 +90,18 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     assert "4, all before: nothing to compute" in done.stdout
 
 
+@pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.thorough), 0])
+def test_run__shows_each_warning_once_and_names_its_case(study, tmp_path, workers):
+    """A steep indenter of three loads: the loaded surface of two of them is steeper than the method allows."""
+    steep = BALL.replace('"10 mm"', '"0.1 mm"').replace('"1 mm"', '"0.4 mm"')
+    study(steep + '[sweep]\n"program.0.load" = ["10 uN", "20 mN", "30 mN"]\n')
+    command = [*RUN, "ball.toml", "--workers", str(workers)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "slope" in line)
+    assert line.startswith("case 1 (program.0.load = 20 mN): ")
+    assert "2 of 3 cases" in line
+
+
 # ----------------------------------------------------------------------------------------------------------------
 # what fails, what is interrupted, what is done again
 
