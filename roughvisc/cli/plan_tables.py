@@ -32,6 +32,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
     total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
     threads = f"{counted(attrs['threads'], 'thread')} on large grids"
     each = " per case" if total > 1 else ""
+    steps = "Speeds" if all(str(model).endswith("steady sliding") for model in costs["model"].values) else "Steps"
     whole = [
         ("Cases", f"{total}, {attrs['processes']} in parallel, each with {threads}" if total > 1 else f"1, {threads}"),
         ("Model", _distinct(costs["model"].values)),
@@ -42,7 +43,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ),
         ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa")),
         ("Contact", _span(100 * costs["contact_fraction"], "", " % of the area")),
-        (f"Steps{each}", _span(costs["steps"], "")),
+        (f"{steps}{each}", _span(costs["steps"], "")),
         (f"Convolutions{each}", _span(costs["convolutions"], "")),
         (f"Wall time{each}", _span(costs["wall_time"], "s")),
         ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}" if total > 1 else ""),

@@ -143,7 +143,7 @@ def starter_study(
     surface = surface_table(file, Path(study).parent, options, found.steps, _REMARKS)
     if math.prod(found.shape) > _LARGE:
         coarse = [max(16, n // 2) for n in found.shape]
-        surface += f"# resample = {coarse}{' ' * 4}# fewer cells: quick to try things with, not for the answer\n"
+        surface += f"# resample = {coarse}{' ' * 4}# fewer cells: for a quick trial, not for final results\n"
     return _TEXT.format(
         title=Path(file).stem.replace("_", " ").replace("\\", "").replace('"', ""),
         name=Path(file).name,
@@ -199,7 +199,7 @@ def pressure_for(fraction: float, modulus: float, rms_slope: float) -> float:
 
 _TEXT = """\
 # First study of {name}: pressed on a rubber, and held while the contact creeps.
-#   roughvisc plan {study}     contact, time and memory that it expects
+#   roughvisc plan {study}     expected contact, time and memory
 #   roughvisc run {study}      results and figures, in the folder results/ next to it
 # Quantities are numbers in SI, or texts with a unit. An invalid value is reported with its key.
 title = "{title} on a rubber"

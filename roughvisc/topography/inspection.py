@@ -205,9 +205,7 @@ def inspect(h: xr.DataArray) -> Inspection:
         seen = f"no noise floor down to two cells; noise is below {_length(noise['rms'])} rms"
     if noise is not None and noise["floor"]:
         part = f"{_percent(noise['noisy_slopes'])} of the mean square slope"
-        seen = (
-            f"{_length(noise['rms'])} rms: wavelengths below {_length(noise['wavelength'])} are noise and make {part}"
-        )
+        seen = f"{_length(noise['rms'])} rms: wavelengths below {_length(noise['wavelength'])} are noise, {part}"
     step, advice = ({"filter": cutoff}, "filter out these wavelengths") if cutoff else ({}, "")
     find("Noise", seen, advice, step, **(noise or {}))
 
