@@ -7,6 +7,7 @@ to files.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -131,6 +132,18 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
         for one in (result, steps)
     )
     return steps if rows <= known else None
+
+
+def cost_of(result: xr.Dataset) -> tuple[float, float]:
+    """Return the wall time [s] and the convolutions of a result; NaN if it does not state them.
+
+    A result over time has them in the history of its steps.
+    """
+    steps = steps_of(result)
+    known = result if steps is None else steps
+    if "wall_time" not in known:
+        return math.nan, math.nan
+    return float(known["wall_time"].max()), float(known["convolutions"].sum())
 
 
 def require_steps(result: xr.Dataset) -> xr.Dataset:

@@ -169,7 +169,8 @@ def solve(
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
-    return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
+    kept = [name for name in dataset.data_vars if experiment.axis != "time" or not VARIABLES[name].of_steps]
+    return label(dataset[sorted(kept, key=list(VARIABLES).index)])  # main results first
 
 
 def solve_on_grid(
@@ -245,5 +246,6 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     dataset = rows.finish(dataset)
     if axis != "time":
         return dataset
+    steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
     every = steps.filter(["time", *STEPPED]).rename_axis(STEP).to_xarray().set_coords("time").drop_vars(STEP)
     return with_steps(dataset, label(every.assign_attrs(title=TITLE)))

@@ -50,6 +50,8 @@ class Variable:
         Meanings of the values 0, 1, ... of a flag.
     in_table : {"", "last", "largest"}
         Column in the table of a sweep: the value in the last row, or the largest one.
+    of_steps : bool
+        Whether a result over time has it at its accepted steps alone, in the group ``steps``.
     """
 
     dims: tuple[str, ...]
@@ -59,6 +61,7 @@ class Variable:
     dtype: str = "float64"
     meanings: tuple[str, ...] = ()
     in_table: Literal["", "last", "largest"] = ""
+    of_steps: bool = False
 
     @property
     def label(self) -> str:
@@ -120,7 +123,12 @@ VARIABLES: dict[str, Variable] = {
         in_table="last",
     ),
     "nominal_pressure": Variable(
-        _SERIES, "Pa", "nominal pressure", "force over the area of the grid, absent cells included", in_table="last"
+        _STEPS,
+        "Pa",
+        "nominal pressure",
+        "force over the area of the grid, absent cells included",
+        in_table="last",
+        of_steps=True,
     ),
     "work": Variable(
         _STEPS,
@@ -132,7 +140,9 @@ VARIABLES: dict[str, Variable] = {
     "contact_area": Variable(
         _STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge", in_table="last"
     ),
-    "contact_area_counted": Variable(_STEPS, "m^2", "contact area, counted", "cells that carry pressure"),
+    "contact_area_counted": Variable(
+        _STEPS, "m^2", "contact area, counted", "cells that carry pressure", of_steps=True
+    ),
     "contact_fraction": Variable(
         _STEPS,
         "1",
@@ -162,6 +172,7 @@ VARIABLES: dict[str, Variable] = {
         "force across the motion",
         "to the left of the motion; keeps the profile on its path",
         in_table="last",
+        of_steps=True,
     ),
     "friction_force_error": Variable(
         _SERIES, "N", "stated error of the friction force", "of steps of one cell, without the rest of the grid error"
@@ -175,8 +186,8 @@ VARIABLES: dict[str, Variable] = {
         "of the kept rows so far; in steady sliding of pressure (L1) and friction, by the iteration; without the grid",
         in_table="largest",
     ),
-    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", in_table="largest"),
-    "residual": Variable(_SERIES, "1", "error of the contact solver", "part of stated_error", in_table="largest"),
+    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", of_steps=True),
+    "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error", of_steps=True),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
     "work_error": Variable(_SERIES, "J", "stated error of the work", "adds up over the steps; without the grid"),
     "contact_area_error": Variable(
@@ -198,9 +209,11 @@ VARIABLES: dict[str, Variable] = {
         _SERIES, "1", "grid error of the area", f"{_COARSER}; also from the edge of the contact", in_table="largest"
     ),
     "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", _COARSER, in_table="largest"),
-    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
-    "convolutions": Variable(_SERIES, "1", "convolutions", "since the previous kept time", dtype="int32"),
-    "wall_time": Variable(_SERIES, "s", "wall time", "since the start of the run"),
+    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS, of_steps=True),
+    "convolutions": Variable(
+        _STEPS, "1", "convolutions", "of a speed; of time steps since the last listed one", dtype="int32", of_steps=True
+    ),
+    "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run", of_steps=True),
     # observables: contact and gap
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),

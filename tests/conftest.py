@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -22,6 +23,7 @@ from roughvisc.cli import main
 from roughvisc.mechanics.grid import Grid
 from roughvisc.plot import save as save_module
 from roughvisc.study.execution import run as run_module
+from roughvisc.variables import axis_of
 
 
 @pytest.fixture
@@ -81,7 +83,7 @@ def stubborn(monkeypatch):
 
     def one_missed(*args, **settings):
         ds = press(*args, **settings)
-        ds["status"][1] = 1
-        return ds
+        status = np.arange(ds.sizes[axis_of(ds.variables)]) == 1
+        return ds.assign(status=(axis_of(ds.variables), status.astype("int8")))
 
     monkeypatch.setattr(run_module, "solve", one_missed)

@@ -63,12 +63,25 @@ LONG = BALL.replace("[keep]", 'time_step = "100 us"\n[keep]')
 
 
 def numbers(folder):
-    """Every variable but the wall time of every result in a folder."""
+    """Every result in a folder, see :func:`with_steps`."""
     found = {}
     for path in sorted(folder.glob("*.nc")):
         with open_result(path) as ds:
-            found[path.name] = ds.drop_vars("wall_time").load()
+            found[path.name] = with_steps(ds)
     return found
+
+
+def at_rows(ds):
+    """Histories of a result over time at its rows, with what only the steps have."""
+    return rv.observables.history(ds).sel(time=ds.time)
+
+
+def with_steps(ds):
+    """Every variable of a result, and over time of its steps, without the wall time."""
+    if "time" not in ds.dims:
+        return ds.load().drop_vars("wall_time")
+    steps = ds.roughvisc.steps.drop_vars("wall_time").reset_coords()
+    return ds.load().assign({f"step_{name}": variable for name, variable in steps.items()})
 
 
 def assert_same(one, other):

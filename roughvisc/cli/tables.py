@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.errors import printable
+from roughvisc.labels import cost_of
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
@@ -24,13 +25,6 @@ if TYPE_CHECKING:
 
     from roughvisc.study.execution.run import Outcome
     from roughvisc.topography.inspection import Inspection
-
-#: Stated error and its parts; the largest values are printed.
-_ERRORS = {
-    "stated_error": "worst stated error",
-    "time_error": "worst error of time steps",
-    "residual": "contact solver (estimate)",
-}
 
 
 def readable(value: float, unit: str) -> str:
@@ -64,10 +58,10 @@ def result_table(dataset: xr.Dataset) -> Group:
     for name in dict.fromkeys(GRID_ERROR.values()):
         if name in dataset and (dataset[name] != 0).any():
             rows.append((f"Accuracy: worst {VARIABLES[name].long_name}", largest_text(dataset[name])))
-    if "convolutions" in dataset:  # a file of another program may lack its cost
-        rows.append(("Cost: convolutions", f"{int(dataset['convolutions'].sum())}"))
-    if "wall_time" in dataset:
-        rows.append(("Cost: wall time", readable(float(dataset["wall_time"].max()), "s")))
+    seconds, convolutions = cost_of(dataset)
+    if math.isfinite(seconds):  # a file of another program may lack its cost
+        rows.append(("Cost: convolutions", f"{convolutions:.0f}"))
+        rows.append(("Cost: wall time", readable(seconds, "s")))
     return two_columns(rows, dataset.attrs.get("title"))
 
 
@@ -165,14 +159,10 @@ def findings_table(found: Inspection) -> Group:
 
 
 def accuracy_rows(found: Sequence[Any], tolerance: float | None = None) -> list[tuple[str, str]]:
-    """Return the largest stated error of some results, and its parts; a sweep has no `tolerance`."""
-    rows = []
-    for name, label in _ERRORS.items():
-        values = [np.ravel(one[name]) for one in found if name in one]
-        if values:
-            limit = f", tolerance {tolerance:g}" if tolerance and not rows else ""
-            rows.append((f"Accuracy: {label}", largest_text(np.concatenate(values)) + limit))
-    return rows
+    """Return the largest stated error of some results; a sweep has no `tolerance`."""
+    values = [np.ravel(one["stated_error"]) for one in found if "stated_error" in one]
+    limit = f", tolerance {tolerance:g}" if tolerance else ""
+    return [("Accuracy: worst stated error", largest_text(np.concatenate(values)) + limit)] if values else []
 
 
 def largest_text(values: Any) -> str:

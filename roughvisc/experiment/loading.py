@@ -259,8 +259,10 @@ class LoadingRows(Rows):
         row: dict[str, Any] = {
             "force": point.force,
             "approach": point.approach,
+            "nominal_pressure": point.force / self.area,
             "work": step.state.work,
             "time_error": stated["time_error"],
+            "residual": stated["residual"],
             "convolutions": step.state.convolutions,
             "status": STATUS_MEANINGS.index(status),
             "contact_area": area,
@@ -300,13 +302,8 @@ class LoadingRows(Rows):
         return row, {name: kept_fields[name] for name in names}
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result with the cost of each row, the nominal pressure and the attributes.
-
-        The attributes state the memory model, numbers for an audit, and warnings.
-        """
+        """Return the result with its attributes: the memory model, numbers for an audit, and warnings."""
         scene, choice, body = self.scene, self.choice, self.problem.body
-        dataset["convolutions"] = "time", np.diff(dataset["convolutions"].values, prepend=0)
-        dataset["nominal_pressure"] = dataset["force"] / self.area
         loaded = self._profile.height[self.domain.cells]
         warnings = loading_warnings(
             scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border

@@ -13,7 +13,7 @@ from scipy.special import erf
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
-from roughvisc.labels import label
+from roughvisc.labels import label, steps_of
 from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
@@ -110,9 +110,11 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
 
 def nominal_area_of(dataset: xr.Dataset) -> float:
     """Return the nominal area of a result: force over nominal pressure if known, else the area of the surface. [m2]"""
-    if "nominal_pressure" in dataset and float(dataset["nominal_pressure"].max()) > 0:
-        at = dataset["nominal_pressure"].argmax(...)
-        return float(dataset["force"].isel(at) / dataset["nominal_pressure"].isel(at))
+    steps = steps_of(dataset)
+    known = dataset if steps is None else steps
+    if "nominal_pressure" in known and float(known["nominal_pressure"].max()) > 0:
+        at = known["nominal_pressure"].argmax(...)
+        return float(known["force"].isel(at) / known["nominal_pressure"].isel(at))
     return nominal_area(dataset)
 
 

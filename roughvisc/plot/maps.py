@@ -22,7 +22,7 @@ from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.rows import frames_at, measured_part, representative_frames, rows_of
-from roughvisc.topography.grid import cell_edges, cell_side
+from roughvisc.topography.grid import cell_edges, cell_side, nominal_area
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES, axis_of
 
@@ -174,8 +174,8 @@ def frame_title(dataset: xr.Dataset, frame: int) -> str:
     if axis_of(dataset.variables) == "speed":
         arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
         return f"{arrow} {text}\nµ = {float(at['friction_coefficient']):.2g}"
-    if "nominal_pressure" in dataset and dataset.attrs.get("boundary") in ("periodic", "mirror"):
-        pressure = float(at["nominal_pressure"])
+    if "force" in dataset and dataset.attrs.get("boundary") in ("periodic", "mirror"):
+        pressure = float(at["force"]) / nominal_area(dataset)
         return f"{text}\nnominal {unit_for([pressure], 'Pa').text(pressure)}"
     return text
 

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.labels import warnings_of
+from roughvisc.labels import cost_of, warnings_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, write_png
@@ -220,8 +220,9 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     if "status" in dataset:
         bad = int((dataset["status"].values == NOT_CONVERGED).sum())
         cells["Status"] = f"{bad} of {dataset['status'].size} {axis.rows} not converged" if bad else "converged"
-    if "wall_time" in dataset:
-        cells["Wall time"] = _text(dataset["wall_time"].max().rename("wall_time"))
+    seconds = cost_of(dataset)[0]
+    if np.isfinite(seconds):
+        cells["Wall time"] = unit_for([seconds], "s").text(seconds)
     return cells
 
 

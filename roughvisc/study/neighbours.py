@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from roughvisc.arguments import one_of
 from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.labels import cost_of
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
@@ -332,7 +333,7 @@ def compared(
     if loaded:
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
     results[case.key] = own
-    seconds = {key: float(result["wall_time"].values[-1]) for key, result in results.items()}
+    seconds = {key: cost_of(result)[0] for key, result in results.items()}
     rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
     return {one.name: _budget(case, sources, one, rows, seconds) for one in observed}
 

@@ -16,6 +16,7 @@ from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.rows import kept_times
+from roughvisc.labels import cost_of
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder, unconverged
@@ -162,7 +163,7 @@ def trade(
         if complaint := unconverged(result):
             notes[setting] = complaint
             continue
-        seconds = float(result["wall_time"].values[-1])
+        seconds = cost_of(result)[0]
         spent, rate = spent + seconds, seconds / work[setting]
         derived = {name: (experiment.axis, QUANTITIES[name].of(result, base)) for name in names if name != "pressure"}
         results[setting] = result.assign(derived)
@@ -203,8 +204,7 @@ def _compared(
         if setting[1] < finest:
             note, error = note or "finer than the reference, for which there is no time", np.full_like(error, math.nan)
         found = None if note else results[setting]
-        spent = math.nan if found is None else float(found["wall_time"][-1])
-        transforms = math.nan if found is None else float(found["convolutions"].sum())
+        spent, transforms = (math.nan, math.nan) if found is None else cost_of(found)
         rows.append((_label(*setting, shape), *setting, *shape, spent, transforms, note, error))
     columns = dict(zip(("setting", *COLUMNS), zip(*rows, strict=True), strict=False))
     errors = ("setting", "quantity"), np.array(columns.pop("error"))

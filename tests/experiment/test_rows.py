@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support import at_rows
 
 import roughvisc as rv
 
@@ -32,9 +33,10 @@ def result(material, program, **settings):
 def test_every_row__states_an_error(material, program, times):
     ds = result(material, program, times=times)
     assert ds.sizes["time"] > 1
-    for name in ("stated_error", "time_error", "residual", "approach_error", "contact_area_error"):
-        assert np.isfinite(ds[name]).all(), name
-        assert (ds[name] >= 0).all(), name
+    found = ds.assign(at_rows(ds)[["time_error", "residual"]].data_vars)
+    for name in ("stated_error", "time_error", "residual", "approach_error", "contact_area_error", "work_error"):
+        assert np.isfinite(found[name]).all(), name
+        assert (found[name] >= 0).all(), name
 
 
 def test_ancillary_variables__exist():

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from support import SMALL
+from support import SMALL, with_steps
 
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
@@ -39,7 +39,7 @@ def case(tmp_path):
 @pytest.fixture
 def wanted(case, tmp_path):
     with open_result(run_case(case, tmp_path / "wanted")) as ds:
-        return ds.drop_vars("wall_time").load()
+        return with_steps(ds)
 
 
 @pytest.mark.timeout(7200)  # the large one: some 700 runs
@@ -51,7 +51,7 @@ def test_at_a_file_operation(case, wanted, tmp_path, most):
         assert end == "killed" if way == "kill" else "TRACEBACK" not in end
         folder = tmp_path / way / at
         with open_result(run_case(case, folder)) as found:
-            xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
+            xr.testing.assert_equal(with_steps(found), wanted)
         clean_folder(folder)
         assert [path.name for path in folder.iterdir()] == [f"{case.key}.nc"], (way, at, end)
 
@@ -81,5 +81,5 @@ def test_damaged_checkpoints(case, wanted, tmp_path, count):
         for name in rng.choice(names, size=rng.integers(1, 4), replace=False):
             (there / name).write_bytes(damaged_bytes(rng, (unfinished / name).read_bytes()))
         with open_result(run_case(case, there.parent)) as found:
-            xr.testing.assert_equal(found.drop_vars("wall_time"), wanted)
+            xr.testing.assert_equal(with_steps(found), wanted)
         assert [path.name for path in there.parent.iterdir()] == [f"{case.key}.nc"]

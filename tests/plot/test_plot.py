@@ -190,7 +190,7 @@ def test_save_figures__writes_what_the_result_allows(tmp_path):
     few = plot.save_figures(ds[["force", "approach"]].isel(time=[3]), tmp_path, "few", suffix=".pdf")
     assert [path.name for path in few] == ["few-history.pdf"]
     with pytest.raises(InputError, match="allows no figure"):
-        plot.save_figures(ds[["residual"]], tmp_path, "none")
+        plot.save_figures(ds[["approach_error"]], tmp_path, "none")
 
 
 @pytest.mark.parametrize("make", [made.rough_creep, made.one_frame])

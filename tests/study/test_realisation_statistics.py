@@ -122,9 +122,9 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
             np.testing.assert_array_equal(one["pressure"], file["pressure"])
             np.testing.assert_array_equal(one["height"], file["height"])
             assert json.loads(file.attrs["case"])["surface"]["seed"] == 5 + realisation
-            assert one["program_0_pressure"] == file["nominal_pressure"][-1]
+            assert one["program_0_pressure"] == file.roughvisc.steps.nominal_pressure[-1]
     for part in (again, again.isel(case=1), again.isel(realisation=[2, 0]), again.sel(realisation=2).isel(case=0)):
-        assert part["wall_time"].dims == part["contact_area"].dims
+        assert part["work_error"].dims == part["contact_area"].dims
         assert part["case_key"].equals(part["case_key"])
     table = to_table(out)
     assert table["realisation"].tolist() == [1, 2, 3] * 2
@@ -149,6 +149,6 @@ def test_open_results__what_is_not_computed_is_missing(study, tmp_path):
     np.testing.assert_array_equal((found["case_key"] == "").values, [[0, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(np.isnan(found["contact_area"][..., -1]), [[0, 0, 0], [0, 1, 0]])
     assert found["pressure"][1, 1].isnull().all()
-    assert found["status"][1, 1].isnull().all()
+    assert found["work_error"][1, 1].isnull().all()
     assert over_realisations(found["contact_area"])["count"][:, -1].values.tolist() == [3, 2]
-    assert found.isel(case=1)["wall_time"].dims == ("realisation", "time")
+    assert found.isel(case=1)["force"].dims == ("realisation", "time")

@@ -74,6 +74,6 @@ def creep(tamaas, cells, steps, repeats):
         if error(ds.pressure[0].values, duration) <= their_error:
             break
     ours, ds = seconds(lambda: rv.simulate(ball, material, program, tolerance=tolerance, **settings), repeats)
-    reached, counted = error(ds.pressure[0].values, duration), int(ds.convolutions.sum())
+    reached, counted = error(ds.pressure[0].values, duration), int(ds.roughvisc.steps.convolutions.sum())
     name = f"free-space creep, {cells}^2, Tamaas with {steps} steps"
     yield row("Tamaas", name, theirs, ours, their_error, reached, counted)

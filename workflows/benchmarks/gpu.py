@@ -80,7 +80,7 @@ def measure(sizes=(512, 1024, 2048, 4096, 8192), limit=240.0, scenes=tuple(SCENE
                 return
             took, found = seconds(partial(SCENES[scene], height, gpu))
             record = {"scene": scene, "cells": cells, "gpu_s": took}
-            record["pairs"] = took / (float(found.convolutions.sum()) * pair)
+            record["pairs"] = took / (float(found.roughvisc.steps.convolutions.sum()) * pair)
             if cells <= COMPARED:
                 with fft.set_workers(1):
                     record["cpu_s"], expected = seconds(partial(SCENES[scene], height, rv.Numerics()))

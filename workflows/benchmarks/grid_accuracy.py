@@ -91,7 +91,7 @@ def _row(ds, **true):
     """Return stated over true errors by quantity; errors below the tolerance of the runs count as zero."""
     stated = ds
     side = float(ds.x[1] - ds.x[0])
-    return {"cells": float(ds.contact_area_counted[0]) / side**2} | {
+    return {"cells": float(ds.roughvisc.steps.contact_area_counted[-1]) / side**2} | {
         name: (float(stated[own if (own := f"grid_error_{name}") in stated else "grid_error"][0]), abs(float(error)))
         for name, error in true.items()
     }

@@ -49,7 +49,7 @@ def one(side, material, boundary):
     case = vary(case, BOUNDARIES[boundary])
     with tempfile.TemporaryDirectory() as folder:
         with open_result(run_case(case, folder)) as ds:
-            contact, rows = float(ds.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
+            contact, rows = float(ds.roughvisc.steps.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.settings, case.program.on_area(nominal_area(case.height()))
     memory = memory_of(case.body, program, settings).memory

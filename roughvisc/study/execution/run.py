@@ -266,6 +266,8 @@ def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
 def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
     """Return a message about times or speeds that did not converge; empty if all did."""
     rows = axis_of(histories)
+    if "status" not in histories:  # over time, where a step that does not converge ends the run
+        return ""
     status = np.asarray(histories["status"])
     bad = np.flatnonzero(status == NOT_CONVERGED)
     if not bad.size:

@@ -119,7 +119,7 @@ def read_entry(path: Path) -> Entry:
             fields = {name: one.dtype.str for name, one in stored.items() if one.dimensions[-2:] == ("x", "y")}
     except ERRORS as error:
         raise unreadable(path, error) from error
-    absent = [name for name in ("status", "x", "y", "case") if name not in {**arrays, **attributes}]
+    absent = [name for name in ("force", "x", "y", "case") if name not in {**arrays, **attributes}]
     if found or absent:
         raise InputError(f"{path}: {found or f'holds no {absent[0]}'}: expected a result of roughvisc run")
     plain = {name: one for name, one in attributes.items() if isinstance(one, str | int | float)}

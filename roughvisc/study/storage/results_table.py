@@ -55,7 +55,7 @@ def to_table(out: str | Path) -> pd.DataFrame:
         The index is the number of the case, from 0 in the order of the study, as in :func:`open_results`; the
         realisations of one case share its number. Columns: title; varied parameters under their dotted keys, in the
         units of the study; force, approach, contact area, contact fraction, mean gap, friction if the profile slides,
-        and observables, each followed by its error if there is one; the largest stated error and its parts; status,
+        and observables, each followed by its error if there is one; the largest stated error; status,
         message and file. The values are for the last kept time, or for a friction curve at the speed of largest
         friction, which is also a column. Units are in brackets.
 
@@ -105,7 +105,7 @@ def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase])
         entry, message = index.get(one.key), ""
         found = {}
         if entry is not None:
-            bad = int((entry.arrays["status"] == NOT_CONVERGED).sum())
+            bad = int((np.asarray(entry.arrays.get("status", ())) == NOT_CONVERGED).sum())
             status = f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"
             found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
             for name in variables_in_table("largest"):

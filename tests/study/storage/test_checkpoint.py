@@ -12,7 +12,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 import xarray as xr
-from support import refused
+from support import refused, with_steps
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import transform_library
@@ -140,7 +140,7 @@ def case_of(text, folder):
 def values(path):
     """All variables but wall_time, to the last bit."""
     with open_result(path) as ds:
-        loaded = ds.drop_vars("wall_time").load().variables
+        loaded = with_steps(ds).variables
         return {str(name): (v.dims, v.dtype, v.values.tobytes()) for name, v in loaded.items()}
 
 

@@ -31,7 +31,7 @@ def test_write_result__gives_the_same_numbers_back(tmp_path):
         assert not read["pressure"]._in_memory
         xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
         assert read.attrs["title"] == written.attrs["title"]
-        assert read["wall_time"].dtype.kind == "f", "seconds stay numbers"
+        assert read["time"].dtype.kind == "f", "seconds stay numbers"
 
 
 def test_write_result__refuses_what_is_not_declared(tmp_path):

@@ -54,7 +54,7 @@ def own_times(tmp_path_factory):
 def test_own_times__each_case_is_its_result_and_missing_after_it(own_times):
     folder, ds = own_times
     assert ds.pressure.dims == ("case", "row", "x", "y")
-    assert ds.time.dims == ds.force.dims == ds.status.dims == ("case", "row")
+    assert ds.time.dims == ds.force.dims == ds.work_error.dims == ("case", "row")
     assert ds.case.values.tolist() == list(range(8))
     assert len(set(ds.rows.values)) > 1
     assert ds.pressure.chunks is not None
@@ -63,7 +63,7 @@ def test_own_times__each_case_is_its_result_and_missing_after_it(own_times):
             count = alone.sizes["time"]
             assert one.rows.item() == count
             assert one.time[0, count - 1] == one.program_0_over + one.program_1_hold
-            for name in ("time", "force", "contact_area", "status", "pressure"):
+            for name in ("time", "force", "contact_area", "work_error", "pressure"):
                 np.testing.assert_array_equal(one[name][0, :count], alone[name], str(number))
                 assert one[name][0, count:].isnull().all(), name
             np.testing.assert_array_equal(ds.height, alone.height)
