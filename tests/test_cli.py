@@ -125,6 +125,12 @@ def test_refused_option__is_named_as_it_was_typed(invoke, tmp_path, command, opt
     assert err.startswith(f"roughvisc: {option}: found "), err
 
 
+@pytest.mark.thorough
+def test_budget__names_the_options_of_open_sources(invoke, coarse_pictures):
+    status, out, _ = invoke("budget", write_study(), "--at", "0.2 s", "--modulus-error", "10%")
+    assert (status, "--time-scale-error" in out, "modulus_error" in out) == (0, True, False)
+
+
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
     status, out, err = invoke("run", write_study(), "--no-plots")
     assert status == 1

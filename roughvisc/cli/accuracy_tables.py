@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import click
 import numpy as np
 import xarray as xr
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from roughvisc.cli.group import by_options
 from roughvisc.cli.tables import titled
 from roughvisc.study.audit.audit import BROKEN, DOUBTFUL, NOT_KNOWN, Audit
 from roughvisc.study.trade import cheapest, pareto_front
@@ -32,9 +34,8 @@ def audit_table(audit: Audit) -> Group:
     table.add_column("number", justify="right", no_wrap=True)
     table.add_column("reason", overflow="fold")
     for one in audit:
-        verdict, reason = Text(one.verdict, style=_STYLES.get(one.verdict, "")), one.sentence
-        if reason.startswith("Give "):  # the missing properties are options of the command
-            reason = reason.replace("Give ", "Give --").replace(" and ", " and --").replace("_", "-")
+        verdict = Text(one.verdict, style=_STYLES.get(one.verdict, ""))
+        reason = by_options(one.sentence, click.get_current_context().command)
         table.add_row(one.name, verdict, one.shown, Text(reason))
     return titled(audit.title, table)
 
@@ -59,7 +60,8 @@ def budget_table(dataset: xr.Dataset) -> Group:
     for source in dataset["source"].values:
         one = dataset.sel(source=source)
         cost = float(one["cost"])
-        table.add_row(str(source), _error(one), Text(str(one["method"].values)), f"{cost:.2g} s" if cost else "")
+        method = by_options(str(one["method"].values), click.get_current_context().command)
+        table.add_row(str(source), _error(one), Text(method), f"{cost:.2g} s" if cost else "")
     for place in dataset[axis].values:
         at = dataset.sel({axis: place})
         low, value, high = (unit.text(float(at[end]), 3) for end in ("lower", "value", "upper"))

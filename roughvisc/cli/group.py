@@ -72,7 +72,7 @@ def by_options(message: str, command: click.Command | None) -> str:
     flags = [flag for one in command.params for flag in one.opts if flag.startswith("--")] if command else []
     for flag in flags:
         name = flag.removeprefix("--").replace("-", "_")
-        message = re.sub(rf"(?<![\w.]){name}(?=: found )|(?<![\w.]){name} =(?= )", flag, message)
+        message = re.sub(rf"(?<![\w.]){name}(?=: found | is not given)|(?<![\w.]){name} =(?= )", flag, message)
     return message
 
 

@@ -201,7 +201,7 @@ def sources_of(
         near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
         found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
     if sample and cutoff is None:
-        found[OCTAVE] = Source("state cutoff, the shortest wavelength that the real surface has", is_open=True)
+        found[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
         end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
         found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
@@ -225,7 +225,7 @@ def sources_of(
             continue
         found[name] = Source(f"{what} are exact")
         if error is None:
-            found[name] = Source(f"state {key}, the relative error of the {what}", is_open=True)
+            found[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
         elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
             one = Neighbour(vary(compared, changes), weight, compared)

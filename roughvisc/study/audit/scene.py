@@ -58,7 +58,7 @@ class Scene:
     def need(self, *names: str) -> list[float]:
         """Return stated properties by name. [SI]"""
         if missing := [name for name in names if name not in self.given]:
-            raise NotKnown(f"Give {' and '.join(missing)}.")
+            raise NotKnown("; ".join(f"{name} is not given" for name in missing) + ".")
         return [self.given[name] for name in names]
 
     @property
