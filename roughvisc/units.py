@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, wraps
+from inspect import signature
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -182,7 +183,8 @@ def in_si(value: Any, unit: str, name: str) -> Any:
 def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     """Decorate a function or a dataclass whose named arguments are numbers in SI or text with a unit.
 
-    Text is converted before the call; other values are passed on unchanged.
+    Text is converted before the call. An argument whose unit is followed by ``> 0`` or ``>= 0`` is one such number, or
+    None if that is its default. Other values are passed on unchanged.
 
     Parameters
     ----------
@@ -191,34 +193,42 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
 
     Examples
     --------
-    >>> @quantities(radius="m")
+    >>> @quantities(radius="m > 0")
     ... def area(radius):
     ...     return 3.0 * radius**2
     >>> area("10 mm") == area(0.01)
     True
     >>> area("2 s")  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
-    InputError: radius: found '2 s', in second: expected a number [m], or text with a unit
+    InputError: radius: found '2 s', in second: expected a number [m], or text with a unit, above 0
     """
+    declared = {name: stated.partition(" >")[::2] for name, stated in units.items()}
 
     def decorate(function: Any) -> Any:
         if isinstance(function, type):
             function.__init__ = decorate(function.__init__)  # type: ignore[misc]
             return function
-        code = function.__code__
-        names = code.co_varnames[: code.co_argcount]
+        parameters = signature(function).parameters
+        names = list(parameters)
+
+        def converted(name: str, value: Any) -> Any:
+            unit, bound = declared[name]
+            if not bound or (value is None and parameters[name].default is None):
+                return in_si(value, unit, name)
+            return number(value, unit, name, **{"least" if bound == "= 0" else "above": 0.0})
 
         @wraps(function)
         def called(*args: Any, **given: Any) -> Any:
-            for name in units.keys() & given.keys():
-                given[name] = in_si(given[name], units[name], name)
             known = list(args)
             for place, name in enumerate(names[: len(args)]):
-                if name in units:
-                    known[place] = in_si(args[place], units[name], name)
+                if name in declared:
+                    known[place] = converted(name, args[place])
+            for name in declared:
+                if name in given:
+                    given[name] = converted(name, given[name])
             return function(*known, **given)
 
-        called.quantities = units  # type: ignore[attr-defined]
+        called.quantities = {name: unit for name, (unit, _) in declared.items()}  # type: ignore[attr-defined]
         return called
 
     return decorate

@@ -66,7 +66,7 @@ class RoundContact:
         return float(self.pressure(0.0))
 
 
-@quantities(sphere_radius="m", contact_modulus="Pa", force="N")
+@quantities(sphere_radius="m > 0", contact_modulus="Pa > 0", force="N > 0")
 def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
     r"""Return the elastic contact of a paraboloid ``r^2 / (2 R)`` (Hertz).
 
@@ -106,24 +106,22 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     >>> contact.radius, contact.approach
     (1.0, 1.0)
     """
-    curvature = number(sphere_radius, "m", "sphere_radius", above=0)
-    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
-    a = float(np.cbrt(0.75 * curvature * force / modulus))
+    a = float(np.cbrt(0.75 * sphere_radius * force / contact_modulus))
 
     def pressure(r: ArrayLike) -> Array:
         s = _from_axis(r)
-        return np.asarray(2 * modulus / (np.pi * curvature) * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
+        return np.asarray(2 * contact_modulus / (np.pi * sphere_radius) * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
 
     def displacement(r: ArrayLike) -> Array:
         s = _from_axis(r)
         out = np.maximum(s, a)
         outside = (2 * a**2 - out**2) * np.arcsin(a / out) + a * np.sqrt((out - a) * (out + a))
-        return np.asarray(np.where(s <= a, (2 * a**2 - s**2) / 2, outside / np.pi) / curvature)
+        return np.asarray(np.where(s <= a, (2 * a**2 - s**2) / 2, outside / np.pi) / sphere_radius)
 
-    return RoundContact(a, a**2 / curvature, force, pressure, displacement)
+    return RoundContact(a, a**2 / sphere_radius, force, pressure, displacement)
 
 
-@quantities(contact_modulus="Pa", force="N")
+@quantities(slope="1 > 0", contact_modulus="Pa > 0", force="N > 0")
 def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundContact:
     r"""Return the elastic contact of a cone ``m r`` (Sneddon).
 
@@ -155,16 +153,14 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 5.2.
     """
-    slope = number(slope, "1", "slope", above=0)
-    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
-    a = float(np.sqrt(2 * force / (np.pi * modulus * slope)))
+    a = float(np.sqrt(2 * force / (np.pi * contact_modulus * slope)))
 
     def pressure(r: ArrayLike) -> Array:
         s = _from_axis(r)
         with np.errstate(divide="ignore", invalid="ignore"):
             # arcosh(1 + e) without the rounding of 1 + e, which would be the whole value near the edge
             excess = np.where(s < a, (a - s) / s, 0.0)
-            return np.asarray(modulus * slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
+            return np.asarray(contact_modulus * slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
 
     def displacement(r: ArrayLike) -> Array:
         s = _from_axis(r)
@@ -175,7 +171,7 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     return RoundContact(a, np.pi / 2 * slope * a, force, pressure, displacement)
 
 
-@quantities(radius="m", contact_modulus="Pa", force="N")
+@quantities(radius="m > 0", contact_modulus="Pa > 0", force="N > 0")
 def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> RoundContact:
     r"""Return the elastic contact of a rigid cylinder with a flat end (Boussinesq).
 
@@ -206,9 +202,7 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
     """
-    a = number(radius, "m", "radius", above=0)
-    modulus, force = number(contact_modulus, "Pa", "contact_modulus", above=0), number(force, "N", "force", above=0)
-    approach = force / (2 * modulus * a)
+    a, approach = radius, force / (2 * contact_modulus * radius)
 
     def pressure(r: ArrayLike) -> Array:
         s = _from_axis(r)
@@ -244,7 +238,7 @@ class WavyContact:
     pressure: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
 
 
-@quantities(amplitude="m", wavelength="m", contact_modulus="Pa", mean_pressure="Pa")
+@quantities(amplitude="m > 0", wavelength="m > 0", contact_modulus="Pa > 0", mean_pressure="Pa > 0")
 def westergaard(
     amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, mean_pressure: Quantity
 ) -> WavyContact:
@@ -288,21 +282,19 @@ def westergaard(
     >>> round(contact.contact_fraction, 12)
     0.5
     """
-    mean = number(mean_pressure, "Pa", "mean_pressure", above=0)
-    full = full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
-    period = number(wavelength, "m", "wavelength", above=0)
+    mean, full = mean_pressure, full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
 
     def pressure(x: ArrayLike) -> Array:
-        phase = np.pi * np.asarray(x, dtype=float) / period
+        phase = np.pi * np.asarray(x, dtype=float) / wavelength
         if mean >= full:
             return mean + full * np.cos(2 * phase)
         return np.asarray(2 * full * np.abs(np.cos(phase)) * np.sqrt(np.maximum(mean / full - np.sin(phase) ** 2, 0.0)))
 
     fraction = 2 / np.pi * float(np.arcsin(np.sqrt(min(mean / full, 1.0))))
-    return WavyContact(fraction * period / 2, fraction, full, pressure)
+    return WavyContact(fraction * wavelength / 2, fraction, full, pressure)
 
 
-@quantities(amplitude="m", wavelength="m", contact_modulus="Pa")
+@quantities(amplitude="m > 0", wavelength="m > 0", contact_modulus="Pa > 0")
 def full_contact_pressure(
     amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, waves: int = 2
 ) -> float:
@@ -328,8 +320,7 @@ def full_contact_pressure(
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 13.2.
     """
     one_of("waves", waves, (1, 2))
-    height, period = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
-    return float(np.sqrt(waves) * np.pi * number(contact_modulus, "Pa", "contact_modulus", above=0) * height / period)
+    return float(np.sqrt(waves) * np.pi * contact_modulus * amplitude / wavelength)
 
 
 def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
@@ -405,7 +396,7 @@ class GrowingContact:
         return self.radius(t) ** 2 / self.sphere_radius
 
 
-@quantities(sphere_radius="m", load="N")
+@quantities(sphere_radius="m > 0", load="N")
 def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Program) -> GrowingContact:
     r"""Return the contact of a sphere with a viscoelastic half-space under a load that never decreases (Lee and Radok).
 
@@ -444,7 +435,6 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
     >>> float(press.radius(0.0)), float(press.radius(7.0))
     (1.0, 2.0)
     """
-    radius = number(sphere_radius, "m", "sphere_radius", above=0)
     if not isinstance(load, Program):
         load = Program().load(number(load, "N", "load", above=0), over=0)
     value = 0.0
@@ -453,4 +443,4 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
         if segment.control != "load" or segment.amplitude or segment.slide or end < value:
             raise InputError(key="load", found=load, expected="a load that never falls, without cycles and slides")
         value = end
-    return GrowingContact(radius, material, load)
+    return GrowingContact(sphere_radius, material, load)

@@ -13,10 +13,10 @@ from roughvisc.mechanics.transport.flow import flow as flow_through
 from roughvisc.mechanics.transport.flow import fluxes
 from roughvisc.observables.frames import frame_by_frame, need
 from roughvisc.topography.grid import spacing
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, quantities
 
 
-@quantities(viscosity="Pa s", pressure_drop="Pa")
+@quantities(viscosity="Pa s > 0", pressure_drop="Pa > 0")
 def leakage(
     dataset: xr.Dataset,
     *,
@@ -74,8 +74,6 @@ def leakage(
     --------
     >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
     """
-    viscosity = number(viscosity, "Pa s", "viscosity", above=0)
-    pressure_drop = number(pressure_drop, "Pa", "pressure_drop", above=0)
     boundary = dataset.attrs.get("boundary", "free")
     if along not in ("x", "y"):
         raise InputError(key="along", found=along, expected="'x' or 'y'")

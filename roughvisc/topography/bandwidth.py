@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, quantities
 
 #: Half-width of a filter [points] up to which a sum is as fast as FFTs, whose library takes half a second to import.
 _SUMMED = 64
@@ -71,7 +71,7 @@ def off_plane(h: xr.DataArray) -> xr.DataArray:
         return like(h, less_polynomial(h.values, 0))
 
 
-@quantities(cutoff="m")
+@quantities(cutoff="m > 0")
 def gaussian_filter(
     h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "short"] = "long", periodic: bool = False
 ) -> xr.DataArray:
@@ -108,7 +108,6 @@ def gaussian_filter(
     ----------
     .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
     """
-    cutoff = number(cutoff, "m", "cutoff", above=0)
     one_of("keep", keep, ("long", "short"))
     h = checked(h, "gaussian_filter")
     sides = spacing(h)

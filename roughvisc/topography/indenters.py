@@ -17,10 +17,10 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import counts, labelled, noted, pair, spacing, with_coordinates
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, quantities
 
 
-@quantities(radius="m", size="m")
+@quantities(radius="m > 0", size="m")
 def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
     r"""Return a spherical indenter, centred, with its apex at height zero.
 
@@ -47,10 +47,10 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
     InputError
         If a parameter is not positive and finite.
     """
-    return _indenter("sphere", {"radius": number(radius, "m", "radius", above=0), "exact": bool(exact)}, size, shape)
+    return _indenter("sphere", {"radius": radius, "exact": bool(exact)}, size, shape)
 
 
-@quantities(size="m")
+@quantities(slope="1 > 0", size="m")
 def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     """Return a conical indenter of height ``-slope * r``, centred, with its apex at height zero.
 
@@ -73,10 +73,10 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     InputError
         If a parameter is not positive and finite.
     """
-    return _indenter("cone", {"slope": number(slope, "1", "slope", above=0)}, size, shape)
+    return _indenter("cone", {"slope": slope}, size, shape)
 
 
-@quantities(radius="m", size="m")
+@quantities(radius="m > 0", size="m")
 def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     """Return a flat-ended cylindrical punch, centred: height zero inside the radius, absent (NaN) outside.
 
@@ -99,7 +99,7 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     InputError
         If a parameter is not positive and finite, or no cell centre lies within the radius.
     """
-    return _indenter("flat_punch", {"radius": number(radius, "m", "radius", above=0)}, size, shape)
+    return _indenter("flat_punch", {"radius": radius}, size, shape)
 
 
 def is_indenter(h: xr.DataArray) -> bool:

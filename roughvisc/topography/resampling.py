@@ -24,7 +24,7 @@ from roughvisc.topography.grid import (
     with_coordinates,
 )
 from roughvisc.topography.missing_points import membrane
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, quantities
 
 #: Largest reduction of an overlap by rounding, relative to a cell.
 _ROUNDING = 1e-9
@@ -89,7 +89,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     return noted(grid, line, **stated)
 
 
-@quantities(shortest="m")
+@quantities(shortest="m > 0")
 def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | None = None) -> xr.DataArray:
     """Remove all wavelengths below a limit, on the same cells.
 
@@ -113,7 +113,6 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     InputError
         If points are missing or the length is out of its range.
     """
-    shortest = number(shortest, "m", "shortest", above=0)
     h = checked(h, "without_short_waves")
     sides = spacing(h)
     lengths = [n * d for n, d in zip(h.shape, sides, strict=True)]

@@ -21,7 +21,7 @@ from roughvisc.topography.spectrum import wavevectors
 from roughvisc.units import Quantity, number, quantities
 
 
-@quantities(amplitude="m", wavelength="m", size="m")
+@quantities(amplitude="m > 0", wavelength="m > 0", size="m")
 def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves: Literal[1, 2] = 2) -> xr.DataArray:
     r"""Return regular waves, periodic over the domain, with a crest at the corner ``x = y = 0``.
 
@@ -48,7 +48,6 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     InputError
         If a parameter is not positive and finite, `waves` is neither 1 nor 2, or the waves do not fit the domain.
     """
-    amplitude, wavelength = number(amplitude, "m", "amplitude", above=0), number(wavelength, "m", "wavelength", above=0)
     size, shape = pair("size", size), counts("shape", shape, low=1)
     one_of("waves", waves, (1, 2))
     for side in size[:waves]:
@@ -65,7 +64,7 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     return labelled(heights, cell_of(size, shape), attrs)
 
 
-@quantities(size="m", rms_slope="1", rms_height="m", rolloff="m", shortcut="m")
+@quantities(size="m", rms_slope="1 > 0", rms_height="m > 0", rolloff="m > 0", shortcut="m > 0", anisotropy="1 > 0")
 def self_affine(
     size: Any,
     shape: Any,
@@ -147,17 +146,13 @@ def self_affine(
         raise InputError(
             f"rms_slope is {rms_slope!r} and rms_height is {rms_height!r}: expected exactly one of the two"
         )
-    if rms_height is None:
-        target = number(rms_slope, "1", "rms_slope", above=0)
-    else:
-        target = number(rms_height, "m", "rms_height", above=0)
-    anisotropy = number(anisotropy, "1", "anisotropy", above=0)
+    target = rms_slope if rms_height is None else rms_height
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
     finest = 2 * max(d / s for d, s in zip(cell_of(size, shape), stretch, strict=True))
-    shortcut = finest if shortcut is None else number(shortcut, "m", "shortcut", above=0)
+    shortcut = finest if shortcut is None else shortcut
     if shortcut < finest * (1 - 1e-12):
         raise InputError(f"shortcut is {shortcut!r}: expected at least two cells, {finest:.6g} [m]")
-    if rolloff is not None and number(rolloff, "m", "rolloff", above=0) < shortcut:
+    if rolloff is not None and rolloff < shortcut:
         raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
     try:

@@ -131,7 +131,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: fl
     return Creep(function, (), poisson, longest)
 
 
-@quantities(glassy="1/Pa", coefficient="1/Pa", time_scale="s")
+@quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", time_scale="s > 0")
 def power_law(
     glassy: Quantity, coefficient: Quantity, exponent: float, time_scale: Quantity = 1.0, poisson: float = 0.5
 ) -> Creep:
@@ -165,9 +165,6 @@ def power_law(
     >>> float(gel.contact_compliance(4.0))  # (1 - nu)/2 J
     5e-05
     """
-    number(glassy, "1/Pa", "glassy", least=0)
-    number(coefficient, "1/Pa", "coefficient", above=0)
-    number(time_scale, "s", "time_scale", above=0)
     check_poisson(poisson)
     number(exponent, "1", "exponent", above=0, below=1)
     return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson)

@@ -53,7 +53,7 @@ def elastic(
     return Prony(1 / (young_modulus / tensile_to_shear("tensile", poisson)), poisson=poisson)
 
 
-@quantities(shear_modulus="Pa", viscosity="Pa s")
+@quantities(shear_modulus="Pa > 0", viscosity="Pa s > 0")
 def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Maxwell fluid: a spring in series with a dashpot; ``J = 1/G + t/eta``.
 
@@ -75,11 +75,10 @@ def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) 
     InputError
         If a number is not positive and finite.
     """
-    glassy = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
-    return Prony(glassy, 1 / number(viscosity, "Pa s", "viscosity", above=0), poisson=poisson)
+    return Prony(1 / shear_modulus, 1 / viscosity, poisson=poisson)
 
 
-@quantities(shear_modulus="Pa", viscosity="Pa s")
+@quantities(shear_modulus="Pa > 0", viscosity="Pa s > 0")
 def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Kelvin-Voigt solid: a spring parallel to a dashpot; ``J = (1 - exp(-G t / eta)) / G``.
 
@@ -101,11 +100,10 @@ def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 
     InputError
         If a number is not positive and finite.
     """
-    retarded = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
-    return Prony(0.0, 0.0, (retarded,), (number(viscosity, "Pa s", "viscosity", above=0) / shear_modulus,), poisson)
+    return Prony(0.0, 0.0, (1 / shear_modulus,), (viscosity / shear_modulus,), poisson)
 
 
-@quantities(shear_modulus="Pa", kelvin_modulus="Pa", kelvin_viscosity="Pa s")
+@quantities(shear_modulus="Pa > 0", kelvin_modulus="Pa > 0", kelvin_viscosity="Pa s > 0")
 def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Zener (standard linear) solid: a spring in series with a Kelvin element.
 
@@ -136,10 +134,7 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     >>> zener("4 MPa", "2 MPa", "0.1 MPa s")
     Prony(glassy=2.5e-07, fluidity=0.0, compliances=(5e-07,), times=(0.05,), poisson=0.5)
     """
-    glassy = 1 / number(shear_modulus, "Pa", "shear_modulus", above=0)
-    retarded = 1 / number(kelvin_modulus, "Pa", "kelvin_modulus", above=0)
-    time = number(kelvin_viscosity, "Pa s", "kelvin_viscosity", above=0) / kelvin_modulus
-    return Prony(glassy, 0.0, (retarded,), (time,), poisson)
+    return Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,), poisson)
 
 
 #: Function of each model of a material that a study may name; its arguments are the keys of the table.

@@ -18,7 +18,7 @@ from roughvisc.units import Quantity, number, quantities
 Array = NDArray[np.float64]
 
 
-@quantities(glassy="1/Pa", fluidity="1/(Pa s)", compliances="1/Pa", times="s")
+@quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa", times="s")
 @dataclass(frozen=True)
 class Prony:
     r"""Exponential (Prony) series of the shear creep compliance.
@@ -70,8 +70,6 @@ class Prony:
         if len(self.compliances) != len(self.times):
             expected = f"as many as times, {len(self.times)}"
             raise InputError(key="compliances", found=len(self.compliances), expected=expected)
-        number(self.glassy, "1/Pa", "glassy", least=0)
-        number(self.fluidity, "1/(Pa s)", "fluidity", least=0)
         for i, (compliance, time) in enumerate(zip(self.compliances, self.times, strict=True)):
             number(compliance, "1/Pa", f"compliances[{i}]", least=0)
             number(time, "s", f"times[{i}]", above=0)

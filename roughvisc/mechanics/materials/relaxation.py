@@ -22,7 +22,7 @@ _ONE = 1e-9
 _RATIOS = 1e-3
 
 
-@quantities(equilibrium="Pa", moduli="Pa", times="s", instantaneous="Pa", bulk_modulus="Pa")
+@quantities(equilibrium="Pa", moduli="Pa", times="s", instantaneous="Pa > 0", bulk_modulus="Pa > 0")
 def from_relaxation(
     equilibrium: Quantity | None = None,
     moduli: Sequence[Quantity] = (),
@@ -86,7 +86,6 @@ def from_relaxation(
         number(term, unit, f"{given}[{i}]", least=0)
         number(time, "s", f"times[{i}]", above=0)
     if instantaneous is not None:
-        instantaneous = number(instantaneous, "Pa", "instantaneous", above=0)
         rest = 1 - math.fsum(ratios)
         if rest < -_ONE:
             raise InputError(key="ratios", found=ratios, expected=f"ratios with a sum of at most 1, not {1 - rest:g}")
@@ -102,7 +101,6 @@ def from_relaxation(
         moduli = [modulus / factor for modulus in moduli]
         shear = relaxation_series(equilibrium / factor, moduli, times)
         return shear if poisson is None else dataclasses.replace(shear, poisson=poisson)
-    number(bulk_modulus, "Pa", "bulk_modulus", above=0)
     found = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
         shear = found.scaled(1.0, 1 / 3)  # 1/G = 3/E - 1/(3K)

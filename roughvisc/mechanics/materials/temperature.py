@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.units import Quantity, number, quantities
 
 
-@quantities(temperature="K", reference_temperature="K")
+@quantities(temperature="K > 0", reference_temperature="K > 0", wlf_c1="1 > 0")
 def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, wlf_c2: float | str) -> float:
     r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
 
@@ -50,9 +50,6 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     >>> wlf(298.15, 298.15, 17.44, 51.6)  # at the reference temperature nothing is shifted
     1.0
     """
-    number(temperature, "K", "temperature", above=0)
-    number(reference_temperature, "K", "reference_temperature", above=0)
-    number(wlf_c1, "1", "wlf_c1", above=0)
     c2 = number(wlf_c2, "K", "wlf_c2", above=0, difference=True)
     above = temperature - reference_temperature
     if not c2 + above > 0:
@@ -63,7 +60,7 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     return _power(10.0, -wlf_c1 * above / (c2 + above))
 
 
-@quantities(temperature="K", reference_temperature="K", activation_energy="J/mol")
+@quantities(temperature="K > 0", reference_temperature="K > 0", activation_energy="J/mol > 0")
 def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation_energy: Quantity) -> float:
     r"""Shift factor of a thermally activated process, after Arrhenius.
 
@@ -99,9 +96,6 @@ def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation
     >>> round(arrhenius(283.15, 293.15, 80e3), 3)  # 10 K colder
     3.187
     """
-    number(temperature, "K", "temperature", above=0)
-    number(reference_temperature, "K", "reference_temperature", above=0)
-    number(activation_energy, "J/mol", "activation_energy", above=0)
     return _power(math.e, activation_energy / GAS_CONSTANT * (1 / temperature - 1 / reference_temperature))
 
 
