@@ -21,7 +21,7 @@ from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
-from roughvisc.mechanics.grid import transform_library
+from roughvisc.mechanics.grid import on_threads, threads_of, transform_library
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
 from roughvisc.variables import STEP, STEPPED, VARIABLES
@@ -96,8 +96,12 @@ class Recorder:
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""
         frames = np.empty((len(rows), *shape))
-        for frame, row in zip(frames, rows, strict=True):
-            frame[...] = self._arrays[row][name]
+
+        def copy(part: slice) -> None:
+            for frame, row in zip(frames[part], rows[part], strict=True):
+                frame[...] = self._arrays[row][name]
+
+        on_threads(copy, len(rows), 1, threads_of(shape[0] * shape[1]))
         return frames
 
     def restart(self) -> None:

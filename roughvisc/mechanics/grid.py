@@ -15,7 +15,7 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import pairwise, starmap
 from typing import Any, Literal
 
@@ -266,20 +266,12 @@ class Grid:
         return self._of_all_waves(1 / symbol).astype(np.float32)
 
     def _of_all_waves(self, symbol: Array) -> Array:
-        """Return a symbol for a convolution.
-
-        For whole periodic fields on a device it has the waves of negative wave numbers along x too, and the factor of
-        the inverse transform if this is a power of two and thus exact: two passes less.
-        """
+        """Return a symbol for a convolution: on a device with periodic boundaries, for :meth:`Transforms.convolved`."""
         if self.xp is np or self.boundary != "periodic":
             return symbol
         count, first = self.shape[0], len(symbol)
-        return self.xp.concatenate([symbol, symbol[count - first : 0 : -1]]) / (self.size if self._is_power else 1)
-
-    @property
-    def _is_power(self) -> bool:
-        """Whether the number of cells is a power of two."""
-        return self.size.bit_count() == 1
+        symbol = self.xp.concatenate([symbol, symbol[count - first : 0 : -1]])
+        return symbol if self._transforms.normalise else symbol / self.size
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
         """Return the convolution of a field with a symbol on a number of points."""
@@ -287,7 +279,7 @@ class Grid:
         if self.boundary == "mirror":
             return fft.cosines_back(fft.cosines(field) * symbol)
         if self.boundary == "periodic" and self.xp is not np:
-            return fft.waves_back(fft.waves(field) * symbol, points, norm="forward" if self._is_power else "backward")
+            return fft.convolved(field, symbol)
         if points == self.shape and self.size < BLOCKS_FROM:
             spectrum = fft.waves(field)
             self.multiply(spectrum, symbol)
@@ -405,6 +397,9 @@ if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
 class Transforms:
     """Transforms along both axes, or one, by SciPy, or by CuPy. The way back may overwrite its argument."""
 
+    #: Whether the inverse transform of :meth:`convolved` divides by the number of points.
+    normalise = True
+
     def __init__(self, fft: Any, **settings: Any) -> None:
         self.fft, self.settings = fft, settings
 
@@ -415,11 +410,16 @@ class Transforms:
         """
         return self.fft.rfftn(field, s=None if points is None else (points,), axes=axes, **self.settings)
 
-    def waves_back(
-        self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1), norm: str = "backward"
-    ) -> Array:
-        """Return the field of a Fourier transform; with ``norm="forward"``, times the number of points."""
-        return self.fft.irfftn(spectrum, s=points, axes=axes, norm=norm, overwrite_x=True, **self.settings)
+    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
+        """Return the field of a Fourier transform."""
+        return self.fft.irfftn(spectrum, s=points, axes=axes, overwrite_x=True, **self.settings)
+
+    def convolved(self, field: Array, symbol: Array) -> Array:
+        """Return the field of a Fourier transform times a symbol at all wave numbers along x.
+
+        If the inverse transform does not normalise, the symbol contains the factor.
+        """
+        return self.waves_back(self.waves(field) * symbol, field.shape)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         """Return the Fourier transform along x, or the inverse one, which may overwrite the spectrum."""
@@ -448,12 +448,10 @@ class DuccTransforms(Transforms):
             field = longer
         return self.fft.r2c(field, axes=axes, **self.settings)
 
-    def waves_back(
-        self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1), norm: str = "backward"
-    ) -> Array:
+    def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
         out = _apart((len(spectrum), points[-1]), spectrum.real.dtype) if axes == (1,) else None
-        back = {"forward": False, "inorm": 2 if norm == "backward" else 0, "allow_overwriting_input": True}
-        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back, **self.settings)
+        back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, **self.settings}
+        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         norm = 2 if back else 0
@@ -466,6 +464,38 @@ class DuccTransforms(Transforms):
         return self.fft.dct(spectrum, type=3, axes=(0, 1), inorm=2, out=spectrum, **self.settings)
 
 
+class CupyTransforms(Transforms):
+    """Transforms by CuPy. A convolution calls cuFFT: small transforms take less time than the functions of CuPy."""
+
+    normalise = False
+
+    def convolved(self, field: Array, symbol: Array) -> Array:
+        if 1 in field.shape:  # cuFFT has no plan
+            return super().convolved(field, symbol * field.size)
+        forward, back = _plans(self.fft, field.shape, field.dtype.char)
+        field = field if field.flags.c_contiguous else field.copy()
+        spectrum = forward.get_output_array(field)
+        forward.fft(field, spectrum, _FORWARD)
+        spectrum *= symbol
+        found = back.get_output_array(spectrum)
+        back.fft(spectrum, found, _BACK)  # overwrites the spectrum
+        return found
+
+
+#: Directions of cuFFT.
+_FORWARD, _BACK = -1, 1
+
+
+@lru_cache(maxsize=16)
+def _plans(fft: Any, shape: tuple[int, int], number: str) -> tuple[Any, Any]:
+    """Return the plans of cuFFT for a real field of some precision, and for its transform."""
+    import cupy
+
+    field = cupy.empty(shape, number)
+    spectrum = cupy.empty((shape[0], shape[1] // 2 + 1), np.result_type(number, np.complex64))
+    return fft.get_fft_plan(field, value_type="R2C"), fft.get_fft_plan(spectrum, shape=shape, value_type="C2R")
+
+
 def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
     """Return an array with padded rows: rows a power of two apart make transforms up to three times slower."""
     return np.empty((shape[0], shape[1] + 16), number)[:, : shape[1]]
@@ -474,7 +504,7 @@ def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
 def transforms(threads: int = 1, xp: Any = np) -> Transforms:
     """Return the transforms of arrays of NumPy, or of CuPy."""
     if xp is not np:
-        return Transforms(fft_of(xp))
+        return (CupyTransforms if hasattr(xp, "RawKernel") else Transforms)(fft_of(xp))
     return DuccTransforms(threads) if has_ducc0() else Transforms(scipy.fft, workers=threads)
 
 

@@ -13,11 +13,15 @@ from typing import Any
 import cupy
 import numpy as np
 
-from roughvisc.mechanics.contact.passes import Free, Last
+from roughvisc.mechanics.contact.passes import BLOCK_TOLERANCE, Free, Last
+from roughvisc.mechanics.grid import Grid
 
 Array = Any  # an array of CuPy
 #: Threads of a block, and largest number of blocks.
-THREADS, BLOCKS = 256, 264
+THREADS, BLOCKS = 256, 528
+#: Largest number of iterations for the blocks. Two need hardly more iterations of the contact than eight, and each
+#: takes as long as half an iteration of the contact.
+FEW_BLOCK_ITERATIONS = 3
 #: A kernel: each thread adds up its elements, then each block its threads; the sums of the blocks go to the host.
 SOURCE = """
 extern "C" __global__ void {name}(const long long count, {arguments}, double* parts) {{
@@ -66,7 +70,8 @@ class Kernel:
     ) -> None:
         adding = [f"sums[{k}] += {one};" for k, one in enumerate(sums)]
         adding += [f"maxima[{len(sums) + k}] = fmax(maxima[{len(sums) + k}], {one});" for k, one in enumerate(maxima)]
-        self._added, self._number, self._compiled = len(sums), max(len(adding), 1), dict[str, Any]()
+        self._added, self._number, self._returns = len(sums), max(len(adding), 1), bool(adding)
+        self._compiled: dict[str, Any] = {}
         self._name, self._source = (
             name,
             SOURCE.format(
@@ -88,10 +93,29 @@ class Kernel:
         blocks = max(min(-(-count // THREADS), BLOCKS), 1)
         parts = cupy.empty((self._number, blocks))
         self._compiled[kind]((blocks,), (THREADS,), (count, *arguments, parts))
+        if not self._returns:
+            return []
         found = parts.get()
         return [*found[: self._added].sum(axis=1).tolist(), *found[self._added :].max(axis=1).tolist()]
 
 
+_contact_level = Kernel(
+    "contact_level",
+    "const double* pressure, const double* separation, const long long* cells",
+    "const long long cell = cells[i]; const bool touches = pressure[cell] > 0;",
+    sums=("touches ? separation[cell] : 0.0", "touches ? 1.0 : 0.0"),
+)
+_may_change = Kernel(
+    "may_change",
+    "const double* pressure, const double* separation, const double level, bool* free",
+    "free[i] = separation[i] < level || pressure[i] > 0;",
+)
+_clear = Kernel("clear", "Real* field, const long long* cells", "field[cells[i]] = 0;")
+_spread = Kernel(
+    "spread",
+    "Real* field, const long long* cells, const double* values, const double divisor",
+    "field[cells[i]] = (Real)(values[i] / divisor);",
+)
 _measure = Kernel(
     "measure",
     "const double* pressure, const double* separation, const double* gap, const long long* cells, "
@@ -144,6 +168,63 @@ _limit = Kernel(
     "const double h = held[i], c = change[i];",
     maxima=("h > 0 && trial[i] == 0 ? 1.0 : 0.0", "c < 0 ? -c / h : 0.0"),
 )
+
+
+_block_sums = Kernel(
+    "block_sums",
+    "const double* field, const long long nx, const long long ny, const long long mx, const long long my, "
+    "double* found",
+    "const long long x = i / my, y = i % my; double total = 0; "
+    "for (long long r = (x * nx + mx - 1) / mx; r < ((x + 1) * nx + mx - 1) / mx; ++r) "
+    "for (long long c = (y * ny + my - 1) / my; c < ((y + 1) * ny + my - 1) / my; ++c) total += field[r * ny + c]; "
+    "found[i] = total;",
+)
+_spot_sums = Kernel(
+    "spot_sums",
+    "const double* loads, const double* displaced, const double* free",
+    "const double l = loads[i];",
+    sums=("l * displaced[i]", "l * l / fmax(free[i], 1.0)"),
+)
+_begin = Kernel(
+    "begin",
+    "const double* left, const double* free, const double local, const double own, double* eased, double* loads, "
+    "const double part",
+    "const double n = free[i], e = left[i] / (n > 0 ? n * local + n * n * own : 1.0); eased[i] = e; "
+    "loads[i] = n * e * part;",
+    sums=("left[i] * e",),
+)
+_respond = Kernel(
+    "respond",
+    "const double* displaced, const double* search, const double* free, const double local, double* response",
+    "const double r = free[i] * (displaced[i] + local * search[i]); response[i] = r;",
+    sums=("search[i] * r",),
+)
+_advance = Kernel(
+    "advance",
+    "const double* search, const double* response, const double* free, const double local, const double own, "
+    "const double length, double* found, double* left, double* eased",
+    "const double n = free[i], l = left[i] - length * response[i], e = l / (n > 0 ? n * local + n * n * own : 1.0); "
+    "found[i] += length * search[i]; left[i] = l; eased[i] = e;",
+    sums=("l * e",),
+)
+_turn_search = Kernel(
+    "turn_search",
+    "const double* eased, const double ratio, const double* free, const double part, double* search, double* loads",
+    "const double s = eased[i] + ratio * search[i]; search[i] = s; loads[i] = free[i] * s * part;",
+)
+
+
+def free_cells(
+    pressure: Array, separation: Array, cells: Array, level: float, under_load: bool, present: Array | None
+) -> tuple[Array, float, int]:
+    """Return the cells that carry pressure or penetrate, the approach, and the number of cells in contact."""
+    separations, touching = _contact_level(cells.size, pressure, separation, cells)
+    level = separations / touching if under_load else level
+    free = cupy.empty(pressure.size, bool)
+    _may_change(pressure.size, pressure, separation, level, free)
+    if present is not None:
+        free &= present
+    return cupy.flatnonzero(free), level, int(touching)
 
 
 def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
@@ -217,3 +298,52 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
         return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
     limit = 1 / steepest if steepest > 0 else math.inf
     return (min(minimum, limit), minimum > limit) if minimum > 1 else (minimum, False)
+
+
+class Scatter:
+    """Field of zeros that receives the values of some cells."""
+
+    def __init__(self, zeros: Array) -> None:
+        self.zeros, self.flat, self.cells = zeros, zeros.reshape(-1), cupy.empty(0, int)
+
+    def __call__(self, values: Array, cells: Array, divisor: float | None = None) -> Array:
+        """Return the field with these values, in single precision if they are divided; the next call overwrites it."""
+        _clear(self.cells.size, self.flat, self.cells, real=self.flat.dtype)
+        kind = np.float64 if divisor is None else np.float32
+        self.flat, self.cells = self.zeros.reshape(-1).view(kind)[: self.zeros.size], cells
+        _spread(cells.size, self.flat, cells, values, 1.0 if divisor is None else divisor, real=kind)
+        return self.flat.reshape(self.zeros.shape)
+
+
+def block_sums(grid: Grid, cells: Array, block: Array, on_grid: Scatter) -> Callable[[Array], Array]:
+    """Return a function that sums the values of the free cells over the blocks of the coarse grid."""
+
+    def sums(values: Array) -> Array:
+        found = cupy.empty(grid.coarse.size)
+        _block_sums(found.size, on_grid(values, cells), *grid.shape, *grid.coarse.shape, found)
+        return found
+
+    return sums
+
+
+def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float]:
+    """Return the sums of the loads of blocks times their displacement, and of their squares over the free cells."""
+    along, spread = _spot_sums(loads.size, loads, displaced, free)
+    return along, spread
+
+
+def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
+    """Return the pressure of each block that displaces it by the mean residual: conjugate gradients."""
+    count, own, found = left.size, blocks.self_influence * part, cupy.zeros(left.size)
+    search, eased, loads, response = (cupy.empty(count) for _ in range(4))
+    (squared,) = _begin(count, left, free, local, own, search, loads, part)
+    enough = BLOCK_TOLERANCE**2 * squared
+    for iteration in range(FEW_BLOCK_ITERATIONS):
+        displaced = blocks.displacement(loads.reshape(blocks.shape))
+        (curvature,) = _respond(count, displaced, search, free, local, response)
+        length, before = squared / curvature, squared
+        (squared,) = _advance(count, search, response, free, local, own, length, found, left, eased)
+        if iteration + 1 == FEW_BLOCK_ITERATIONS or not squared > enough:
+            break
+        _turn_search(count, eased, squared / before, free, part, search, loads)
+    return found

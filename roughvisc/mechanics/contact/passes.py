@@ -10,11 +10,15 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from roughvisc.mechanics.grid import namespace
+import numpy as np
+
+from roughvisc.mechanics.grid import Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy
 #: Cells [index], change, response (whole field) and curvature of the last step.
 Last = tuple[Array, Array, Array, float]
+#: Reduction of the residual of the equations of the blocks, and largest number of iterations.
+BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 100
 
 
 class Free(NamedTuple):
@@ -43,6 +47,33 @@ class Free(NamedTuple):
     most: float
     weighted: float
     energy: float
+
+
+def free_cells(
+    pressure: Array, separation: Array, cells: Array, level: float, under_load: bool, present: Array | None
+) -> tuple[Array, float, int]:
+    """Return the cells that carry pressure or penetrate, the approach, and the number of cells in contact.
+
+    Parameters
+    ----------
+    pressure, separation : array, shape (nx ny,)
+        Pressure, and separation at zero approach.
+    cells : array of int
+        Cells that contain the contact.
+    level : float
+        Approach if it is given.
+    under_load : bool
+        Whether the approach follows from the present contact, equation (7) of the paper.
+    present : array of bool, shape (nx ny,), or None
+        Cells with material; None: all.
+    """
+    contact = cells[pressure[cells] > 0]
+    level = float(separation[contact].sum()) / contact.size if under_load else level
+    free = separation < level
+    if present is not None:
+        free &= present
+    free[contact] = True
+    return namespace(free).flatnonzero(free), level, contact.size
 
 
 def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
@@ -133,6 +164,75 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
     steepest = largest(-change[shrinking] / held[shrinking])
     limit = 1 / steepest if steepest > 0 else math.inf
     return min(minimum, limit), minimum > limit
+
+
+class Scatter:
+    """Field of zeros that receives the values of some cells."""
+
+    def __init__(self, zeros: Array) -> None:
+        self.zeros, self.flat = zeros, zeros.reshape(-1)
+        self.cells: Array | slice = slice(0, 0)
+
+    def __call__(self, values: Array, cells: Array, divisor: float | None = None) -> Array:
+        """Return the field with these values, in single precision if they are divided; the next call overwrites it."""
+        if divisor is not None:
+            values = (values / divisor).astype(np.float32)
+        self.flat[self.cells] = 0
+        self.flat = self.zeros.reshape(-1).view(values.dtype)[: self.zeros.size]
+        self.flat[cells] = values
+        self.cells = cells
+        return self.flat.reshape(self.zeros.shape)
+
+
+def block_sums(grid: Grid, cells: Array, block: Array, on_grid: Scatter) -> Callable[[Array], Array]:
+    """Return a function that sums the values of the free cells over the blocks of the coarse grid.
+
+    Parameters
+    ----------
+    grid : Grid
+        Cells.
+    cells, block : array of int, shape (n,)
+        The free cells, and the block of each.
+    on_grid : Scatter
+        Field on the cells.
+    """
+    return lambda values: grid.xp.bincount(block, values, grid.coarse.size)
+
+
+def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float]:
+    """Return the sums of the loads of blocks times their displacement, and of their squares over the free cells."""
+    return inner(loads, displaced), float((loads * loads / namespace(free).maximum(free, 1)).sum())
+
+
+def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
+    """Return the pressure of each block that displaces it by the mean residual: conjugate gradients.
+
+    Parameters
+    ----------
+    blocks : Grid
+        Grid of the blocks.
+    left, free : array, shape (m,)
+        Sum of the residual, and number of free cells; the residual is overwritten.
+    local, part : float
+        Local compliance [m], and area of a cell over the area of a block.
+    """
+    xp = blocks.xp
+    diagonal = xp.where(free > 0, free * local + free * free * blocks.self_influence * part, 1)
+    found, eased = xp.zeros_like(left), left / diagonal
+    search, squared = eased, inner(left, eased)
+    enough = BLOCK_TOLERANCE**2 * squared
+    for _ in range(BLOCK_ITERATIONS):
+        if not squared > enough:
+            break
+        displaced = blocks.displacement((free * search * part).reshape(blocks.shape)).reshape(-1)
+        response = free * (displaced + local * search)
+        length = squared / inner(search, response)
+        found += length * search
+        left -= length * response
+        eased = left / diagonal
+        before, squared = squared, inner(left, eased)
+        search = eased + squared / before * search
+    return found
 
 
 def without_mean(values: Array) -> Array:

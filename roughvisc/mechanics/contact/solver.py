@@ -28,6 +28,7 @@ one pressure, so that loads of 1e-300 are solved like any others.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,8 +166,7 @@ def solve_contact(
         given[~present] = 0
     level = overlap / unit
     is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
-    # The preconditioner may have a second level; on a GPU it takes longer than the iterations that it saves.
-    has_blocks = min(gap.shape) >= BLOCKS_FROM and passes is host
+    has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
         raise ConvergenceError("the approach reaches full contact and does not determine the load")
 
@@ -192,24 +192,19 @@ def solve_contact(
     else:
         separation = separation_under(pressure)
 
-    on_grid = Scatter(xp.zeros(gap.shape))
-    contact = xp.flatnonzero(pressure)
+    on_grid, cells = passes.Scatter(xp.zeros(gap.shape)), xp.flatnonzero(pressure)
+    touching = cells.size  # number of cells in contact
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
     requested_size, requested_duality = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
     length, error, best, stalled, is_single = 1.0, math.inf, math.inf, 0, False
     for iteration in range(max_iterations + 1):
         # The gap is closed under a given approach: the energy decreases if all cells carry less.
-        if is_blind and contact.size == gap.size:
+        if is_blind and touching == gap.size:
             pressure -= pressure.min()
-            contact, previous = xp.flatnonzero(pressure), None
+            previous = None
 
         # Approach of the present contact, equation (7) of the paper, and the cells that may change, (14).
-        level = float(separation[contact].sum()) / contact.size if under_load else level
-        free = separation < level
-        if present is not None:
-            free &= present
-        free[contact] = True
-        cells = xp.flatnonzero(free)
+        cells, level, touching = passes.free_cells(pressure, separation, cells, level, under_load, present)
         found = passes.measure(pressure, separation, given, cells, level, under_load)
         held, residual, size, total, energy = found.held, found.residual, found.size, found.total, found.energy
         lowest, highest = min(found.least, level), max(found.most, -found.least, 0.0)
@@ -231,8 +226,8 @@ def solve_contact(
             error = requested_size * math.sqrt(duality / requested_duality) / max(total, 1e-300)
         is_empty = size > 0 and total == 0  # a step has emptied all cells although the surfaces overlap
         is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding) and not is_empty
-        if is_solved and is_blind and 4 * contact.size > gap.size:
-            error += load_error(grid, separation.reshape(gap.shape), contact, level, present, total)
+        if is_solved and is_blind and 4 * touching > gap.size:
+            error += load_error(grid, separation.reshape(gap.shape), xp.flatnonzero(pressure), level, present, total)
             is_solved = error <= tolerance
         if is_solved and not is_single:
             break
@@ -243,9 +238,9 @@ def solve_contact(
             is_single, previous = False, None
             continue
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
-        waves = LongWaves.of(grid, cells, held, energy) if has_blocks else None
+        waves = LongWaves.of(grid, cells, held, energy, on_grid) if has_blocks else None
         rest = residual if waves is None else residual - waves.means(residual)[waves.block]
-        direction = passes.taken(grid.inverse(on_grid((rest / size).astype(np.float32), cells)), cells, size)
+        direction = passes.taken(grid.inverse(on_grid(rest, cells, size)), cells, size)
         if waves is not None:
             direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
         # Conjugate to the step before, on the cells that are free now.
@@ -280,7 +275,7 @@ def solve_contact(
         # Minimize the energy along the search direction, equation (11): one convolution.
         if is_single:
             most = largest(abs(change))
-            response = grid.displacement(on_grid((change / most).astype(np.float32), cells)).reshape(-1)
+            response = grid.displacement(on_grid(change, cells, most)).reshape(-1)
             response *= most
         elif is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
@@ -296,14 +291,13 @@ def solve_contact(
         if fraction != 1:
             trial = xp.maximum(held + fraction * change, 0)
         pressure[cells] = trial
-        contact = cells[trial > 0]
         previous = (cells, change, response, curvature) if curvature > 0 else None
         separation += response if fraction == 1 else fraction * response
         length *= min(max(minimum, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
     if under_load:
         full = math.inf if grid.definite or present is not None else float(given.mean())
-        level = level_under_load(grid, pressure, separation.reshape(gap.shape), full, contact, level)
+        level = level_under_load(grid, pressure, separation.reshape(gap.shape), full, level)
     separation -= given
     separation *= unit
     pressure *= unit
@@ -330,22 +324,6 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     grid.convolutions += found.convolutions
     rows, columns = (xp.arange(n) * m // n for n, m in sides)
     return found.pressure[xp.ix_(rows, columns)]
-
-
-class Scatter:
-    """Field of zeros that receives the values of some cells, in their precision."""
-
-    def __init__(self, zeros: Array) -> None:
-        self.zeros, self.flat = zeros, zeros.reshape(-1)
-        self.cells: Array | slice = slice(0, 0)
-
-    def __call__(self, values: Array, cells: Array) -> Array:
-        """Return the field with these values; the next call overwrites it."""
-        self.flat[self.cells] = 0
-        self.flat = self.zeros.reshape(-1).view(values.dtype)[: self.zeros.size]
-        self.flat[cells] = values
-        self.cells = cells
-        return self.flat.reshape(self.zeros.shape)
 
 
 def passes_of(xp: Any) -> Any:
@@ -416,9 +394,7 @@ def load_error(
     return inner(opening, pressure) * off / separation.size / total
 
 
-def level_under_load(
-    grid: Grid, pressure: Array, separation: Array, full: float, contact: Array, level: float
-) -> float:
+def level_under_load(grid: Grid, pressure: Array, separation: Array, full: float, level: float) -> float:
     """Return the approach under a load: the separation in the contact, weighted by the pressure.
 
     Near full contact with periodic boundaries the mean gap must be accurate, and it is far smaller than the
@@ -426,6 +402,7 @@ def level_under_load(
     the pressure changes the approach by ``q.Ke``, which vanishes because ``Kq`` is uniform. ``full`` is the approach
     of full contact.
     """
+    contact = grid.xp.flatnonzero(pressure)
     weight = pressure[contact]
     if full - level < NEARLY_FULL * full:
         opening, opens = opening_pressure(grid, separation, contact, level, None)
@@ -448,8 +425,6 @@ BLOCKS_FROM, SPARSE = 768, 0.6
 SPOTS = 45.0
 #: Part of the local compliance that is used. The number of iterations is least between 0.5 and 1.
 LOCAL_SHARE = 0.7
-#: Reduction of the residual of the equations of the blocks, and largest number of iterations.
-BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 100
 
 
 class LongWaves(NamedTuple):
@@ -467,6 +442,8 @@ class LongWaves(NamedTuple):
         Grid of the blocks.
     block : array of int
         Block of each free cell.
+    sums : callable
+        Sums values of the free cells over each block.
     free : array
         Number of free cells of each block.
     part : float
@@ -481,51 +458,35 @@ class LongWaves(NamedTuple):
 
     blocks: Grid
     block: Array
+    sums: Callable[[Array], Array]
     free: Array
     part: float
     local: float
 
     @classmethod
-    def of(cls, grid: Grid, cells: Array, held: Array, energy: float) -> LongWaves | None:
+    def of(cls, grid: Grid, cells: Array, held: Array, energy: float, on_grid: Any) -> LongWaves | None:
         """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
         if cells.size > SPARSE * grid.size:
             return None
-        xp, blocks = grid.xp, grid.coarse
+        xp, blocks, passes = grid.xp, grid.coarse, passes_of(grid.xp)
         block = grid.block_of_cell.take(cells)
-        free = xp.bincount(block, minlength=blocks.size).astype(float)
-        whole = float(free[free > 0.98 * grid.size / blocks.size].sum())
+        sums = passes.block_sums(grid, cells, block, on_grid)
+        free = sums(xp.ones(cells.size))
+        whole = float(xp.where(free > 0.98 * grid.size / blocks.size, free, 0).sum())
         if (1 - whole / max(cells.size, 1)) * min(blocks.shape) < SPOTS:
             return None
-        found = cls(blocks, block, free, grid.cell_area / blocks.cell_area, 0.0)
-        loads = xp.bincount(block, held, blocks.size)
-        smooth, spread = inner(loads, found.displacement(loads)), float((loads * loads / xp.maximum(free, 1)).sum())
-        return found._replace(local=LOCAL_SHARE * (energy - smooth) / spread) if energy > smooth else None
+        part, loads = grid.cell_area / blocks.cell_area, sums(held)
+        displaced = blocks.displacement((loads * part).reshape(blocks.shape)).reshape(-1)
+        smooth, spread = passes.spot_sums(loads, displaced, free)
+        if not energy > smooth:
+            return None
+        return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread)
 
     def means(self, values: Array) -> Array:
         """Return the mean over the free cells of each block; zero if there are none."""
-        xp = self.blocks.xp
-        return xp.bincount(self.block, values, self.free.size) / xp.maximum(self.free, 1)
-
-    def displacement(self, loads: Array) -> Array:
-        """Return the displacement of the blocks under their loads. [m]"""
-        return self.blocks.displacement((loads * self.part).reshape(self.blocks.shape)).reshape(-1)
+        return self.sums(values) / self.blocks.xp.maximum(self.free, 1)
 
     def pressure(self, residual: Array) -> Array:
-        """Return the pressure of each block that displaces it by the mean residual: conjugate gradients."""
-        xp, free, local = self.blocks.xp, self.free, self.local
-        diagonal = xp.where(free > 0, free * local + free * free * self.blocks.self_influence * self.part, 1)
-        left = xp.bincount(self.block, residual, free.size)
-        found, eased = xp.zeros_like(left), left / diagonal
-        search, squared = eased, inner(left, eased)
-        enough = BLOCK_TOLERANCE**2 * squared
-        for _ in range(BLOCK_ITERATIONS):
-            if not squared > enough:
-                break
-            response = free * (self.displacement(free * search) + local * search)
-            length = squared / inner(search, response)
-            found += length * search
-            left -= length * response
-            eased = left / diagonal
-            before, squared = squared, inner(left, eased)
-            search = eased + squared / before * search
-        return found
+        """Return the pressure of each block that displaces it by the mean residual."""
+        solve = passes_of(self.blocks.xp).block_pressure
+        return solve(self.blocks, self.sums(residual), self.free, self.local, self.part)

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roughvisc.mechanics.contact import passes
+from roughvisc.mechanics.grid import Grid
 
 #: One thread of one block, on the processor.
 SHIM = """
@@ -43,6 +44,7 @@ def kernels(tmp_path_factory):
         def __call__(self, blocks, threads, arguments):
             def plain(value):
                 if isinstance(value, np.ndarray):
+                    assert value.flags.c_contiguous
                     return ctypes.c_void_p(value.ctypes.data)
                 return ctypes.c_longlong(value) if isinstance(value, int) else ctypes.c_double(value)
 
@@ -52,7 +54,12 @@ def kernels(tmp_path_factory):
         def get(self):
             return np.asarray(self)
 
-    cupy = SimpleNamespace(RawKernel=RawKernel, empty=lambda shape: np.empty(shape).view(Parts))
+    cupy = SimpleNamespace(
+        RawKernel=RawKernel,
+        empty=lambda shape, kind=float: np.empty(shape, kind).view(Parts),
+        zeros=np.zeros,
+        flatnonzero=np.flatnonzero,
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(sys.modules, "cupy", cupy)
         patch.delitem(sys.modules, "roughvisc.mechanics.contact.kernels", raising=False)
@@ -87,8 +94,12 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
     pressure = np.maximum(random.normal(size=size), 0)
     separation, gap = random.normal(size=size), random.random(size)
     response = random.normal(size=size).astype(np.float32 if single else np.float64)
-    cells = np.flatnonzero((pressure > 0) | (separation < 0.2))
-    level, under_load = float(random.normal()), under_load and cells.size > 0
+    cells = np.flatnonzero(pressure >= 0)
+    level, under_load = float(random.normal()), under_load and bool(pressure.any())
+    present = pressure >= 0 if single else None
+    both = [one.free_cells(pressure, separation, cells, level, under_load, present) for one in (kernels, passes)]
+    same(*both)
+    cells, level, _ = both[1]
     both = [one.measure(pressure, separation, gap, cells, level, under_load) for one in (kernels, passes)]
     same(*both)
     if not cells.size:
@@ -113,3 +124,23 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
     same(*([one.inner_at(change, response, cells)] for one in (kernels, passes)))
     for minimum in (0.2, 0.8, 1.5, 20.0):
         same(*(one.admissible_fraction(held, trial, change, minimum) for one in (kernels, passes)))
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 10**6), shape=st.tuples(st.integers(8, 50), st.integers(8, 50)))
+def test_kernels__solve_for_the_blocks_as_numpy_does(kernels, seed, shape):
+    random, grid = np.random.default_rng(seed), Grid(shape, (1.0, 1.3), "periodic")
+    cells = np.sort(random.choice(grid.size, grid.size // 3, replace=False))
+    block, values = grid.block_of_cell.take(cells), random.normal(size=cells.size)
+    fields = [one.Scatter(np.zeros(shape)) for one in (kernels, passes)]
+    for divisor in (None, 0.3, None):  # the next field overwrites the last one, in another precision
+        few = np.sort(random.choice(cells, cells.size // 2, replace=False))
+        same(*([one(values[: few.size], few, divisor)] for one in fields))
+    sums = [one.block_sums(grid, cells, block, field) for one, field in zip((kernels, passes), fields, strict=True)]
+    same(*([one(values)] for one in sums))
+    free, loads = sums[1](np.ones(cells.size)), sums[1](abs(values))
+    same(*(one.spot_sums(loads, np.sqrt(loads), free) for one in (kernels, passes)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(passes, "BLOCK_ITERATIONS", kernels.FEW_BLOCK_ITERATIONS)
+        left = sums[1](values)
+        same(*([one.block_pressure(grid.coarse, left.copy(), free, 0.4, 1 / 64)] for one in (kernels, passes)))
