@@ -110,6 +110,7 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
     [
         (("scan", "mine.npy", "--unit", "N"), "--unit"),
         (("scan", "mine.npy", "--height-scale", "-1"), "--height-scale"),
+        (("scan", "mine.npy", "--format", "foo"), "mine.npy: --format"),
         (("new", "mine.npy", "--contact", "3"), "--contact"),
         (("run", "ball.toml", "--for", "much"), "--for"),
         (("trade", "ball.toml", "--budget", "much"), "--budget"),

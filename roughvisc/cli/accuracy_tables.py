@@ -131,13 +131,13 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     by_steps, by_grid = (
         _percent(float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity))) for part in ("time", "grid")
     )
-    grid = "spacing of the points of the scan" if dataset.attrs["grid_is_data"] else "grid"
+    grid = "spacing of the surface points" if dataset.attrs["grid_is_data"] else "grid"
     lines.append(f"Reference: {dataset.attrs['reference']}.")
-    lines.append(f"Its error of the {words}: {by_steps} % by steps, {by_grid} % by the {grid}.")
+    lines.append(f"Its error of the {words}: {by_steps} % from time steps, {by_grid} % from the {grid}.")
     if chosen is None:
         lines.append(f"No setting is known to have an error of at most {wanted}.")
     else:
-        lines.append(f"For {wanted} on {words}: {dataset['setting'].values[chosen]}.")
+        lines.append(f"For an error of {wanted} of the {words} use {dataset['setting'].values[chosen]}.")
     return titled(dataset.attrs["title"], table, *map(Text, lines))
 
 

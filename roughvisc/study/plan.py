@@ -1,4 +1,4 @@
-"""``roughvisc plan``: steps, time, memory and disk of each case, before anything runs.
+"""``roughvisc plan``: steps, time, memory and disk of each case, estimated before the study is run.
 
 A run on few cells gives the numbers of steps and convolutions and the contact, which grow slowly with the grid. A timed
 convolution on the real grid gives the time. Memory and disk follow from the sizes of the arrays.

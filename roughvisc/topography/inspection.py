@@ -177,7 +177,8 @@ def inspect(h: xr.DataArray) -> Inspection:
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
     x, y = borders.of_neighbours
-    seen = f"opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as neighbouring rows"
+    times = [f"{one:.2g}" if one > 1e-3 else "0" for one in (x, y)]  # rounding of a surface that repeats
+    seen = f"opposite borders differ {times[0]} (x) and {times[1]} times (y) as much as neighbouring rows"
     advice = 'boundary = "mirror"; with "periodic" the step at the seam carries load'
     find("Borders", seen, advice if borders.jumps else 'boundary = "periodic"', of_neighbours=borders.of_neighbours)
 

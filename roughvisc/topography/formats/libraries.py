@@ -86,7 +86,7 @@ def read_with_surface_topography(path: Path, format: str, source: BytesIO | Text
     from SurfaceTopography.IO import lookup_reader_by_format
 
     if format not in lookup_reader_by_format:
-        raise InputError(f"format is {format!r}: expected one of {', '.join(sorted(suffixes()))}, or 'auto'")
+        raise InputError(key="format", found=format, expected=f"one of {', '.join(sorted(suffixes()))}, or 'auto'")
     reader = lookup_reader_by_format[format](str(path) if source is None else source)
 
     def load(found: Any, shape: tuple[int, ...]) -> np.ndarray:
