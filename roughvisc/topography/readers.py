@@ -57,13 +57,8 @@ def read_file(path: Path, format: str | None, channel: int | str | None, how: Re
     for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
         if unit is not None:
             number(f"1 {unit}", "m", key)
-    for key, value, unit, low in (
-        ("no_data", how.no_data, "1", None),
-        ("height_scale", how.height_scale, "1", 0.0),
-        ("grid", how.grid, "m", 0.0),
-    ):
-        if value is not None:
-            number(value, unit, key, above=low)
+    if how.no_data is not None:
+        number(how.no_data, "1", "no_data")
     how = how._replace(spacing=None if how.spacing is None else pair("spacing", how.spacing))
     with _reading(path), closing(open_file(path, format)) as file:
         chosen = _chosen(file, channel)

@@ -27,7 +27,7 @@ from roughvisc.units import Quantity, quantities
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
 
 
-@quantities(spacing="m", grid="m")
+@quantities(spacing="m", grid="m > 0", height_scale="1 > 0")
 def open_scan(
     path: str | os.PathLike[str],
     *,
