@@ -97,16 +97,16 @@ def table(results: Path, out: Path | None) -> None:
 @quantity("--work-of-adhesion", "W", 'Work of adhesion of the two surfaces: "50 mJ/m^2".')
 @quantity("--yield-strength", "Y", 'Tensile yield strength of the softer body: "40 MPa".')
 @quantity("--thickness", "H", 'Actual thickness of the body modelled as a half-space: "5 mm".')
+@click.option("--base", help="How that body rests on its base: bonded or slipping. [default: bonded]")
 @quantity("--density", "RHO", 'Density of the body: "1100 kg/m^3".')
 @quantity("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".')
 @quantity("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".')
 @quantity("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".')
-@click.option("--base", help="Support of that body: bonded or slipping. [default: bonded]")
 @click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
 def audit(result: Path, study: Path | None, **properties: Any) -> None:
     """Check the assumptions of the model for a result.
 
-    Prints, for each assumption, a number, a verdict (holds, doubtful, broken, not known) and an explanation. Properties
+    Prints, for each assumption, a number, a verdict (holds, doubtful, broken, not known) and a reason. Properties
     not given as options come from the [audit] table of the study. For a folder, checks every result.
 
     \b

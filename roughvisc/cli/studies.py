@@ -212,16 +212,16 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
 
 @click.command()
 @click.argument("study", type=PATH)
-@click.option("--out", type=PATH, help="Folder for the measurements. [default: trade in the results]")
+@click.option("--out", type=PATH, help="Folder for the measurements. [default: folder trade in the results]")
 @quantity("--accuracy", "PART", "Target relative error.", default="1%", show_default=True)
-@click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction]")
+@click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction_coefficient]")
 @quantity("--budget", "TIME", "Total wall time of all runs.", default="5 min", show_default=True)
 @QUIET
 def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, budget: Any, quiet: bool) -> None:
     """Measure the cost and the error of several tolerances and grids.
 
-    Each run is timed and compared with the finest run. Marks the cheapest setting with the error --accuracy. Writes a
-    NetCDF file and a figure.
+    Each run is timed and compared with the finest run. Marks the cheapest setting whose error is at most --accuracy.
+    Writes a NetCDF file and a figure.
 
     \b
     Example:
@@ -243,7 +243,9 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
 
 @click.command()
 @click.argument("study", metavar="STUDY|RESULT", type=PATH)
-@click.option("--quantity", multiple=True, metavar="NAME", help="May be repeated. [default: contact_area]")
+@click.option(
+    "--quantity", multiple=True, metavar="NAME", help="Quantity of the budget; may be repeated. [default: contact_area]"
+)
 @quantity("--at", "VALUE", "Time or speed; may be repeated. [default: all kept]", multiple=True)
 @quantity("--modulus-error", "PART", "Relative error of the moduli at 95 %: 10%.")
 @quantity("--time-scale-error", "PART", "Relative error of the times of the material at 95 %.")
@@ -253,7 +255,7 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     type=click.Choice(["patch", "ensemble"]),
     help="Result for this patch, or for the roughness of which the scan is one sample. [default: patch]",
 )
-@click.option("--out", type=PATH, help="Folder of the budget. [default: budget in the results]")
+@click.option("--out", type=PATH, help="Folder of the budget. [default: folder budget in the results]")
 @WORKERS
 @QUIET
 def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **known: Any) -> None:
