@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
@@ -64,9 +65,7 @@ def conductance(
     if isinstance(resistivity, str) or not isinstance(resistivity, Sequence) or len(resistivity) != 2:
         wanted = 'a list of two, one of each body, in K m/W or, as strings such as "2e-8 ohm m" or with kind, in ohm m'
         raise InputError(key="resistivity", found=resistivity, expected=wanted)
-    if kind not in (None, *_UNITS):
-        raise InputError(key="kind", found=kind, expected="'thermal' or 'electrical'")
-    if kind is None:
+    if one_of("kind", kind, (None, *_UNITS)) is None:
         texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
         kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
     both = [number(one, _UNITS[kind], "resistivity") for one in resistivity]

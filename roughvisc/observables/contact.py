@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from scipy import ndimage, sparse
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
@@ -178,8 +179,7 @@ def distribution(
     InputError
         If the result does not contain the field, or edges do not increase.
     """
-    if name not in ("pressure", "gap"):
-        raise InputError(key="name", found=name, expected="'pressure' or 'gap'")
+    one_of("name", name, ("pressure", "gap"))
     need(dataset, name)
     field, dim = by_frame(dataset[name]), f"{name}_bin"
     if isinstance(bins, int | np.integer):

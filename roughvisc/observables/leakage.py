@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.mechanics.transport.flow import flow as flow_through
@@ -75,8 +76,7 @@ def leakage(
     >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
     """
     boundary = dataset.attrs.get("boundary", "free")
-    if along not in ("x", "y"):
-        raise InputError(key="along", found=along, expected="'x' or 'y'")
+    one_of("along", along, ("x", "y"))
     if sides not in (None, "closed", "periodic") or (sides == "periodic" and boundary != "periodic"):
         expected = f"'closed', or 'periodic' if the boundary is, which is {boundary!r}"
         raise InputError(key="sides", found=sides, expected=expected)

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.artist import Artist
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
@@ -49,8 +50,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     """
     path = Path(path)
     name = field or ("pressure" if "pressure" in dataset else "gap")
-    if name not in FIELDS:
-        raise InputError(key="field", found=name, expected=f"one of {', '.join(FIELDS)}")
+    one_of("field", name, FIELDS)
     expect_result(dataset, "x", "y", name)
     if frames < 1 or rate <= 0:
         raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from roughvisc.errors import InputError
+from roughvisc.arguments import one_of
 from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
@@ -215,8 +215,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     expect_result(dataset, "x", "y")
     fields = [fields] if isinstance(fields, str) else list(fields)
     for name in fields:
-        if name not in (*FIELDS, "flux"):
-            raise InputError(key="fields", found=name, expected=f"some of {', '.join(FIELDS)}, flux")
+        one_of("fields", name, (*FIELDS, "flux"))
     if "flux" in fields:
         expect_result(dataset, "gap")
         dataset = dataset.assign(flux=_flux_of(dataset))

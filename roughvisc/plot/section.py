@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from roughvisc.errors import InputError
+from roughvisc.arguments import one_of
 from roughvisc.observables import contact
 from roughvisc.observables.deformed import deformed
 from roughvisc.observables.frames import expect_result
@@ -40,8 +40,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     matplotlib.figure.Figure
     """
     expect_result(dataset, "x", "y", "height", "pressure")
-    if axis not in ("x", "y"):
-        raise InputError(key="axis", found=axis, expected="'x' or 'y'")
+    one_of("axis", axis, ("x", "y"))
     dataset = measured_part(dataset)
     rows, across = rows_of(dataset), "y" if axis == "x" else "x"
     frame = largest_contact(dataset) if time is None else frames_at(dataset, time)[0]

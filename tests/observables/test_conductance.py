@@ -65,7 +65,7 @@ def test_resistivities__say_what_flows(ball):
         ((1.0, -1), None, "none below zero"),
         (("1 ohm m", "1 K m/W"), None, "resistivity: found '1 K m/W'"),
         (("1 ohm m", 0), "thermal", "resistivity: found '1 ohm m'"),
-        ((1, 1), "sound", "kind: found 'sound': expected 'thermal' or 'electrical'"),
+        ((1, 1), "sound", "kind: found 'sound'"),
         ((np.nan, 1), None, "finite"),
     ],
 )
