@@ -170,6 +170,13 @@ _limit = Kernel(
 )
 
 
+_put = Kernel(
+    "put",
+    "double* pressure, const long long* cells, const double* held, const double* trial, const double* change, "
+    "const double fraction",
+    "pressure[cells[i]] = fraction == 1 ? trial[i] : fmax(held[i] + fraction * change[i], 0.0);",
+)
+_add = Kernel("add", "double* field, const Real* change, const double fraction", "field[i] += fraction * change[i];")
 _block_sums = Kernel(
     "block_sums",
     "const double* field, const long long nx, const long long ny, const long long mx, const long long my, "
@@ -298,6 +305,21 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
         return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
     limit = 1 / steepest if steepest > 0 else math.inf
     return (min(minimum, limit), minimum > limit) if minimum > 1 else (minimum, False)
+
+
+def advance(
+    pressure: Array,
+    separation: Array,
+    cells: Array,
+    held: Array,
+    trial: Array,
+    change: Array,
+    response: Array,
+    fraction: float,
+) -> None:
+    """Take a fraction of a trial step: change the pressure at the free cells, and the separation everywhere."""
+    _put(cells.size, pressure, cells, held, trial, change, fraction)
+    _add(separation.size, separation, response, fraction, real=response.dtype)
 
 
 class Scatter:

@@ -235,6 +235,35 @@ def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: f
     return found
 
 
+def advance(
+    pressure: Array,
+    separation: Array,
+    cells: Array,
+    held: Array,
+    trial: Array,
+    change: Array,
+    response: Array,
+    fraction: float,
+) -> None:
+    """Take a fraction of a trial step: change the pressure at the free cells, and the separation everywhere.
+
+    Parameters
+    ----------
+    pressure, separation, response : array, shape (nx ny,)
+        Pressure and separation, which are overwritten, and the displacement due to the step.
+    cells : array of int, shape (n,)
+        The free cells.
+    held, trial, change : array, shape (n,)
+        Their pressure before and after the step, and its change.
+    fraction : float
+        Part of the step.
+    """
+    if fraction != 1:
+        trial = namespace(held).maximum(held + fraction * change, 0)
+    pressure[cells] = trial
+    separation += response if fraction == 1 else fraction * response
+
+
 def without_mean(values: Array) -> Array:
     """Return a vector without its mean."""
     return values - values.sum() / values.size

@@ -288,11 +288,8 @@ def solve_contact(
         if is_extrapolated and not is_single:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
-        if fraction != 1:
-            trial = xp.maximum(held + fraction * change, 0)
-        pressure[cells] = trial
+        passes.advance(pressure, separation, cells, held, trial, change, response, fraction)
         previous = (cells, change, response, curvature) if curvature > 0 else None
-        separation += response if fraction == 1 else fraction * response
         length *= min(max(minimum, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
     if under_load:

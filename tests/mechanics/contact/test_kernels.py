@@ -124,6 +124,11 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
     same(*([one.inner_at(change, response, cells)] for one in (kernels, passes)))
     for minimum in (0.2, 0.8, 1.5, 20.0):
         same(*(one.admissible_fraction(held, trial, change, minimum) for one in (kernels, passes)))
+    for fraction in (0.4, 1.0):
+        both = [(pressure.copy(), separation.copy()) for _ in range(2)]
+        kernels.advance(*both[0], cells, held, trial, change, response, fraction)
+        passes.advance(*both[1], cells, held, trial, change, response.astype(float), fraction)
+        same(*both)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
