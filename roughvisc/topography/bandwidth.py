@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, format_quantity, quantities
 
 #: Half-width of a filter [points] up to which a sum is as fast as FFTs, whose library takes half a second to import.
 _SUMMED = 64
@@ -113,8 +113,9 @@ def gaussian_filter(
     sides = spacing(h)
     longest = max(side * count for side, count in zip(sides, h.shape, strict=True))
     if not 3 * max(sides) <= cutoff <= longest:
-        limits = f"from three cells, {3 * max(sides):.6g} [m], to the longest side, {longest:.6g} [m]"
-        raise InputError(key="cutoff", found=cutoff, expected=f"{limits}; or text with a unit, such as '2.5 um'")
+        least, most = (format_quantity(one, "m") for one in (3 * max(sides), longest))
+        expected = f"a length [m], or text with a unit, from three cells ({least}) to the longest side ({most})"
+        raise InputError(key="cutoff", found=cutoff, expected=expected)
     require_heights(h, "gaussian_filter")
     heights = _long_waves(h.values, [cutoff / d for d in sides], periodic)
     if keep == "short":
