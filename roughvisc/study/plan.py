@@ -146,11 +146,9 @@ def plan(
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
-    surfaces, runs, rows = (
-        dict[str, tuple[xr.DataArray, float]](),
-        dict[int, CoarseRun](),
-        [dict[str, Any]()] * len(cases),
-    )
+    surfaces: dict[str, tuple[xr.DataArray, float]] = {}
+    runs: dict[int, CoarseRun] = {}
+    rows: list[dict[str, Any]] = [{}] * len(cases)
     began, expected = time.thread_time(), 0.0
     for number in sorted(range(len(cases)), key=lambda one: f"{one:b}"[::-1]):  # spread over the sweep: 0, 4, 2, 1, 3
         case, is_own = cases[number], not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)

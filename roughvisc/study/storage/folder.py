@@ -113,6 +113,12 @@ def require_folder(folder: Path) -> None:
         raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
 
 
+def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc)") -> InputError:
+    """Return the error of a file that is not what a caller expects; another file may follow under its name."""
+    text = f"{path}: {found}: expected {expected}"
+    return InputError(text, key=str(path), found=found, expected=expected, transient=True)
+
+
 def require_file(path: Path) -> None:
     """Refuse a path that is not a readable regular file, because opening a pipe may never return.
 
@@ -131,10 +137,7 @@ def require_file(path: Path) -> None:
         found = "does not exist"
     except OSError as error:
         found = f"cannot be read: {error.strerror or error}"
-    expected = "a result of roughvisc (.nc)"
-    raise InputError(
-        f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
-    )
+    raise unusable(path, found)
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from xarray.core import indexing
 
 from roughvisc.errors import InputError
 from roughvisc.labels import STEPS, label, steps_of, with_steps
-from roughvisc.study.storage.folder import atomic_write, require_file, results_at
+from roughvisc.study.storage.folder import atomic_write, require_file, results_at, unusable
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 #: Errors of the library for a file that it cannot read.
@@ -60,8 +60,7 @@ class DamagedError(InputError):
 def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     """Return the error of a file that the library could not read: a system error, or damaged content."""
     if isinstance(error, OSError) and (error.errno or 0) > 0:  # errors of the library have negative numbers
-        text = f"{path}: cannot be read: {error.strerror or error}: expected a result of roughvisc (.nc)"
-        return InputError(text, key=str(path), found=error.strerror, transient=True)
+        return unusable(path, f"cannot be read: {error.strerror or error}")
     reason = f"{what}{error}"
     text = f"{path}: is damaged: {reason}: expected a whole result; remove the file and run its study again"
     return DamagedError(text, key=str(path), found=reason, transient=True)
@@ -99,10 +98,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     except ERRORS as error:
         raise unreadable(path, error) from error
     if found := foreign(dataset.attrs, {str(name): one.dims for name, one in dataset.variables.items()}):
-        expected = f"a result of roughvisc of format {RESULT_FORMAT}"
-        raise InputError(
-            f"{path}: {found}: expected {expected}", key=str(path), found=found, expected=expected, transient=True
-        )
+        raise unusable(path, found, f"a result of roughvisc of format {RESULT_FORMAT}")
     return dataset
 
 
