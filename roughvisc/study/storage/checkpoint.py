@@ -111,12 +111,15 @@ class CheckpointWriter(Recorder):
                 plain, arrays = _read(path)
                 ends = plain["ends"]
                 if plain["owner"] == self._owner:
-                    rows = [row for number in range(len(ends) - 1) for row in _read(self._rows_path(number))[0]]
+                    rows = []
+                    for number, end in enumerate(ends[1:]):
+                        rows += _read(self._rows_path(number))[0][: end - len(rows)]
                     if len(rows) != ends[-1]:
                         raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
                     parts = {name: _unflatten(value, arrays) for name, value in plain["reached"].items()}
                     self.latest = Checkpoint(**parts).with_current_transforms()
-                    self.plain, self._ends = rows, ends
+                    count = self.latest.rows  # rows after the state are computed again
+                    self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
                     log.info("%s: goes on from here", path)
                     return
                 log.warning("%s: belongs to another case or revision and is not used", path)

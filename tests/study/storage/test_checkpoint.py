@@ -199,6 +199,21 @@ def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name,
         assert names(folder) == [path.name]
 
 
+@pytest.mark.parametrize("reports", [1, 2, 6])
+def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, reports):
+    """In the middle of a pair of steps, or at its end, before the state is recorded."""
+    case, expected, _ = whole(MODES)
+    told = iter(range(reports))
+
+    def report(now, end):
+        if next(told, None) is None:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, progress=report)
+    assert values(run_case(case, tmp_path)) == expected
+
+
 # ----------------------------------------------------------------------------------------------------------------
 # what a crash leaves
 
