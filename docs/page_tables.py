@@ -14,9 +14,8 @@ def variables():
     """Return the table of all variables of results and observables."""
     lines = ["| variable | over | unit | meaning |", "|---|---|---|---|"]
     for name, one in VARIABLES.items():
-        over = [
-            "steps" if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims
-        ]
+        steps = "steps" if one.of_steps else "rows and steps"
+        over = [steps if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims]
         meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
         if name == "status":
             meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
