@@ -416,9 +416,9 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
     xp, shape = namespace(right), right.shape
     residual, solution, count = right.reshape(-1), xp.zeros(right.size), 0
     norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
+    directions = xp.empty((_RESTART + 1, right.size))
     while norm > enough and count < _MOST_VECTORS:
         # The first direction is the residual; each further direction is the image of the last one, orthonormalised.
-        directions = xp.empty((_RESTART + 1, right.size))
         directions[0] = residual / norm
         triangle, along_residual, size = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART), 0
         for k in range(_RESTART):

@@ -13,15 +13,12 @@ from typing import Any
 import cupy
 import numpy as np
 
-from roughvisc.mechanics.contact.passes import BLOCK_TOLERANCE, Free, Last
+from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, Free, Last
 from roughvisc.mechanics.grid import Grid
 
 Array = Any  # an array of CuPy
 #: Threads of a block, and largest number of blocks.
 THREADS, BLOCKS = 256, 528
-#: Largest number of iterations for the blocks. Two need hardly more iterations of the contact than eight, and each
-#: takes as long as half an iteration of the contact.
-FEW_BLOCK_ITERATIONS = 3
 #: A kernel: each thread adds up its elements, then each block its threads; the sums of the blocks go to the host.
 SOURCE = """
 extern "C" __global__ void {name}(const long long count, {arguments}, double* parts) {{
@@ -360,12 +357,12 @@ def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: f
     search, eased, loads, response = (cupy.empty(count) for _ in range(4))
     (squared,) = _begin(count, left, free, local, own, search, loads, part)
     enough = BLOCK_TOLERANCE**2 * squared
-    for iteration in range(FEW_BLOCK_ITERATIONS):
+    for iteration in range(BLOCK_ITERATIONS):
         displaced = blocks.displacement(loads.reshape(blocks.shape))
         (curvature,) = _respond(count, displaced, search, free, local, response)
         length, before = squared / curvature, squared
         (squared,) = _advance(count, search, response, free, local, own, length, found, left, eased)
-        if iteration + 1 == FEW_BLOCK_ITERATIONS or not squared > enough:
+        if iteration + 1 == BLOCK_ITERATIONS or not squared > enough:
             break
         _turn_search(count, eased, squared / before, free, part, search, loads)
     return found

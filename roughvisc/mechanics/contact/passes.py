@@ -17,8 +17,9 @@ from roughvisc.mechanics.grid import Grid, namespace
 Array = Any  # an array of NumPy or CuPy
 #: Cells [index], change, response (whole field) and curvature of the last step.
 Last = tuple[Array, Array, Array, float]
-#: Reduction of the residual of the equations of the blocks, and largest number of iterations.
-BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 100
+#: Reduction of the residual of the equations of the blocks, and largest number of iterations. With four instead of
+#: about eight iterations, creep on 1,024 x 1,024 cells needs 3 % more convolutions of the cells and 3 % less time.
+BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 4
 
 
 class Free(NamedTuple):

@@ -239,10 +239,13 @@ def solve_contact(
             continue
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
         waves = LongWaves.of(grid, cells, held, energy, on_grid) if has_blocks else None
-        rest = residual if waves is None else residual - waves.means(residual)[waves.block]
+        rest = residual
+        if waves is not None:
+            sums = waves.sums(residual)
+            rest = residual - waves.mean(sums)[waves.block]
         direction = passes.taken(grid.inverse(on_grid(rest, cells, size)), cells, size)
         if waves is not None:
-            direction += (waves.pressure(residual) - waves.means(direction))[waves.block]
+            direction += (waves.pressure(sums) - waves.mean(waves.sums(direction)))[waves.block]
         # Conjugate to the step before, on the cells that are free now.
         direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
@@ -479,11 +482,10 @@ class LongWaves(NamedTuple):
             return None
         return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread)
 
-    def means(self, values: Array) -> Array:
-        """Return the mean over the free cells of each block; zero if there are none."""
-        return self.sums(values) / self.blocks.xp.maximum(self.free, 1)
+    def mean(self, sums: Array) -> Array:
+        """Return the mean over the free cells of each block from the sum; zero if there are none."""
+        return sums / self.blocks.xp.maximum(self.free, 1)
 
-    def pressure(self, residual: Array) -> Array:
-        """Return the pressure of each block that displaces it by the mean residual."""
-        solve = passes_of(self.blocks.xp).block_pressure
-        return solve(self.blocks, self.sums(residual), self.free, self.local, self.part)
+    def pressure(self, sums: Array) -> Array:
+        """Return the pressure of each block that displaces it by the mean residual, from the sum of the residual."""
+        return passes_of(self.blocks.xp).block_pressure(self.blocks, sums, self.free, self.local, self.part)

@@ -145,7 +145,5 @@ def test_kernels__solve_for_the_blocks_as_numpy_does(kernels, seed, shape):
     same(*([one(values)] for one in sums))
     free, loads = sums[1](np.ones(cells.size)), sums[1](abs(values))
     same(*(one.spot_sums(loads, np.sqrt(loads), free) for one in (kernels, passes)))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(passes, "BLOCK_ITERATIONS", kernels.FEW_BLOCK_ITERATIONS)
-        left = sums[1](values)
-        same(*([one.block_pressure(grid.coarse, left.copy(), free, 0.4, 1 / 64)] for one in (kernels, passes)))
+    left = sums[1](values)
+    same(*([one.block_pressure(grid.coarse, left.copy(), free, 0.4, 1 / 64)] for one in (kernels, passes)))
