@@ -233,23 +233,23 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     kept = steps[steps["kept"]].sort_values("place", kind="stable")
     attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    fields: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
+    columns = {name: (axis, kept[name].to_numpy()) for name in kept if name not in ("kept", "place", axis)}
+    variables: dict[str, Any] = {**columns, "height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
-        fields[name] = (axis, "x", "y"), field
+        variables[name] = (axis, "x", "y"), field
     if "filled" in height.coords:
-        fields["filled"] = ("x", "y"), height["filled"].values
-    histories = kept.drop(columns=["kept", "place"]).set_index(axis).to_xarray()
-    dataset = histories.assign(fields).assign_coords(x=height["x"].values, y=height["y"].values)
-    dataset.attrs = {
-        "Conventions": "CF-1.11",
-        "boundary": settings.boundary,
-        "tolerance": settings.tolerance,
-        "history": str(height.attrs.get("history", "")),
-    }
+        variables["filled"] = ("x", "y"), height["filled"].values
+    coordinates = {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values}
+    dataset = xr.Dataset(variables, coordinates).assign_attrs(
+        Conventions="CF-1.11",
+        boundary=settings.boundary,
+        tolerance=settings.tolerance,
+        history=str(height.attrs.get("history", "")),
+    )
     dataset = rows.finish(dataset)
     if axis != "time":
         return dataset
     steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
-    every = steps.filter(["time", *STEPPED]).rename_axis(STEP).to_xarray().set_coords("time").drop_vars(STEP)
-    return with_steps(dataset, label(every.assign_attrs(title=TITLE)))
+    every = {name: (STEP, steps[name].to_numpy()) for name in ("time", *STEPPED) if name in steps}
+    return with_steps(dataset, label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time")))
