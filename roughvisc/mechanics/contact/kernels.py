@@ -65,21 +65,19 @@ class Kernel:
     def __init__(
         self, name: str, arguments: str, body: str, sums: Sequence[str] = (), maxima: Sequence[str] = ()
     ) -> None:
-        adding = [f"sums[{k}] += {one};" for k, one in enumerate(sums)]
-        adding += [f"maxima[{len(sums) + k}] = fmax(maxima[{len(sums) + k}], {one});" for k, one in enumerate(maxima)]
-        self._added, self._number, self._returns = len(sums), max(len(adding), 1), bool(adding)
+        lines = [f"sums[{k}] += {one};" for k, one in enumerate(sums)]
+        for k, one in enumerate(maxima, len(sums)):
+            lines.append(f"maxima[{k}] = fmax(maxima[{k}], {one});")
+        self._name, self._sums, self._returned = name, len(sums), len(lines)
         self._compiled: dict[str, Any] = {}
-        self._name, self._source = (
-            name,
-            SOURCE.format(
-                name=name,
-                arguments=arguments,
-                body=body,
-                adding=" ".join(adding),
-                number=self._number,
-                added=len(sums),
-                threads=THREADS,
-            ),
+        self._source = SOURCE.format(
+            name=name,
+            arguments=arguments,
+            body=body,
+            adding=" ".join(lines),
+            number=max(len(lines), 1),
+            added=len(sums),
+            threads=THREADS,
         )
 
     def __call__(self, count: int, *arguments: Any, real: Any = np.float64) -> list[float]:
@@ -88,12 +86,12 @@ class Kernel:
         if kind not in self._compiled:
             self._compiled[kind] = cupy.RawKernel(self._source.replace("Real", kind), self._name)
         blocks = max(min(-(-count // THREADS), BLOCKS), 1)
-        parts = cupy.empty((self._number, blocks))
+        parts = cupy.empty((max(self._returned, 1), blocks))
         self._compiled[kind]((blocks,), (THREADS,), (count, *arguments, parts))
-        if not self._returns:
-            return []
+        if not self._returned:
+            return []  # without waiting for the device
         found = parts.get()
-        return [*found[: self._added].sum(axis=1).tolist(), *found[self._added :].max(axis=1).tolist()]
+        return [*found[: self._sums].sum(axis=1).tolist(), *found[self._sums :].max(axis=1).tolist()]
 
 
 _contact_level = Kernel(
