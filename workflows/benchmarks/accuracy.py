@@ -351,7 +351,8 @@ def _misses(part):
 def _miss(result, name):
     """A line for a quantity of a case that misses the tolerance."""
     true = np.array(result["rows"][name]["true"], float) / result["tolerance"]
-    stated = np.array(result["rows"]["total"]["stated"], float) / result["tolerance"]
+    statement = "work" if name == "work" else "total"
+    stated = np.array(result["rows"][statement]["stated"], float) / result["tolerance"]
     worst = int(np.nanargmax(true))
     rows = f"{np.count_nonzero(true > 1)} of {true.size} rows, the worst row {worst} (states {stated[worst]:.2g})"
     families = ", ".join([*(result[kind] for kind in ("material", "program", "surface")), _kept(result)])
