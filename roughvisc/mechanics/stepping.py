@@ -457,6 +457,18 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     return Step(new, replace(apart, pressure=apart.pressure + shared), number, after_step)
 
 
+def before_closing(scene: Scene, state: State, step: Step) -> Step:
+    """Return a step between open surfaces, whose stated error is the largest force if they may already have closed.
+
+    Without instantaneous compliance the force jumps when a surface closes on its former imprint. The time of the jump
+    is uncertain if the remaining gap is within the tolerance of the approach.
+    """
+    before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
+    if scene.can_jump or not left < min(before, scene.tolerance * state.largest_approach):
+        return step
+    return step._replace(difference=replace(step.difference, pressure=state.largest_force, force=state.largest_force))
+
+
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
     fine, coarse, number = state.fine, state.coarse, state.segment
@@ -465,7 +477,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     if fine.is_open:
         closes = closing_time(scene, state, segment, event)
         if closes > fine.time:
-            return [single_step(scene, state, closes)]
+            return [before_closing(scene, state, single_step(scene, state, closes))]
     if scene.memory.is_elastic:
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
@@ -968,7 +980,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
         return scene.lowest(scene.gap + scene.memory.after_rest(here.history, time - now))
 
     turns = [began + time for time in segment.turns(now - began, event - began)]
-    first = now
+    first, shortest = now, max(CLOSING * (event - now), math.ulp(event))
     for last in (*turns, event):  # in between the approach is monotone, and the surface only rises
         pending = [(first, last)]
         while pending:
@@ -976,7 +988,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
             level = touching(right)
             if max(scene.prescribed(state.segment, end, here) for end in (left, right)) <= level:
                 continue
-            if right - left <= CLOSING * (event - now):
+            if right - left <= shortest:
                 if scene.prescribed(state.segment, right, here) > level:
                     return left if left - now > AT_ONCE * (event - now) else now
                 continue

@@ -116,3 +116,21 @@ def test_contact_at_the_very_first_instant__is_not_put_off(lead):
     scene = sphere(program.approach(0.02, over=1.0), times=(lead + 0.25, lead + 1.0), tolerance=1e-2)
     steps = list(march(scene))
     assert all(step.point.force > 0 for step in steps if step.point.time > lead)
+
+
+def test_row_just_before_an_imprint_closes__states_the_force_to_which_it_jumps():
+    """A Kelvin-Voigt body carries a large force as soon as its imprint closes: a row at that time may be either."""
+    program = rv.Program().approach(0.05, over=0.5).approach(-0.02, over=0.1).approach(0.05, over=0.2)
+    body = rv.kelvin_voigt(1.0, 1.0)
+    apart = found_again(list(march(sphere(program, body, tolerance=1e-3))), 0.5)
+    for late in (1e-7, 1e-12):  # the time to the next event is hardly longer than its resolution
+        assert list(march(sphere(program, body, times=(apart - late,), tolerance=1e-3)))[-1].point.time == 0.8
+    kept = (apart - 1e-7, apart + 1e-4)
+    before, after = (
+        step for step in march(sphere(program, body, times=kept, tolerance=1e-3)) if step.point.time in kept
+    )
+    assert before.point.force == 0
+    assert after.point.force > 0.05 * before.state.largest_force
+    assert before.difference.force >= after.point.force
+    (early,) = (one for one in march(sphere(program, body, times=(apart - 2e-3,))) if one.point.time == apart - 2e-3)
+    assert early.point.force == early.difference.force == 0
