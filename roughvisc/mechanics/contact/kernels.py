@@ -10,11 +10,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import cupy
 import numpy as np
 
 from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, Free, Last
 from roughvisc.mechanics.grid import Grid
+
+try:
+    import cupy
+except ImportError:  # tools that import every module need no GPU
+    cupy = None
 
 Array = Any  # an array of CuPy
 #: Threads of a block, and largest number of blocks.
