@@ -3,7 +3,6 @@
 import ctypes
 import shutil
 import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from roughvisc.mechanics.contact import kernels as kernels_of_a_gpu
 from roughvisc.mechanics.contact import passes
 from roughvisc.mechanics.grid import Grid
 
@@ -61,18 +61,15 @@ def kernels(tmp_path_factory):
         flatnonzero=np.flatnonzero,
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "cupy", cupy)
-        patch.delitem(sys.modules, "roughvisc.mechanics.contact.kernels", raising=False)
-        from roughvisc.mechanics.contact import kernels
-
-        patch.setattr(kernels, "BLOCKS", 1)
-        for value in vars(kernels).values():
-            if isinstance(value, kernels.Kernel):
-                value._source = value._source.replace(f"shared[{kernels.THREADS}]", "shared[1]").replace(
-                    f"half = {kernels.THREADS} / 2", "half = 0"
-                )
-        yield kernels
-    sys.modules.pop("roughvisc.mechanics.contact.kernels", None)
+        patch.setattr(kernels_of_a_gpu, "cupy", cupy)
+        patch.setattr(kernels_of_a_gpu, "BLOCKS", 1)
+        threads = kernels_of_a_gpu.THREADS
+        for value in vars(kernels_of_a_gpu).values():
+            if isinstance(value, kernels_of_a_gpu.Kernel):
+                source = value._source.replace(f"shared[{threads}]", "shared[1]")
+                patch.setattr(value, "_source", source.replace(f"half = {threads} / 2", "half = 0"))
+                patch.setattr(value, "_compiled", {})
+        yield kernels_of_a_gpu
 
 
 def same(found, expected):
