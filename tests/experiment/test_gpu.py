@@ -98,7 +98,7 @@ def test_friction__on_a_device_is_that_of_a_cpu(gpu, boundary):
         np.testing.assert_allclose(found[variable], expected[variable], rtol=0, atol=1e-7 * scale, err_msg=variable)
 
 
-@pytest.mark.parametrize("name", ["part of a ball", "slide", "layer", "soft"])
+@pytest.mark.parametrize("name", ["part of a ball", "slide", "layer", pytest.param("soft", marks=pytest.mark.thorough)])
 def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name, tmp_path):
     height, body, program, settings = SCENES[name]
     settings = Settings(times=6, **({"boundary": "free"} | settings), device="gpu")
