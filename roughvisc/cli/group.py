@@ -61,7 +61,7 @@ class Failure(click.ClickException):
 
 
 def by_options(message: str, command: click.Command | None) -> str:
-    """Return a message in which the options of a command replace the names of the arguments.
+    """Replace the names of arguments in a message by the options of a command.
 
     Examples
     --------

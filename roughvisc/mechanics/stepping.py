@@ -41,8 +41,8 @@ FIRST_PAIR = 0.005
 STATED, STATED_APPROACH = 0.6, 0.6
 #: The same for bodies with hardly any instantaneous compliance, whose first steps are of first order.
 STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
-#: Error of the work along a straight path if the force vanishes at one end, as a part of this work: in ball and cone
-#: contacts a fifth and a third.
+#: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
+#: On a sphere it is a fifth, on a cone a third.
 STRAIGHT = 0.25
 #: Part of the tolerance that a pair may add to the error, and the part that it may add in any case.
 SHARE, LEAST_SHARE = 0.4, 0.2
@@ -463,8 +463,10 @@ def before_closing(scene: Scene, state: State, step: Step) -> Step:
     Without instantaneous compliance the force jumps when a surface closes on its former imprint. The time of the jump
     is uncertain if the remaining gap is within the tolerance of the approach.
     """
+    if scene.can_jump:
+        return step
     before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
-    if scene.can_jump or not left < min(before, scene.tolerance * state.largest_approach):
+    if not left < min(before, scene.tolerance * state.largest_approach):
         return step
     return step._replace(difference=replace(step.difference, pressure=state.largest_force, force=state.largest_force))
 

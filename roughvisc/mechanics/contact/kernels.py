@@ -52,7 +52,7 @@ extern "C" __global__ void {name}(const long long count, {arguments}, double* pa
 
 
 class Kernel:
-    """A kernel over vectors: new vectors, sums and largest values of expressions.
+    """Kernel that computes new vectors, and returns sums and largest values of expressions.
 
     Parameters
     ----------
@@ -167,8 +167,6 @@ _limit = Kernel(
     "const double h = held[i], c = change[i];",
     maxima=("h > 0 && trial[i] == 0 ? 1.0 : 0.0", "c < 0 ? -c / h : 0.0"),
 )
-
-
 _put = Kernel(
     "put",
     "double* pressure, const long long* cells, const double* held, const double* trial, const double* change, "
@@ -247,7 +245,7 @@ def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level:
 
 
 def taken(field: Array, cells: Array, factor: float) -> Array:
-    """Return the values of a field at some cells, times a factor, in double precision."""
+    """Return the values of a field at given cells, multiplied by a factor, in double precision."""
     values = cupy.empty(cells.size)
     _take(cells.size, field, cells, factor, values, real=field.dtype)
     return values
@@ -261,7 +259,7 @@ def conjugate(
     cells: Array,
     under_load: bool,
 ) -> tuple[Array, float]:
-    """Return the direction, conjugate to the last step if that descends, and the L1 norm of the direction before."""
+    """Return the direction of the step, and the L1 norm of the preconditioned residual."""
     count, beta, former_mean, former = direction.size, 0.0, 0.0, direction
     if last is None:
         mean = float(direction.sum()) / count if under_load else 0.0
@@ -283,7 +281,7 @@ def conjugate(
 def cut_step(
     held: Array, direction: Array, residual: Array, length: float, under_load: bool
 ) -> tuple[Array, Array, float]:
-    """Return a step along a direction, cut at zero pressure: new pressure, its change, and the slope of the energy."""
+    """Return the pressure after a step, cut at zero, the change of the pressure, and the slope of the energy."""
     trial, change = cupy.empty(held.size), cupy.empty(held.size)
     (carried,) = _cut(held.size, held, direction, length, trial)
     if under_load and carried == 0:
@@ -354,7 +352,7 @@ def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float
 
 
 def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
-    """Return the pressure of each block that displaces it by the mean residual: conjugate gradients."""
+    """Solve, by conjugate gradients, for the pressures that displace the blocks by their mean residual."""
     count, own, found = left.size, blocks.self_influence * part, cupy.zeros(left.size)
     search, eased, loads, response = (cupy.empty(count) for _ in range(4))
     (squared,) = _begin(count, left, free, local, own, search, loads, part)

@@ -1,4 +1,4 @@
-"""Passes over the free cells in an iteration of the contact solver: new vectors, and all sums of a pass at once.
+"""Passes of the contact solver over the free cells. Each returns new vectors, and all its sums together.
 
 On a GPU each pass is one kernel of :mod:`roughvisc.mechanics.contact.kernels`, which has the same functions: the launch
 of a kernel and the copy of a number to the host take longer than the pass itself.
@@ -89,7 +89,7 @@ def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level:
 
 
 def taken(field: Array, cells: Array, factor: float) -> Array:
-    """Return the values of a field at some cells, times a factor, in double precision."""
+    """Return the values of a field at given cells, multiplied by a factor, in double precision."""
     values = field.reshape(-1)[cells].astype(float)
     values *= factor
     return values
@@ -103,7 +103,9 @@ def conjugate(
     cells: Array,
     under_load: bool,
 ) -> tuple[Array, float]:
-    """Return the direction, conjugate to the last step if that descends, and the L1 norm of the direction before.
+    """Return the direction of the step, and the L1 norm of the preconditioned residual.
+
+    The direction is conjugate to the last step if it still descends then.
 
     Parameters
     ----------
@@ -133,7 +135,7 @@ def conjugate(
 def cut_step(
     held: Array, direction: Array, residual: Array, length: float, under_load: bool
 ) -> tuple[Array, Array, float]:
-    """Return a step along a direction, cut at zero pressure: new pressure, its change, and the slope of the energy.
+    """Return the pressure after a step, cut at zero, the change of the pressure, and the slope of the energy.
 
     Under a load, the new pressure is scaled to a sum of one; the slope is zero if no cell carries pressure.
     """
@@ -206,7 +208,7 @@ def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float
 
 
 def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
-    """Return the pressure of each block that displaces it by the mean residual: conjugate gradients.
+    """Solve, by conjugate gradients, for the pressures that displace the blocks by their mean residual.
 
     Parameters
     ----------

@@ -273,7 +273,7 @@ class Record:
         self.display.warn(text)
 
     def warn_of_cases(self, keys: Iterable[str]) -> None:
-        """Display one warning of each subject in the results of some cases, with the number of cases that have one."""
+        """Display one warning of each subject in the results of some cases, and the number of cases that have it."""
         found: dict[str, dict[str, str]] = {}
         for key in keys:
             entry = self._outcomes[key].entry

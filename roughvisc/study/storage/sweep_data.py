@@ -55,7 +55,7 @@ class SweepCase:
 
 
 def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
-    """Return key and JSON of each case, in the given order; cases of equal key and labels count once."""
+    """Return key and JSON of each case, in the given order, without repeated cases of equal key and labels."""
     distinct: dict[Any, Case] = {}
     for case in cases:
         distinct.setdefault((case.key, json.dumps(dict(case.varied))), case)
