@@ -179,6 +179,8 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
         (tmp_path / f"begun-{len(list(tmp_path.glob('begun*')))}").touch()
         if len(list(tmp_path.glob("begun*"))) == 2:
             raise OSError(28, "No space left on device; make room", "x.nc")
+        if len(list(tmp_path.glob("begun*"))) == 3:
+            time.sleep(1)  # the sweep hears of the full disk before the fourth case could begin
         return bring(case, folder, **settings)
 
     if workers:  # the processes of a local cluster are forked from one that has not seen this
