@@ -12,7 +12,6 @@ from references.half_space import (
     punch_force,
     reduced_contact,
     relaxation_spectrum,
-    sticking_stiffness,
 )
 from references.layered import ElasticLayer, OnSheet, PunchOnSheet
 
@@ -31,5 +30,4 @@ __all__ = [
     "reduced_contact",
     "relaxation_spectrum",
     "sliding_cylinder",
-    "sticking_stiffness",
 ]

@@ -5,7 +5,6 @@ independent springs (method of dimensionality reduction, MDR). An elastic contac
 ``g(a)`` and the force ``2 E* int_0^a (g(a) - g(x)) dx``.
 """
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from types import SimpleNamespace
@@ -167,12 +166,6 @@ def punch_dissipation(radius, material, amplitude, period):
     relaxation = Relaxation.of(material)
     x = 2 * np.pi / period * relaxation.times
     return 2 * np.pi * radius * float(relaxation.moduli @ (x / (1 + x**2))) * amplitude**2
-
-
-def sticking_stiffness(poisson):
-    """Return the stiffness of a punch that sticks over one without friction (Spence, Proc. R. Soc. A 305 (1968) 55)."""
-    x = 1 - 2 * poisson
-    return 1.0 if x == 0 else (1 - poisson) * math.log1p(2 * x) / x
 
 
 # ------------------------------------------------------------------------------------------------- any history

@@ -92,18 +92,6 @@ class Audit:
             lines.append(textwrap.fill(one.sentence, _WIDTH, initial_indent=head, subsequent_indent=" " * len(head)))
         return "\n".join(lines)
 
-    def to_dataset(self) -> xr.Dataset:
-        """Return the findings over ``assumption``: number, verdict, sentence, and both limits with their source."""
-        columns = {name: [getattr(one, name) for one in self] for name in ("number", "verdict", "sentence")} | {
-            "doubtful_from": [one.limit.doubtful for one in self],
-            "broken_from": [one.limit.broken for one in self],
-            "source": [one.limit.source for one in self],
-        }
-        dataset = xr.Dataset(
-            {name: ("assumption", values) for name, values in columns.items()}, attrs={"title": self.title}
-        )
-        return dataset.assign_coords(assumption=[one.name for one in self])
-
 
 @quantities(
     work_of_adhesion="J/m^2 >= 0",
@@ -176,21 +164,12 @@ def audit(
     >>> found["adhesion"].verdict, found["slope"].verdict, found["yielding"].verdict
     ('broken', 'holds', 'not known')
     """
-    given = {
-        "work_of_adhesion": work_of_adhesion,
-        "yield_strength": yield_strength,
-        "thickness": thickness,
-        "density": density,
-        "linear_strain": linear_strain,
-        "heat_conductivity": heat_conductivity,
-        "volumetric_heat_capacity": volumetric_heat_capacity,
-    }
-    given = {name: value for name, value in given.items() if value is not None}
+    stated = dict(locals())
+    given = {name: value for name, value in stated.items() if name != "result" and value is not None}
     if base is not None:
         one_of("base", base, get_args(Base))
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
-        given["base"] = base
     expect_result(result, "force", "approach", "contact_area", "contact_fraction")
     case = None
     if "case" in result.attrs:
@@ -205,5 +184,5 @@ def audit(
         except NotKnown as missing:
             found = math.nan, str(missing)
         if found is not None:
-            findings.append(Finding(name.partition(" ")[0], *found, limit))
+            findings.append(Finding(name, *found, limit))
     return Audit(str(result.attrs.get("title", "")), tuple(findings))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +13,7 @@ from roughvisc.mechanics.sheet import Sheet, complement
 Array = NDArray[np.float64]
 
 #: Distance over which surfaces attract each other: the distance between atoms (D. Tabor, J. Colloid Interface Sci. 58
-#: (1977) 2). The Tabor parameter is proportional to its inverse, the attraction of stiff rough surfaces to the inverse
-#: of its cube root. [m]
+#: (1977) 2). The Tabor parameter is proportional to its inverse. [m]
 ATTRACTION_RANGE = 3e-10
 #: Maugis' parameter over Tabor's, for Lennard-Jones atoms (D. Maugis, J. Colloid Interface Sci. 150 (1992) 243).
 _MAUGIS = 1.1570
@@ -91,115 +89,6 @@ def pull_off_force(radius: float, work_of_adhesion: float, tabor: float = math.i
     return math.pi * work_of_adhesion * radius * (7 - share) / 4
 
 
-def punch_pull_off(radius: float, contact_modulus: float, work_of_adhesion: float) -> float:
-    r"""Return the force that separates a round flat punch from a half-space.
-
-    Parameters
-    ----------
-    radius : float
-        Radius ``a`` of the punch. [m]
-    contact_modulus : float
-        ``E*``. [Pa]
-    work_of_adhesion : float
-        ``w``. [J/m2]
-
-    Returns
-    -------
-    float
-        :math:`\sqrt{8 \pi a^3 E^* w}`. [N]
-
-    References
-    ----------
-    .. [1] K. Kendall, J. Phys. D 4 (1971) 1186.
-
-    Examples
-    --------
-    >>> round(punch_pull_off(1e-3, 3e6, 0.05), 4)
-    0.0614
-    """
-    return math.sqrt(8 * math.pi * radius**3 * contact_modulus * work_of_adhesion)
-
-
-def adhesive_load(force: float, pull_off: float) -> float:
-    r"""Return the load under which a sphere without adhesion has the contact radius of an adhesive sphere (JKR).
-
-    Parameters
-    ----------
-    force : float
-        Load ``F``. [N]
-    pull_off : float
-        Pull-off force :math:`P = \frac32 \pi w R`. [N]
-
-    Returns
-    -------
-    float
-        :math:`F + 2 P + 2 \sqrt{P F + P^2}`: Hertz's theory gives the contact radius under this load. [N]
-
-    References
-    ----------
-    .. [1] K. L. Johnson, K. Kendall, A. D. Roberts, Proc. R. Soc. A 324 (1971) 301.
-
-    Examples
-    --------
-    >>> adhesive_load(1.0, 0.0), adhesive_load(-1.0, 1.0)  # without adhesion; at separation
-    (1.0, 1.0)
-    """
-    return force + 2 * pull_off + 2 * math.sqrt(pull_off * force + pull_off**2)
-
-
-def rough_attraction(
-    rms_slope: float,
-    rms_laplacian: float,
-    contact_modulus: float,
-    work_of_adhesion: float,
-    attraction_range: float = ATTRACTION_RANGE,
-) -> float:
-    r"""Return the attraction around the spots of a stiff rough contact over the repulsion within them.
-
-    Parameters
-    ----------
-    rms_slope : float
-        Root mean square slope ``h'``. [-]
-    rms_laplacian : float
-        Root mean square ``h''`` of the Laplacian of the heights: twice the rms mean curvature. [1/m]
-    contact_modulus : float
-        ``E*``. [Pa]
-    work_of_adhesion : float
-        ``w``. [J/m2]
-    attraction_range : float
-        Distance ``z`` over which the surfaces attract each other. [m]
-
-    Returns
-    -------
-    float
-        Ratio ``r``. From 1 on the surfaces stick without a load. For smaller ratios a load makes :math:`1 / (1 - r)`
-        times the contact area without adhesion. [-]
-
-    Notes
-    -----
-    A spot of diameter :math:`d = 4 h' / h''` is surrounded by a rim of width :math:`d\,(3 z / 4 h' d)^{2/3}`, in which
-    the gap is below ``z``. The attraction in the rim is ``w / z``, and the mean pressure in the spot is
-    :math:`h' E^* / 2`. The ratio of the two forces is
-
-    .. math::
-        r = \pi \left(\tfrac{3}{16}\right)^{2/3} \frac{2 w}{h' E^* z} \left(\frac{4 z}{h' d}\right)^{2/3} .
-
-    The ratio applies if the attraction does not change the shape of the spots (DMT): for Tabor parameters below one.
-
-    References
-    ----------
-    .. [1] L. Pastewka, M. O. Robbins, PNAS 111 (2014) 3298, eq. (10).
-
-    Examples
-    --------
-    >>> round(rough_attraction(0.1, 1e8, 1e11, 0.05), 3)  # h' / h'' = 1 nm: a stiff surface, rough to the atoms
-    0.071
-    """
-    width = (rms_laplacian * attraction_range / rms_slope**2) ** (2 / 3)
-    pulled = 2 * work_of_adhesion / (rms_slope * contact_modulus * attraction_range)
-    return math.pi * (3 / 16) ** (2 / 3) * pulled * width
-
-
 def conformal_energy(roughness: float, contact_modulus: float) -> float:
     r"""Return the elastic energy per area of a half-space that follows a rough surface everywhere.
 
@@ -253,76 +142,6 @@ def periodic_relief(pressure: Array, cells: tuple[float, float], sheet: Sheet) -
     power[:, 1 : (ny + 1) // 2] *= 2  # conjugates are not stored
     lost = power * 2 / q * complement(q * sheet.thickness, sheet.poisson, sheet.base)
     return float(lost.sum() / (nx * ny * pressure.sum()))
-
-
-def half_space_excess(first: float) -> float:
-    r"""Return the relative excess of the approach on a half-space over the approach on the real sheet, at one load.
-
-    Parameters
-    ----------
-    first : float
-        Reduction ``e`` of the approach by the base over the approach on a half-space, to first order: :math:`C F \int_0
-        ^\infty (1 - S)\,\mathrm ds / \pi h \delta` for a contact much smaller than the thickness ``h``. The integral is
-        1.7702 on a bonded sheet with Poisson's ratio 1/2, and 1.1676 on a slipping sheet of any Poisson's ratio. [-]
-
-    Returns
-    -------
-    float
-        :math:`e / (1 + e)`, over the approach on the half-space: equal to ``e`` to first order, and never more than
-        one. For spheres it is within 25 % of the solution of the Fredholm equation, up to contact radii of two
-        thicknesses. [-]
-    """
-    return first / (1 + first)
-
-
-def half_space_shortfall(first: float) -> float:
-    r"""Return the relative shortfall of the force on a half-space from the force on the real sheet, at one approach.
-
-    Parameters
-    ----------
-    first : float
-        As for :func:`half_space_excess`; the contact is treated as the contact of a paraboloid. [-]
-
-    Returns
-    -------
-    float
-        :math:`1 - F / F_{sheet}` at the same approach. [-]
-
-    Notes
-    -----
-    The force on the sheet is :math:`F (1 + 1.5 e + 2.27 e^2 + 3 e^3)`. The first coefficient is exact for a sphere; the
-    others are fitted to the Fredholm equation of a sphere on bonded and slipping sheets. Up to an approach of
-    :math:`h^2/R` the shortfall is within 7 % of the solution of this equation.
-    """
-    return 1 - 1 / (1 + 1.5 * first + 2.27 * first**2 + 3 * first**3)
-
-
-def dundurs_coupling(compliances: Sequence[float], poissons: Sequence[float]) -> float:
-    r"""Return Dundurs' second constant, which couples tangential displacements of an interface to the pressure.
-
-    Parameters
-    ----------
-    compliances : sequence of float
-        Contact compliance of each deformable body, one or two. [1/Pa]
-    poissons : sequence of float
-        Poisson's ratio of each. [-]
-
-    Returns
-    -------
-    float
-        :math:`|\beta|`; :math:`(1 - 2\nu)/(2 - 2\nu)` for one body under a rigid body. [-]
-
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 5.4.
-
-    Examples
-    --------
-    >>> dundurs_coupling([1e-6], [0.25]), dundurs_coupling([1e-6, 1e-6], [0.3, 0.3])
-    (0.3333333333333333, 0.0)
-    """
-    shares = [c * (1 - 2 * nu) / (2 - 2 * nu) for c, nu in zip(compliances, poissons, strict=True)]
-    return abs(shares[0] - sum(shares[1:])) / sum(compliances)
 
 
 def radiation_lag(radius: float, shear_modulus: float, density: float) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables.histories import history
-from roughvisc.topography.borders import is_analytic
+from roughvisc.topography.borders import is_analytic, recipe_name
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Relative rounding of loads, areas and wavelengths.
+#: Relative rounding of loads and areas.
 _ROUNDING = 1e-9
-#: Largest part of the mean square slope below the shortest wavelength of a recipe, for heights that the recipe made.
-_SHORTER = 1e-6
+#: Margin of the shortest wavelength of a recipe.
+_JUST_BELOW = 0.99
 
 
 class NotKnown(Exception):
@@ -111,31 +111,15 @@ class Scene:
         """Whether the surface has no roughness: a smooth recipe, or wavelengths above a quarter of the shorter side."""
         return is_analytic(self.period) or self.waves[2] > min(self.sides) / 2
 
-    @cached_property
-    def stated_wave(self) -> tuple[float, float] | None:
-        """Shortest wavelength of the recipe [m], and cells per wavelength, along the axis with the fewest cells.
-
-        None if the recipe states no wavelength, or conditioning has added shorter wavelengths to the heights.
-        """
-        try:
-            recipe = json.loads(self.dataset["height"].attrs["recipe"])
-            made = recipe["parameters"]
-            if recipe["name"] == "wavy":
-                waves = [made["wavelength"], made["wavelength"] if made["waves"] == 2 else math.inf]
-            else:  # self_affine; other recipes have no such parameters
-                stretch = math.sqrt(made["anisotropy"])
-                waves = [made["shortcut"] * stretch, made["shortcut"] / stretch]
-        except (KeyError, TypeError, ValueError):
-            return None
-        z = self.period.values
-        if not is_analytic(self.period):
-            q_x, q_y, power, count = modes(z - z.mean(), self.cells)
-            squares = count * (q_x**2 + q_y**2) * power
-            beyond = np.hypot(q_x * waves[0], q_y * waves[1]) > 2 * np.pi * (1 + _ROUNDING)
-            if not squares[beyond].sum() <= _SHORTER * squares.sum():  # NaN if points are missing
-                return None
-        cells, wave = min((wave / side, wave) for side, wave in zip(self.cells, waves, strict=True))
-        return wave, cells
+    @property
+    def is_complete(self) -> bool:
+        """Whether the grid holds all waves: of an analytic recipe, or of one that states its shortest wavelength."""
+        if is_analytic(self.period) or recipe_name(self.period) != "self_affine":
+            return is_analytic(self.period)
+        made = json.loads(self.height.attrs["recipe"])["parameters"]
+        shortest = made["shortcut"] / math.sqrt(made["anisotropy"])
+        # conditioning may have added shorter waves
+        return bool(shortest > 2 * max(self.cells) and self.waves[2] / 2 > _JUST_BELOW * shortest)
 
     @cached_property
     def loaded_slope(self) -> float:
@@ -183,12 +167,7 @@ class Scene:
         """Half the longer side of the contact in free space, otherwise half the longer side of the surface. [m]"""
         if self.boundary != "free":
             return max(self.sides) / 2
-        if not self.fullest["contact_area"] > 0:
-            raise NotKnown("The result has no contact.")
-        try:
-            spans = [np.ptp(at) + 1 for at in np.nonzero(self.pressure)]
-        except NotKnown:  # no field of the pressure
-            return math.sqrt(float(self.fullest["contact_area"]) / math.pi)
+        spans = [np.ptp(at) + 1 for at in np.nonzero(self.pressure)]
         return max(count * side for count, side in zip(spans, self.cells, strict=True)) / 2
 
     @property
@@ -245,19 +224,3 @@ class Scene:
         if not self.facts["compliance_at_end"] > 0:
             raise NotKnown("The body does not deform by the end of the program.")
         return float(self.facts["compliance_at_end"])
-
-    @cached_property
-    def bodies(self) -> list[tuple[float, float, float]]:
-        """Early and late contact compliance [1/Pa] and Poisson's ratio [-] of one or two bodies.
-
-        Empty if a ratio is not known or changes in time.
-        """
-        if "poisson" in self.facts:
-            return [(float(self.facts["compliance_at_once"]), self.late, float(self.facts["poisson"]))]
-        materials = [] if self.case is None else self.case.materials
-        if any(one.stands_for for one in materials):
-            return []
-        return [
-            (float(one.contact_compliance(0.0)), float(one.contact_compliance(self.creep_time)), float(one.poisson))
-            for one in materials
-        ]

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from references import sticking_stiffness
 from support import BALL, refused
 
 import roughvisc as rv
@@ -52,14 +51,11 @@ def test_limits__ascend_and_have_a_source():
 
 
 def test_limits_of_adhesion__are_contact_areas_of_jkr():
+    """The load that presses a sphere without adhesion to the same radius: Johnson, Kendall, Roberts (1971)."""
     for name, area in (("doubtful", 1.1), ("broken", 2.0)):
-        grown = float(effects.adhesive_load(1.0, getattr(LIMITS["adhesion"], name))) ** (2 / 3)
-        assert grown == pytest.approx(area, abs=0.02)
-
-
-def test_limit_of_coupling__is_a_punch_that_sticks():
-    assert effects.dundurs_coupling([1.0], [0.0]) == LIMITS["coupling"].doubtful
-    assert sticking_stiffness(0.0) == pytest.approx(1.1, abs=0.01)
+        pull_off = getattr(LIMITS["adhesion"], name)
+        load = 1 + 2 * pull_off + 2 * math.sqrt(pull_off + pull_off**2)
+        assert load ** (2 / 3) == pytest.approx(area, abs=0.02)
 
 
 def test_limit_of_yielding__is_a_mean_pressure_of_hertz():
@@ -93,26 +89,11 @@ def test_adhesion__of_a_stiff_sphere_is_its_pull_off_force_by_dmt():
     assert found.number == pytest.approx(2 * math.pi * 1e-3 * 1e-8 / 5e-11, rel=2e-3)
 
 
-def test_adhesion__of_a_flat_punch_is_by_kendall():
-    ds = rv.simulate(rv.flat_punch(2e-4, 5e-4, 32), RUBBER, rv.Program().load(1e-3, over=1.0), **QUICK)
-    a = math.sqrt(float(ds.contact_area[-1]) / math.pi)
-    found = rv.audit(ds, work_of_adhesion=1e-6)["adhesion"]
-    assert found.number == pytest.approx(effects.punch_pull_off(a, MODULUS, 1e-6) / 1e-3, rel=1e-9)
-
-
 def test_stickiness__of_a_smooth_soft_gel_is_broken():
     heights = rv.self_affine((2e-5, 2e-5), 48, hurst=0.8, rms_height=5e-8, rolloff=1e-5, shortcut=2e-6, seed=1)
     gel = rv.simulate(heights, rv.elastic(2.5e3), rv.Program().pressure(20.0, over=1.0), boundary="periodic", **QUICK)
     found = rv.audit(gel, work_of_adhesion="50 mJ/m^2")
     assert (found["stickiness"].verdict, found["adhesion"].verdict) == ("broken", "broken")
-
-
-def test_stickiness__of_stiff_roughness_is_that_of_pastewka_and_robbins():
-    heights = rv.self_affine((1e-7, 1e-7), 48, hurst=0.8, rms_slope=0.1, rolloff=5e-8, shortcut=8e-9, seed=1)
-    stiff = rv.simulate(heights, rv.elastic(4e10), rv.Program().pressure(1e8, over=1.0), boundary="periodic", **QUICK)
-    measures = rv.parameters(heights, periodic=True)
-    expected = effects.rough_attraction(float(measures.Sdq), 2 * float(measures.rms_curvature), 1.6e11, 0.01, 3e-10)
-    assert rv.audit(stiff, work_of_adhesion=0.01)["stickiness"].number == pytest.approx(expected, rel=1e-3)
 
 
 def test_stickiness__of_a_wave_is_its_energy_of_full_contact():
@@ -128,16 +109,15 @@ def test_stickiness__of_a_wave_is_its_energy_of_full_contact():
 
 @pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.4, "bonded"), (0.5, "bonded"), (0.3, "slipping")])
 @pytest.mark.parametrize("width", [0.5, *(pytest.param(one, marks=pytest.mark.long) for one in (0.1, 0.8))])
-def test_thickness__predicts_the_force_on_the_sheet(poisson, base, width):
+def test_thickness__predicts_the_approach_on_the_sheet(poisson, base, width):
     """Run with and without the sheet, over contact radii of 0.1 to 0.8 thicknesses."""
     a = 2e-4
-    load = 4 * 2e6 / (1 - poisson) * a**3 / (3 * RADIUS)
+    program = rv.Program().load(4 * 2e6 / (1 - poisson) * a**3 / (3 * RADIUS), over=1.0)
     heights, material = rv.sphere(RADIUS, 5.2e-4, 26), rv.elastic(1e6, poisson)
-    half_space = rv.simulate(heights, material, rv.Program().load(load, over=1.0), **QUICK)
-    as_deep = rv.Program().approach(float(half_space.approach[-1]), over=1.0)
-    sheet = rv.simulate(heights, rv.sheet(material, a / width, base), as_deep, **QUICK)
+    half_space = rv.simulate(heights, material, program, **QUICK)
+    sheet = rv.simulate(heights, rv.sheet(material, a / width, base), program, **QUICK)
     found = rv.audit(half_space, thickness=a / width, base=base)["thickness"]
-    assert found.number == pytest.approx(1 - float(half_space.force[-1] / sheet.force[-1]), rel=0.05)
+    assert found.number == pytest.approx(1 - float(sheet.approach[-1] / half_space.approach[-1]), rel=0.25)
     assert rv.audit(sheet)["thickness"].verdict == "holds"
     assert rv.audit(sheet, thickness=2 * a / width)["thickness"].verdict == "not known", (
         "the result is for another sheet"
@@ -189,18 +169,6 @@ def test_inertia__is_by_waves_over_the_program(ball):
 )
 def test_time_scale__is_that_of_the_fastest_change(program, scale):
     assert program.time_scale == pytest.approx(scale, rel=1e-12)
-
-
-def test_coupling__is_dundurs_constant_of_one_body_or_two(tmp_path):
-    heights, program = rv.sphere(RADIUS, 4e-4, 16), rv.Program().load(1e-4, over=1.0)
-    one = rv.simulate(heights, rv.elastic(1e6, 0.3), program, **QUICK)
-    assert rv.audit(one)["coupling"].number == pytest.approx(0.4 / 1.4, rel=1e-12)
-    body = '{ model = "elastic", shear_modulus = 1e6, poisson = 0.3 }'
-    head, rest = BALL.split("[material]")
-    table = f'[material]\nmodel = "pair"\na = {body}\nb = {body}\n[[program]]{rest.split("[[program]]", 1)[1]}'
-    (tmp_path / "study.toml").write_text(head + table)
-    with open_result(run_case(read_study(tmp_path / "study.toml"), tmp_path)) as ds:
-        assert rv.audit(ds)["coupling"].number == 0
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -292,34 +260,13 @@ def test_resolution__of_a_measured_ball_is_that_of_its_form(ball):
     assert "stickiness" not in [one.name for one in found]
 
 
-@pytest.mark.parametrize(
-    ("cells", "verdict"), [(None, "broken"), (3.9, "broken"), (4, "doubtful"), (7.9, "doubtful"), (8, "holds")]
-)
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_resolution__of_a_generated_surface_is_by_cells_in_its_shortest_wave(cells, verdict, boundary):
-    found = rv.audit(pressed(generated(cells and cells * 1e-5), boundary))["resolution"]
-    assert found.verdict == verdict
-    assert found.number == pytest.approx(1 / (cells or 2), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("heights", "number"),
-    [
-        (generated(1.2e-4, anisotropy=4.0), 1 / 6),  # 12 cells on average are 24 along x and 6 along y
-        (rv.wavy(1e-6, 1e-4, (3e-4, 2e-4), (15, 6), waves=1), 1 / 5),
-        (rv.wavy(1e-6, 1e-4, (3e-4, 2e-4), (15, 6), waves=2), 1 / 3),
-    ],
-)
-def test_resolution__is_along_the_axis_of_the_fewest_cells(heights, number):
-    assert rv.audit(pressed(heights))["resolution"].number == pytest.approx(number, rel=1e-12)
-
-
 def test_resolution__of_heights_that_are_no_longer_the_recipe_s_is_by_the_last_octave():
     surface = generated(8e-5)
     noise = 1e-7 * np.random.default_rng(1).standard_normal(surface.shape)
     for other in (surface.copy(data=surface.values + noise), surface.isel(x=slice(0, 31))):
         assert "recipe" in other.attrs
-        assert rv.audit(pressed(other))["resolution"].limit is LIMITS["resolution"]
+        assert rv.audit(pressed(other))["resolution"].number > 0.01
+    assert rv.audit(pressed(surface))["resolution"].number == 0
 
 
 def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
@@ -338,7 +285,7 @@ def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
 
 
 def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
-    usual = [name for name in LIMITS if name not in ("heating", "resolution (stated)")]
+    usual = [name for name in LIMITS if name != "heating"]
     assert [one.name for one in rv.audit(rough)] == usual
     assert [one.name for one in rv.audit(ball)] == [name for name in usual if name not in ("stickiness", "border")]
 
@@ -383,9 +330,8 @@ def test_audit__takes_units_and_shows_a_table(ball):
     two = rv.audit(ball, work_of_adhesion=0.05, yield_strength=4e7, thickness=1e-3, density=1100)
     assert repr(one) == repr(two)
     lines = repr(one).splitlines()
-    assert len(one.findings) == 8
-    assert [line.split()[0] for line in lines if line[:1].strip()][-8:] == [finding.name.split()[0] for finding in one]
-    assert one.to_dataset().verdict.sel(assumption="adhesion") == one["adhesion"].verdict
+    assert len(one.findings) == 7
+    assert [line.split()[0] for line in lines if line[:1].strip()][-7:] == [finding.name.split()[0] for finding in one]
 
 
 AUDITED = BALL + '[audit]\nwork_of_adhesion = "50 mJ/m^2"\nthickness = "0.6 mm"\n'

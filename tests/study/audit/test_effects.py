@@ -5,12 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from references import OnSheet, Paraboloid
 from scipy import special
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from roughvisc.mechanics import closed_forms as cf
 from roughvisc.mechanics.sheet import Sheet, complement
 from roughvisc.study.audit import effects
 
@@ -54,45 +52,12 @@ def test_pull_off__between_the_limits_is_that_of_maugis(parameter):
     assert found == pytest.approx(-min(forces), rel=1.7e-2)
 
 
-def test_adhesive_load__presses_a_sphere_to_the_radius_of_jkr():
-    radius, modulus, w, force = 1e-2, 3e6, 0.05, 0.02
-    load = float(effects.adhesive_load(force, effects.pull_off_force(radius, w)))
-    a = cf.hertz(radius, modulus, load).radius
-    assert jkr_force(a, radius, modulus, w) == pytest.approx(force, rel=1e-12)
-
-
 def test_tabor_parameter__is_the_height_of_the_neck_over_the_range():
     """With (R w^2 / E*^2)^(1/3), of a rubber ball of a centimetre some micrometres."""
     radius, modulus, w = 1e-2, 1e6, 0.1
     neck = (radius * w**2 / modulus**2) ** (1 / 3)
     assert effects.tabor_parameter(radius, modulus, w, neck) == pytest.approx(1.0, rel=1e-14)
     assert effects.tabor_parameter(8 * radius, modulus, w, neck) == pytest.approx(2.0, rel=1e-14)
-
-
-def test_punch_pull_off__is_that_of_the_energy():
-    """Griffith: the energy F^2 / 4 a E* falls with the radius by 2 pi a w (Maugis 2000)."""
-    a, modulus, w = 2e-3, 5e6, 0.05
-    force = effects.punch_pull_off(a, modulus, w)
-    step = 1e-6 * a
-    energies = [force**2 / (4 * (a + side) * modulus) for side in (-step, step)]
-    assert (energies[0] - energies[1]) / (2 * step) == pytest.approx(2 * math.pi * a * w, rel=1e-8)
-
-
-def test_rough_attraction__is_that_of_rims_around_spots():
-    """The gap beside a cylinder of the curvature h'' / 2 whose contact is d wide, by the closed form of Hertz."""
-    slope, laplacian, modulus, w, reach = 0.1, 1e5, 1e9, 0.05, 1e-13
-    d = 4 * slope / laplacian
-    a, curvature = d / 2, laplacian / 2
-
-    def gap(s):
-        return curvature * quad(lambda t: math.sqrt(t * (t + 2 * a)), 0, s, epsabs=0)[0]  # sqrt(x^2 - a^2), x = a + t
-
-    rim = brentq(lambda s: gap(s) / reach - 1, 1e-9 * d, 0.1 * d, xtol=1e-12 * d)
-    attraction = math.pi * d * rim * w / reach  # around a spot whose perimeter is pi d ...
-    repulsion = d**2 * slope * modulus / 2  # ... for an area d^2: the perimeter is pi over d times the area
-    assert effects.rough_attraction(slope, laplacian, modulus, w, reach) == pytest.approx(
-        attraction / repulsion, rel=1e-4
-    )
 
 
 def test_conformal_energy__is_half_the_work_of_the_pressure_that_flattens_a_wave():
@@ -103,35 +68,11 @@ def test_conformal_energy__is_half_the_work_of_the_pressure_that_flattens_a_wave
     assert effects.conformal_energy(k * a**2 / 2, modulus) == pytest.approx(work, rel=1e-12)
 
 
-@pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.4, "bonded"), (0.5, "bonded"), (0.5, "slipping")])
-def test_half_space_excess__is_near_the_fredholm_equation(poisson, base):
-    ball, sheet = Paraboloid(1.0), Sheet(1e-2, poisson, base)
-    for a in (2e-4, 1e-3, 5e-3, 1e-2, 2e-2):
-        force, approach = float(ball.scaled_force(a)), float(ball.reduced(a))
-        there = OnSheet(ball, sheet)
-        true = 1 - float(there.reduced(there.radius_at_scaled_force(force))) / approach
-        found = effects.half_space_excess(sheet.relief * force / approach)
-        assert 0.75 * true < found < 1.25 * true
-        if a < 1e-3:
-            assert found == pytest.approx(true, rel=0.03)
-
-
 def test_relief__has_the_integrals_that_are_stated():
     for base, expected in (("bonded", 1.7702), ("slipping", 1.16758)):
         integral = quad(lambda s, base=base: float(complement(s, 0.5, base)), 0, 40)[0]
         assert integral == pytest.approx(expected, abs=5e-5)
         assert Sheet(1.0, 0.5, base).relief == pytest.approx(expected / math.pi, rel=1e-4)
-
-
-def test_dundurs_coupling__of_a_rigid_partner_and_of_like_bodies():
-    assert effects.dundurs_coupling([2e-6], [0.3]) == pytest.approx(0.4 / 1.4, rel=1e-14)
-    assert effects.dundurs_coupling([2e-6, 1e-20], [0.3, 0.2]) == pytest.approx(0.4 / 1.4, rel=1e-12)
-    assert effects.dundurs_coupling([2e-6, 2e-6], [0.3, 0.3]) == 0
-    # Johnson (1985), eq. (5.3): ((1-2v1)/G1 - (1-2v2)/G2) / ((1-v1)/G1 + (1-v2)/G2) / 2
-    (g1, v1), (g2, v2) = (1e6, 0.4), (3e6, 0.25)
-    johnson = ((1 - 2 * v1) / g1 - (1 - 2 * v2) / g2) / ((1 - v1) / g1 + (1 - v2) / g2) / 2
-    compliances = [(1 - v) / (2 * g) for g, v in ((g1, v1), (g2, v2))]
-    assert effects.dundurs_coupling(compliances, [v1, v2]) == pytest.approx(abs(johnson), rel=1e-12)
 
 
 def moving_compliance(speed, shear, density, poisson):
@@ -194,13 +135,3 @@ def test_flash_temperature__has_both_limits_of_jaeger():
     fast = 2 * 1e5 * behind / math.sqrt(math.pi * 0.2 * 1.8e6)
     assert effects.flash_temperature(1e5, 1e-5, 1e3, 0.2, 1.8e6) == pytest.approx(fast, rel=1e-3)
     assert effects.flash_temperature(0.0, 1e-5, 1.0, 0.2, 1.8e6) == 0
-
-
-@pytest.mark.parametrize(("poisson", "base"), [(0.5, "bonded"), (0.2, "bonded"), (0.3, "slipping")])
-@pytest.mark.parametrize("depth", [0.1, 0.3, 0.5, 1.0])
-def test_half_space_shortfall__agrees_with_the_fredholm_equation(poisson, base, depth):
-    ball, sheet = Paraboloid(1.0), Sheet(1.0, poisson, base)
-    on_sheet, approach = OnSheet(ball, sheet), depth**2
-    force, actual = (float(one.scaled_force(one.radius_at_approach(approach))) for one in (ball, on_sheet))
-    found = effects.half_space_shortfall(sheet.relief * force / approach)
-    assert found == pytest.approx(1 - force / actual, rel=0.07)
