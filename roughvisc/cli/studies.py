@@ -168,7 +168,6 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     from roughvisc.study.execution.run import REFUSED
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.folder import LOG
-    from roughvisc.study.storage.index import index_of
     from roughvisc.study.storage.results_table import CASES, realisations_table
     from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
 
@@ -177,7 +176,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
-    if len(drawn := realisations_table(index_of(folder), listed)):
+    if len(drawn := realisations_table(rv.to_table(folder))):
         console.print(realisations_tables(drawn))
     say_path(console, "Results", folder)
     for what, name in (("Table of cases", CASES), ("Log", LOG)):

@@ -26,9 +26,8 @@ from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
-from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import realisations_table
+from roughvisc.study.storage.results_table import realisations_table, to_table
 from roughvisc.study.storage.sweep_data import number_by_key, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
@@ -84,7 +83,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             raise no_results(folder)
         numbers = number_by_key(cases)
         sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
-        page["realisations"] = realisation_rows(realisations_table(index_of(folder), cases))
+        page["realisations"] = realisation_rows(realisations_table(to_table(folder)))
         if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
     else:

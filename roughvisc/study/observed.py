@@ -15,10 +15,8 @@ from roughvisc.observables import study_observables
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import lock_case, lock_path, require_writable, result_path
-from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result, write_result
 from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_data import sweep_cases
 
 log = logging.getLogger("roughvisc")
 
@@ -68,7 +66,7 @@ def observe(
         if path.exists() and _add(case, path):
             added.append(path)
     if added and len(cases) > 1:
-        write_table(folder, index_of(folder), sweep_cases(cases))
+        write_table(folder)
     return added
 
 

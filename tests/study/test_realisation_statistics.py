@@ -12,10 +12,9 @@ from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.realisations import over_realisations
-from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.results_table import realisations_table, to_table
-from roughvisc.study.storage.sweep_data import open_results, read_sweep
+from roughvisc.study.storage.sweep_data import open_results
 
 
 def of(values, **coords):
@@ -130,7 +129,7 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
     assert table["realisation"].tolist() == [1, 2, 3] * 2
     assert table.index.tolist() == [0, 0, 0, 1, 1, 1]
     area = over_realisations(again["contact_area"]).isel(time=-1)
-    told = realisations_table(index_of(out), read_sweep(out)).set_index(["quantity", "program.0.pressure [kPa]"])
+    told = realisations_table(table).set_index(["quantity", "program.0.pressure [kPa]"])
     assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
     for number, pressure in enumerate((10, 20)):
         row = told.loc["contact_area", pressure]

@@ -299,4 +299,4 @@ class Record:
                     record_path(self.folder, key).unlink(missing_ok=True)
                 if outcome.entry is None:
                     self._outcomes[key] = outcome_of(index[key], reused=True)
-        write_table(self.folder, index, self._listed)
+        write_table(self.folder)

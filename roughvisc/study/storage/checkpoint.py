@@ -21,14 +21,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from xarray.backends import BackendArray
-from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
 
 from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.case import NUMERICS_REVISION
 from roughvisc.study.storage.folder import atomic_write
+from roughvisc.study.storage.netcdf import lazy
 from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
@@ -92,7 +91,15 @@ class CheckpointWriter(Recorder):
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows as a lazy array (rows, x, y)."""
-        return LazilyIndexedArray(_Frames(self, name, rows, shape))
+
+        def read(key: tuple[Any, ...]) -> Array:
+            chosen = np.array(rows, int)[key[0]]
+            frames = np.empty((chosen.size, *shape))
+            for frame, row in zip(frames, chosen.flat, strict=True):
+                frame[...] = self.array(int(row), name)
+            return frames[(slice(None), *key[1:])] if chosen.ndim else frames[(0, *key[1:])]
+
+        return lazy(read, (len(rows), *shape))
 
     def array(self, row: int, name: str) -> Array:
         """Return a field of one row."""
@@ -188,28 +195,6 @@ class CheckpointWriter(Recorder):
 
     def _rows_path(self, number: int) -> Path:
         return self._folder / f"rows-{number:04d}.npz"
-
-
-class _Frames(BackendArray):
-    """Lazy array (rows, x, y) of a field of some rows of a recorder."""
-
-    dtype = np.dtype(float)
-
-    def __init__(self, recorder: CheckpointWriter, name: str, rows: Sequence[int], shape: tuple[int, int]) -> None:
-        self._recorder, self._name, self._rows = recorder, name, np.array(rows, int)
-        self.shape = (len(rows), *shape)
-
-    def __getitem__(self, key: Any) -> Any:
-        return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)
-
-    def _read(self, key: tuple[Any, ...]) -> Any:
-        rows = self._rows[key[0]]
-        if rows.ndim == 0:
-            return self._recorder.array(int(rows), self._name)[key[1:]]
-        read = np.empty((rows.size, *self.shape[1:]))
-        for frame, row in zip(read, rows, strict=True):
-            frame[...] = self._recorder.array(int(row), self._name)
-        return read[(slice(None), *key[1:])]
 
 
 def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:

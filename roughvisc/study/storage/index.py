@@ -18,7 +18,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import netCDF4
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,19 +30,16 @@ from roughvisc.study.storage.folder import (
     lock_case,
     lock_path,
     read_json,
-    require_file,
     require_folder,
     result_files,
     result_path,
     warn_once,
     write_json,
 )
-from roughvisc.study.storage.netcdf import ERRORS, NETCDF, foreign, open_result, unreadable
-from roughvisc.variables import ROW, STEP, VARIABLES, axis_of
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.variables import axis_of
 
 INDEX = ".index.json.gz"
-#: Variables over one dimension: histories over the rows, coordinates of the rows and of the cells.
-_ARRAYS = ("x", "y", *(name for name, variable in VARIABLES.items() if variable.dims in ((ROW,), (STEP,))))
 #: Names of results are their keys.
 _KEY = re.compile(r"[0-9a-f]{16}")
 #: Hidden files of a case: its lock, its checkpoint, and incomplete files.
@@ -60,7 +56,7 @@ class Entry:
     ----------
     file : str
         Name of the file in the folder.
-    stamp : tuple of int
+    stamp : list of int
         Size of the file [bytes] and time of its last change [ns].
     attributes : dict
         Attributes of the file that are text or numbers.
@@ -71,7 +67,7 @@ class Entry:
     """
 
     file: str
-    stamp: tuple[int, int]
+    stamp: list[int]
     attributes: dict[str, Any]
     fields: dict[str, str]
     arrays: dict[str, NDArray[Any]] = field(repr=False)
@@ -79,7 +75,7 @@ class Entry:
     @property
     def key(self) -> str:
         """Key of the case."""
-        return str(self.attributes.get("case_key", Path(self.file).stem))
+        return str(self.attributes.get("case_key", ""))
 
     @property
     def along(self) -> str:
@@ -105,30 +101,21 @@ def read_entry(path: Path) -> Entry:
     InputError
         If the file cannot be read, is not a result, or is damaged.
     """
-    require_file(path)
-    stamp = _stamp(path)
-    try:
-        with NETCDF, netCDF4.Dataset(path) as file:  # in half the time of open_result
-            file.set_auto_maskandscale(False)
-            stored = file.variables
-            attributes = {
-                name: one.item() if isinstance(one, np.generic) else one for name, one in file.__dict__.items()
-            }
-            found = foreign(attributes, {name: one.dimensions for name, one in stored.items()})
-            arrays = {name: stored[name][...] for name in _ARRAYS if name in stored}
-            fields = {name: one.dtype.str for name, one in stored.items() if one.dimensions[-2:] == ("x", "y")}
-    except ERRORS as error:
-        raise unreadable(path, error) from error
-    absent = [name for name in ("force", "x", "y", "case") if name not in {**arrays, **attributes}]
-    if found or absent:
-        raise InputError(f"{path}: {found or f'holds no {absent[0]}'}: expected a result of roughvisc run")
-    plain = {name: one for name, one in attributes.items() if isinstance(one, str | int | float)}
+    stamp, arrays, fields = _stamp(path), {}, {}
+    with open_result(path) as result:
+        lines = (axis_of(result.variables),), ("x",), ("y",)
+        for name, variable in result.variables.items():
+            if variable.dims in lines:
+                arrays[str(name)] = variable.values
+            elif variable.dims[-2:] == ("x", "y"):
+                fields[str(name)] = variable.dtype.str
+    plain = {str(name): one for name, one in result.attrs.items() if isinstance(one, str | int | float)}
     return Entry(path.name, stamp, plain, fields, arrays)
 
 
-def _stamp(path: Path) -> tuple[int, int]:
+def _stamp(path: Path) -> list[int]:
     found = path.stat()
-    return found.st_size, found.st_mtime_ns
+    return [found.st_size, found.st_mtime_ns]
 
 
 def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
@@ -149,7 +136,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
         If the folder is absent, or a file.
     """
     require_folder(folder)
-    cached = _read_index(folder)
+    cached = _read_cache(folder)
     before = cached | {entry.file: entry for entry in known}
     entries = {}
     for path in result_files(folder):
@@ -160,8 +147,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
             if entry is None or entry.stamp != _stamp(path):
                 entry = read_entry(path)
             if entry.key != path.stem:
-                expected = "expected the one that its name says"
-                raise InputError(f"{path}: holds the result of case {entry.key}: {expected}")
+                raise InputError(f"{path}: holds the result of case {entry.key}: expected the case of its name")
             entries[entry.key] = entry
         except InputError as error:
             warn_once(str(error))
@@ -170,30 +156,26 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
         results = [
             (
-                entry.file,
-                entry.stamp,
-                entry.attributes,
-                entry.fields,
-                {name: [one.dtype.str, b64encode(one).decode()] for name, one in entry.arrays.items()},
+                one.file,
+                one.stamp,
+                one.attributes,
+                one.fields,
+                {name: (array.dtype.str, b64encode(array).decode()) for name, array in one.arrays.items()},
             )
-            for entry in entries.values()
+            for one in entries.values()
         ]
         write_json(folder / INDEX, {"version": program_version(), "results": results})
     return entries
 
 
-def _read_index(folder: Path) -> dict[str, Entry]:
+def _read_cache(folder: Path) -> dict[str, Entry]:
     """Return the entries of the cache by file name; none if it is absent, damaged or of another version."""
     entries = {}
-    try:
+    with suppress(*DAMAGED):
         stated = read_json(folder / INDEX)
-        for file, stamp, attributes, fields, arrays in (
-            stated["results"] if stated["version"] == program_version() else ()
-        ):
+        for *plain, arrays in stated["results"] if stated["version"] == program_version() else ():
             unpacked = {name: np.frombuffer(b64decode(text), dtype) for name, (dtype, text) in arrays.items()}
-            entries[file] = Entry(file, tuple(stamp), attributes, fields, unpacked)
-    except DAMAGED:
-        return {}
+            entries[plain[0]] = Entry(*plain, unpacked)
     return entries
 
 
@@ -220,35 +202,37 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     """
     folder = Path(folder)
     require_folder(folder)
-    of_cases: dict[str, list[Path]] = {}
     removed: list[Path] = []
 
     def remove(path: Path) -> None:
         with suppress(OSError):  # removed in the meantime, or the folder is not writable
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
             removed.append(path)
 
+    keys: dict[str, None] = {}
     for path in sorted(folder.iterdir()):
-        if matched := _OF_A_CASE.match(path.name):
-            of_cases.setdefault(matched[1], []).append(path)
+        if found := _OF_A_CASE.match(path.name):
+            keys[found[1]] = None
         elif path.match(".*.part*"):
             with suppress(OSError):
-                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                if time.time() - path.stat().st_mtime > _ABANDONED:
                     remove(path)
         elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
             remove(path)
-    for key, paths in of_cases.items():
-        checkpoint, lock = checkpoint_path(folder, key), lock_path(folder, key)
-        if (checkpoint / STATE).exists() and not everything:
-            try:
-                open_result(result_path(folder, key)).close()
-            except InputError:  # the case is not finished
-                paths.remove(checkpoint)
-        if paths:
-            with suppress(OSError), lock_case(lock, patience=0.0):
-                for path in paths:
-                    remove(path) if path != lock else removed.append(lock)
+    for key in keys:
+        lock, checkpoint = lock_path(folder, key), checkpoint_path(folder, key)
+        with suppress(OSError), lock_case(lock, patience=0.0):  # which also removes the lock
+            kept = [lock, *([] if everything or _is_left(checkpoint, result_path(folder, key)) else [checkpoint])]
+            for path in sorted(set(folder.glob(f".{key}.*")) - set(kept)):
+                remove(path)
     return removed
+
+
+def _is_left(checkpoint: Path, result: Path) -> bool:
+    """Return whether a checkpoint is of no use: without a state, or beside a result."""
+    if not (checkpoint / STATE).exists():
+        return True
+    with suppress(InputError):  # the case is not finished
+        open_result(result).close()
+        return True
+    return False

@@ -8,11 +8,11 @@ library holds the lock.
 from __future__ import annotations
 
 import errno
-import json
 import math
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -97,34 +97,13 @@ def open_result(path: str | Path) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except ERRORS as error:
         raise unreadable(path, error) from error
-    if found := foreign(dataset.attrs, {str(name): one.dims for name, one in dataset.variables.items()}):
-        raise unusable(path, found, f"a result of roughvisc of format {RESULT_FORMAT}")
-    return dataset
-
-
-def foreign(attributes: Mapping[str, Any], variables: Mapping[str, tuple[Any, ...]]) -> str:
-    """Return the reason if a file is not a result of this format; empty for a result.
-
-    Parameters
-    ----------
-    attributes : mapping
-        Attributes of the file.
-    variables : mapping
-        Name -> dimensions of its variables.
-    """
-    rows = axis_of(variables)
-    if (stated := attributes.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
-        return f"is of format {stated}"
+    expected, rows = f"a result of roughvisc of format {RESULT_FORMAT}", axis_of(dataset.variables)
+    if (stated := dataset.attrs.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
+        raise unusable(path, f"is of format {stated}", expected)
     for name in AXES[rows].needed:
-        if name not in variables:
-            return f"holds no {name}"
-        if (dims := variables[name]) != (rows,):
-            return f"holds {name} over {', '.join(map(str, dims)) or 'nothing'}"
-    try:
-        case = json.loads(attributes.get("case", "{}"))
-    except (TypeError, ValueError, RecursionError):
-        case = None
-    return "" if isinstance(case, dict) else "has an attribute case that is no case in JSON"
+        if name not in dataset.variables or dataset[name].dims != (rows,):
+            raise unusable(path, f"holds no {name} over {rows}", expected)
+    return dataset
 
 
 class ResultBackend(BackendEntrypoint):
@@ -146,28 +125,49 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
     variables = {}
     for name, stored in file.variables.items():
         lazily = stored.dimensions[-2:] == ("x", "y")
-        data = indexing.LazilyIndexedArray(_Field(path, stored)) if lazily else np.asarray(stored[...])
-        chunking, filters = stored.chunking(), stored.filters() or {}
-        encoding = {name: filters[name] for name in ("zlib", "complevel", "shuffle") if name in filters}
-        encoding |= {"contiguous": True} if chunking == "contiguous" else {"chunksizes": tuple(chunking or ())}
-        variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__, encoding)
+        read = partial(read_variable, path, name)
+        data = (
+            lazy(read, stored.shape, stored.dtype, indexing.IndexingSupport.OUTER)
+            if lazily
+            else np.asarray(stored[...])
+        )
+        variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__)
     decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
     texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
     return decoded.assign_coords(texts)
 
 
-class _Field(BackendArray):
-    """Lazy array of a variable; each reading opens the file, so that threads and processes can share the array."""
+class _Lazy(BackendArray):
+    """Array that a function reads."""
 
-    def __init__(self, path: str, stored: netCDF4.Variable) -> None:
-        self.path, self.name = path, stored.name
-        self.shape, self.dtype = stored.shape, stored.dtype
+    def __init__(
+        self, read: Callable[[Any], Any], shape: tuple[int, ...], dtype: Any, support: indexing.IndexingSupport
+    ) -> None:
+        self.read, self.shape, self.dtype, self.support = read, shape, np.dtype(dtype), support
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
-        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+        return indexing.explicit_indexing_adapter(key, self.shape, self.support, self.read)
 
-    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        return read_variable(self.path, self.name, key)
+
+def lazy(
+    read: Callable[[Any], Any],
+    shape: tuple[int, ...],
+    dtype: Any = float,
+    support: indexing.IndexingSupport = indexing.IndexingSupport.BASIC,
+) -> Any:
+    """Return an array for xarray, parts of which are read when they are needed.
+
+    Parameters
+    ----------
+    read : callable
+        Returns a part for an index, a tuple with a whole number or a slice for each dimension. With ``OUTER`` an index
+        may also contain arrays.
+    shape, dtype
+        Shape and dtype of the whole.
+    support : IndexingSupport
+        What `read` accepts.
+    """
+    return indexing.LazilyIndexedArray(_Lazy(read, shape, dtype, support))
 
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:

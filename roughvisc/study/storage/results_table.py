@@ -68,36 +68,12 @@ def to_table(out: str | Path) -> pd.DataFrame:
     --------
     >>> rv.to_table("results/load_sweep").to_excel("load_sweep.xlsx")  # doctest: +SKIP
     """
+    import pandas as pd
+
     folder = Path(out).absolute()
     index, cases = index_of(folder), read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)
-    return _table(folder, index, cases)
-
-
-def write_table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> None:
-    """Write the table of a sweep as CSV; if writing fails, log a warning.
-
-    Parameters
-    ----------
-    folder : Path
-        Results folder.
-    index : mapping
-        Key -> entry of each result in the folder.
-    cases : sequence of SweepCase
-        Cases of the sweep.
-    """
-    try:
-        with atomic_write(folder / CASES) as temporary:
-            # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
-            _table(folder, index, cases).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
-    except (OSError, InputError) as error:
-        log.warning("%s cannot be written: %s", folder / CASES, error)
-
-
-def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
-    import pandas as pd
-
     cases = cases or [SweepCase(key, entry.case) for key, entry in index.items()]
     stated = [one.case for one in cases]
     numbers, ends = [], []
@@ -121,6 +97,16 @@ def _table(folder: Path, index: Mapping[str, Entry], cases: Sequence[SweepCase])
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)})
     table = table.join(pd.DataFrame(numbers, table.index)).dropna(axis="columns", how="all").join(pd.DataFrame(ends))
     return table.set_index(pd.Index(numbers_of(cases), name="case"))
+
+
+def write_table(folder: Path) -> None:
+    """Write the table of the last sweep in a folder as CSV; if writing fails, log a warning."""
+    try:
+        with atomic_write(folder / CASES) as temporary:
+            # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
+            to_table(folder).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
+    except (OSError, InputError) as error:
+        log.warning("%s cannot be written: %s", folder / CASES, error)
 
 
 def _telling(entry: Entry) -> dict[str, float]:
@@ -150,15 +136,13 @@ def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return columns
 
 
-def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -> pd.DataFrame:
+def realisations_table(table: pd.DataFrame) -> pd.DataFrame:
     """Return mean, scatter and intervals over the realisations of each case, with one row per quantity.
 
     Parameters
     ----------
-    index : mapping
-        Key -> entry of each result in the folder.
-    cases : sequence of SweepCase
-        Cases of the sweep.
+    table : pandas.DataFrame
+        Result of :func:`to_table`.
 
     Returns
     -------
@@ -168,25 +152,20 @@ def realisations_table(index: Mapping[str, Entry], cases: Sequence[SweepCase]) -
     """
     import pandas as pd
 
-    parameters = _parameters([one.case for one in cases])
-    groups: dict[int, list[int]] = {}
-    for place, (case, one) in enumerate(zip(numbers_of(cases), cases, strict=True)):
-        if one.key in index and REALISATION in one.case.get("varied", {}):
-            groups.setdefault(case, []).append(place)
     rows = []
-    for case, places in groups.items():
-        varied = {key: values[places[0]] for key, values in parameters.items() if key not in (REALISATION, *DRAWN)}
-        numbers = [_telling(index[cases[place].key]) for place in places]
-        axis = AXES[index[cases[places[0]].key].along]
-        where = f"largest {axis.telling}" if axis.telling else "end"
+    varied = [name for name in table if "." in name.partition(" [")[0] and name not in DRAWN]
+    telling = AXES["speed" if "speed [m/s]" in table else "time"].telling
+    where = f"largest {telling}" if telling else "end"
+    drawn = table[table[REALISATION].notna()] if REALISATION in table else table[:0]
+    for case, group in drawn.groupby(level="case"):
         for name in variables_in_table("last"):
-            values = np.array([one.get(name, np.nan) for one in numbers])
+            values = group.get(heading(name, VARIABLES[name].units), pd.Series(dtype=float)).to_numpy()
             known = values[np.isfinite(values)]
             if name in AXES or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
                 continue
-            drawn = [cases[place].case["varied"][REALISATION] for place in places]
-            found = over_realisations(xr.DataArray(values, {REALISATION: drawn}, name=name))
-            what = {"case": case, **varied, "quantity": name, "unit": VARIABLES[name].units, "where": where}
+            found = over_realisations(xr.DataArray(values, {REALISATION: group[REALISATION].to_numpy()}, name=name))
+            what = {"case": case, **group[varied].iloc[0]}
+            what |= {"quantity": name, "unit": VARIABLES[name].units, "where": where}
             rows.append(what | {str(key): one.item() for key, one in found.data_vars.items()})
     return pd.DataFrame(rows)
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from xarray.backends import BackendArray
-from xarray.core.indexing import IndexingSupport, LazilyIndexedArray, explicit_indexing_adapter
 
 from roughvisc.errors import InputError
 from roughvisc.labels import label
@@ -21,8 +19,8 @@ from roughvisc.study.case import Case
 from roughvisc.study.si_tables import default_of, unit_of
 from roughvisc.study.storage.folder import DAMAGED, no_results, read_json, warn_once, write_json
 from roughvisc.study.storage.index import Entry, index_of
-from roughvisc.study.storage.netcdf import read_variable
-from roughvisc.study.sweep_table import DRAWN, REALISATION
+from roughvisc.study.storage.netcdf import lazy, read_variable
+from roughvisc.study.sweep_table import DRAWN, REALISATION, value_at
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
 #: File with the cases of the last sweep.
@@ -36,8 +34,7 @@ Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 _BLOCK = 16 << 20
 
 
-@dataclass(frozen=True)
-class SweepCase:
+class SweepCase(NamedTuple):
     """One case of a sweep.
 
     Two cases share a key and a result if they differ only in labels, for example scans with equal bytes.
@@ -64,7 +61,7 @@ def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
 
 def write_sweep(folder: Path, cases: Sequence[SweepCase]) -> None:
     """Write the list of cases of a sweep to its folder; if writing fails, the folder has no list."""
-    write_json(folder / SWEEP, [{"key": one.key, "case": one.case} for one in cases])
+    write_json(folder / SWEEP, cases)
 
 
 def read_sweep(folder: Path) -> list[SweepCase]:
@@ -77,7 +74,7 @@ def read_sweep(folder: Path) -> list[SweepCase]:
     """
     path = folder / SWEEP
     try:
-        return [SweepCase(str(one["key"]), dict(one["case"])) for one in read_json(path)]
+        return [SweepCase(*one) for one in read_json(path)]
     except FileNotFoundError:
         return []
     except DAMAGED as error:
@@ -107,21 +104,13 @@ def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
     """Return the varied parameters of cases in JSON; a case that does not vary one states it, or has its default."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
-    values = [dict(_leaves(case)) | case.get("varied", {}) for case in cases]
-    return {
-        key: _column(
-            [one[key] if key in one else default_of(key, case) for one, case in zip(values, cases, strict=True)]
-        )
-        for key in keys
-    }
+    return {key: _column([_value_of(key, case) for case in cases]) for key in keys}
 
 
-def _leaves(stated: Any, above: str = "") -> Iterable[tuple[str, Any]]:
-    for key, value in stated.items() if isinstance(stated, dict) else enumerate(stated):
-        if isinstance(value, dict) or (isinstance(value, list) and any(isinstance(v, dict) for v in value)):
-            yield from _leaves(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
+def _value_of(key: str, case: Mapping[str, Any]) -> Any:
+    varied = case.get("varied", {})
+    stated = varied[key] if key in varied else value_at(case, key, None)
+    return default_of(key, case) if stated is None else stated
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:
@@ -275,40 +264,32 @@ def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 def _field(folder: Path, entries: Sequence[Entry], name: str) -> xr.Variable:
     """Return a variable over (case, ...) in blocks of one case and some rows, which Dask reads."""
-    frames = _Frames(folder, entries, name)
     dims = ("case", *VARIABLES[name].over(entries[0].along))
-    rows = max(1, _BLOCK // (frames.shape[-2] * frames.shape[-1] * frames.dtype.itemsize))
-    return xr.Variable(dims, LazilyIndexedArray(frames)).chunk({"case": 1} | ({dims[1]: rows} if len(dims) > 3 else {}))
+    counts = [entry.rows for entry in entries]
+    dtype = np.result_type(*(entry.fields[name] for entry in entries))
+    shape = (len(entries), *[max(counts)] * (len(dims) - 3), *(len(entries[0].arrays[axis]) for axis in ("x", "y")))
+    paths = [str(folder / entry.file) for entry in entries]
+    array = lazy(partial(_read_frames, name, paths, counts, shape, dtype), shape, dtype)
+    rows = max(1, _BLOCK // (shape[-2] * shape[-1] * dtype.itemsize))
+    return xr.Variable(dims, array).chunk({"case": 1} | ({dims[1]: rows} if len(dims) > 3 else {}))
 
 
-class _Frames(BackendArray):
-    """Field of several results, read from their files over (case, x, y) or (case, row, x, y), and padded with NaN."""
-
-    def __init__(self, folder: Path, entries: Sequence[Entry], name: str) -> None:
-        self.name, self.paths = name, [str(folder / entry.file) for entry in entries]
-        self.rows = [entry.rows for entry in entries]
-        self.dtype = np.result_type(*(entry.fields[name] for entry in entries))
-        rows = () if VARIABLES[name].dims == ("x", "y") else (max(self.rows),)
-        self.shape = (len(entries), *rows, *(len(entries[0].arrays[axis]) for axis in ("x", "y")))
-
-    def __getitem__(self, key: Any) -> Any:
-        return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self._read)
-
-    def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
-        cases = np.arange(len(self.paths))[key[0]]
-        if cases.ndim:
-            return np.stack([self._read((case, *key[1:])) for case in cases])
-        path = self.paths[cases]
-        if len(self.shape) == 3:
-            return read_variable(path, self.name, key[1:])
-        rows = np.arange(self.shape[1])[key[1]]
-        known = rows < self.rows[cases]
-        if known.all():
-            return read_variable(path, self.name, key[1:])
-        read = np.full((rows.size, *self.shape[2:]), np.nan, self.dtype)[(slice(None), *key[2:])]
-        if known.any():
-            read[known] = read_variable(path, self.name, (rows[known], *key[2:]))
-        return read.reshape(rows.shape + read.shape[1:])
+def _read_frames(
+    name: str, paths: Sequence[str], counts: Sequence[int], shape: tuple[int, ...], dtype: Any, key: tuple[Any, ...]
+) -> NDArray[Any]:
+    """Read a part of a variable over (case, x, y) or (case, row, x, y); rows after the last row of a case are NaN."""
+    cases = np.arange(shape[0])[key[0]]
+    if cases.ndim:
+        parts = [_read_frames(name, paths, counts, shape, dtype, (case, *key[1:])) for case in cases]
+        return np.stack(parts)
+    rows = np.arange(shape[1])[key[1]]
+    known = np.atleast_1d(rows < counts[cases])
+    if len(shape) == 3 or known.all():
+        return read_variable(paths[cases], name, key[1:])
+    read = np.full((known.size, *shape[2:]), np.nan, dtype)[(slice(None), *key[2:])]
+    if known.any():
+        read[known] = read_variable(paths[cases], name, (rows[known], *key[2:]))
+    return read.reshape(rows.shape + read.shape[1:])
 
 
 def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) -> xr.Dataset:
