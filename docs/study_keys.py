@@ -27,7 +27,6 @@ HEAD = ("key", "unit", "default", "meaning")
 _DESCRIBED_BY = {Settings: rv.simulate, SteadySliding: rv.friction, Numerics: Numerics}
 #: Keys that are not arguments of a function: unit, default, meaning.
 _FILE = ("", "none", "a CSV file with columns in place of the lists, relative to the study")
-_COLUMN_UNIT = ("", "that of the heading", "unit of the column, if its heading has none")
 _RECIPE = ("", "required", "the recipe: " + ", ".join(f"`{name}`" for name in RECIPES))
 _MODEL = ("", "required", "the model: " + ", ".join(f"`{name}`" for name in MODELS))
 _CONTROL = ("", "`load`", "what the values are: `load`, `approach` or `pressure`")
@@ -70,7 +69,7 @@ _EXTRA = {
         "table": (
             "",
             "required",
-            "a table, see below; or the path of a CSV file, whose rows are all kept",
+            "a table, see below",
         ),
         "control": _CONTROL,
     },
@@ -88,11 +87,7 @@ _EXTRA = {
         "leakage": ("", "none", "leak rate of a fluid through the gap"),
         "conductance": ("", "none", "conductance of the contact spots"),
     },
-    **{
-        f"material: {model}": {"file": _FILE}
-        | {one.stated: _COLUMN_UNIT for one in columns.values() if one.stated}
-        for model, columns in COLUMNS.items()
-    },
+    **{f"material: {model}": {"file": _FILE} for model in COLUMNS},
 }
 
 

@@ -20,18 +20,10 @@ from roughvisc.units import number
 
 #: Units of equal dimension that differ by 2 pi: never converted.
 FREQUENCY_UNITS = ("rad/s", "Hz")
-_BLANKS = " '\u00a0\u202f"
-_REMOVE_BLANKS = str.maketrans("", "", _BLANKS)
-#: Decimal mark -> pattern of numbers; the other mark, a blank or an apostrophe may separate groups of three digits.
-_NUMBER = {
-    mark: re.compile(
-        rf"[+-]?((\d+|[1-9]\d{{0,2}}(\{other}\d{{3}})+|[1-9]\d{{0,2}}([{_BLANKS}]\d{{3}})+)(\{mark}\d*)?|\{mark}\d+)"
-        r"([eE][+-]?\d+)?"
-    )
-    for mark, other in (".,", ",.")
-}
-#: Pattern of numbers if the separator is a blank: only no-break blanks and apostrophes separate groups of digits.
-_BETWEEN_BLANKS = re.compile(r"[+-]?((\d+|[1-9]\d{0,2}(['\u00a0\u202f]\d{3})+)(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
+#: Pattern of numbers by decimal mark, of numbers with either mark, and of numbers that may have grouped thousands.
+_NUMBER = {mark: re.compile(rf"[+-]?(\d+(\{mark}\d*)?|\{mark}\d+)([eE][+-]?\d+)?") for mark in ".,"}
+_EITHER = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 #: ``name [unit]`` or ``name (unit)``. A unit in square brackets may have parentheses, as in ``1/(Pa s)``.
 _HEADING = re.compile(r"(?P<name>.*?)\s*(\[\s*(?P<square>[^\[\]]*?)\s*\]|\(\s*(?P<round>[^()]*?)\s*\))")
 #: The same pattern if the separator is a blank.
@@ -73,10 +65,10 @@ def decimal_mark(cells: Iterable[str], separator: str) -> str:
     Parameters
     ----------
     cells : iterable of str
-        Cells of the file; those that are not numbers are ignored.
+        Cells of the file; those that are not numbers are ignored. A number with grouped digits, such as ``1.250,5``, is
+        not a number here.
     separator : str
-        Sign between the cells. In a file with commas, ``"1,250"`` in quotation marks may be 1.25 or 1250. With any
-        other separator it is 1.25, unless another number of the file has a decimal point.
+        Sign between the cells. In a file with commas, ``"1,250"`` in quotation marks may be 1.25 or 1250.
 
     Returns
     -------
@@ -90,39 +82,31 @@ def decimal_mark(cells: Iterable[str], separator: str) -> str:
 
     Examples
     --------
-    >>> decimal_mark(["0,5", "1.250,5"], ";"), decimal_mark(["1,250.5", "1,250"], ","), decimal_mark(["1,250"], ";")
+    >>> decimal_mark(["0,5", "1"], ";"), decimal_mark(["1.5"], ","), decimal_mark(["1,250"], ";")
     (',', '.', ',')
     """
-    marked = [cell for cell in cells if "," in cell or "." in cell]
-    if not any("," in cell for cell in marked):
+    cells = list(cells)
+    commas = [cell for cell in cells if "," in cell and plain_number(cell, ",")]
+    if not commas:
         return "."
-    first: dict[str, str] = {}  # possible mark -> the first number with it
-    for cell in marked:
-        point, comma = (plain_number(cell, mark) is not None for mark in ".,")
-        if point != comma:
-            first.setdefault("point" if point else "comma", cell)
-        elif point:
-            first.setdefault("comma or thousands" if "," in cell else "point or thousands", cell)
-    sure = [first[mark] for mark in ("comma", "point") if mark in first]
-    told = sure or list(first.values())
-    if len(told) == 2:
-        raise InputError(f"holds {told[0]!r} and {told[1]!r}: expected one decimal mark")
-    if not sure and "comma or thousands" in first and separator == ",":
-        raise InputError(f"holds {told[0]!r}, which may have a decimal comma or be thousands: expected a decimal point")
-    return "," if "comma" in first or (not sure and "comma or thousands" in first) else "."
+    for cell in cells:
+        if "." in cell and plain_number(cell, "."):
+            raise InputError(f"holds {commas[0]!r} and {cell!r}: expected one decimal mark")
+    if separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
+        ambiguous = f"holds {commas[0]!r}, which may have a decimal comma or be thousands"
+        raise InputError(f"{ambiguous}: expected a decimal point")
+    return ","
 
 
 def plain_number(cell: str, mark: str) -> str | None:
-    """Return a number in the notation of Python, without grouped digits, or None if the text is not a number.
+    """Return a number in the notation of Python, or None if the text is not a number with this decimal mark.
 
     Examples
     --------
-    >>> plain_number("1.250,5", ","), plain_number("12.5", ","), plain_number("1,250,000", ".")
-    ('1250.5', None, '1250000')
+    >>> plain_number("1250,5", ","), plain_number("12.5", ","), plain_number("1,250.5", ".")
+    ('1250.5', None, None)
     """
-    if not _NUMBER[mark].fullmatch(cell):
-        return None
-    return cell.translate(_REMOVE_BLANKS).replace("," if mark == "." else ".", "").replace(mark, ".")
+    return cell.replace(mark, ".") if _NUMBER[mark].fullmatch(cell) else None
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
@@ -143,18 +127,15 @@ class Wanted(NamedTuple):
     Attributes
     ----------
     name : str
-        Name in the heading, in upper or lower case; it may include the unit.
+        Name in the heading, in upper or lower case; it may include the unit, for a heading that has none.
     unit : str
         Unit of the result.
-    stated : str, optional
-        Unit of the column if the heading has none.
     optional : bool
         Whether the column may be absent.
     """
 
     name: str
     unit: str
-    stated: str | None = None
     optional: bool = False
 
 
@@ -249,7 +230,7 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
 def _between_blanks(line: str) -> list[str]:
     """Split a row of numbers at blanks and tabs, but not at no-break blanks; return nothing for any other line."""
     cells = re.split(r"[ \t]+", line.strip(" \t"))
-    return cells if all(map(_BETWEEN_BLANKS.fullmatch, cells)) else []
+    return cells if all(map(_EITHER.fullmatch, cells)) else []
 
 
 def _places(heading: Sequence[str], name: str) -> list[int]:
@@ -286,7 +267,7 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
     if len(names) > 1:
         raise InputError(f"{where}: {key} = {one.name!r} fits the columns {', '.join(names)}: expected one")
     given = name_and_unit(names[0])[1]
-    stated = one.stated or name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
+    stated = name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
     if given and stated and given != stated and one.unit != "1":
         problem = f"the heading says {given!r} and the study {stated!r}"
         raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")
@@ -300,4 +281,7 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
     if one.unit in FREQUENCY_UNITS:
         text = f"{path}: unit of {key}: found {unit!r}: expected {one.unit!r}, as stated"
         raise InputError(text, found=unit, expected=one.unit)
-    return number(f"1 {unit}", one.unit, f"{path}: unit of {key}")
+    try:
+        return number(f"1 {unit}", one.unit)
+    except InputError as error:
+        raise error.prefixed(f"{path}: unit of {key}") from error

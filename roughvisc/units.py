@@ -234,23 +234,6 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     return decorate
 
 
-def number_and_unit(text: str) -> tuple[float, str]:
-    """Split a quantity into its number and its unit.
-
-    Parameters
-    ----------
-    text : str
-        Valid input of :func:`number`.
-
-    Examples
-    --------
-    >>> number_and_unit("0.1 MPa s"), number_and_unit("1e-3")
-    ((0.1, 'MPa s'), (0.001, ''))
-    """
-    digits, unit = _QUANTITY.fullmatch(text).groups()  # type: ignore[union-attr]
-    return float(digits), unit or ""
-
-
 def is_quantity(value: Any, unit: str) -> bool:
     """Return whether a value is a number, or text that converts to this unit."""
     try:

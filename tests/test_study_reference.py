@@ -51,11 +51,7 @@ EXPECTED = {
     ("surface: steps of a face", "surface: steps of the profile"): {*STEPS, "missing"},
     **{("generate: any", f"generate: {name}"): {"generate", *keys_of(one)} for name, one in RECIPES.items()},
     **{(f"material: {name}",): keys_of(one) for name, one in MODELS.items() if name not in COLUMNS},
-    **{
-        (f"material: {name}",): keys_of(MODELS[name])
-        | {"file", *(column.stated for column in columns.values() if column.stated)}
-        for name, columns in COLUMNS.items()
-    },
+    **{(f"material: {name}",): keys_of(MODELS[name]) | {"file"} for name in COLUMNS},
     ("material: any", "material: temperature", "material: thickness"): {
         "model",
         "modulus_factor",

@@ -19,6 +19,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Settings
+from roughvisc.study.case_text import value_text
 from roughvisc.study.si_tables import in_si
 from roughvisc.study.study_file import body_of, parts_of, shift_factor, with_files
 from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
@@ -66,8 +67,6 @@ class Case:
         The study file.
     varied : mapping
         Values that a sweep or :func:`vary` set: dotted key -> value in SI.
-    written : mapping
-        Varied quantities as written in the study file: dotted key -> text with a unit.
     title : str
         Title of the study.
     body : Body
@@ -85,7 +84,6 @@ class Case:
     tables: Mapping[str, Any]
     origin: Path | None
     varied: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
-    written: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     title: str = field(compare=False)
     body: Body = field(compare=False)
     experiment: Experiment = field(compare=False)
@@ -97,7 +95,7 @@ class Case:
         """Return title, surface, material, experiment and varied values in one line."""
         name = Path(self.surface["file"]).name if "file" in self.surface else self.surface["generate"]
         parts = [f"{self.title!r}, {name} on {self.tables['material']['model']}", repr(self.experiment)]
-        parts += [f"{key} = {self.written.get(key, value)}" for key, value in self.varied.items()]
+        parts += [f"{key} = {value_text(key, value)}" for key, value in self.varied.items()]
         return f"Case {'; '.join(parts)}"
 
     @property
@@ -203,14 +201,8 @@ class Case:
 
     def to_json(self) -> str:
         """Return the case as JSON; :meth:`from_json` makes a case with the same key from it."""
-        stated = dict(self.tables)
-        if self.varied:
-            stated["varied"] = dict(self.varied)
-        if self.written:
-            stated["written"] = dict(self.written)
-        if self.origin is not None:
-            stated["origin"] = str(self.origin.absolute())
-        return json.dumps(stated)
+        about = {"varied": dict(self.varied), "origin": self.origin and str(self.origin.absolute())}
+        return json.dumps({**self.tables, **{name: value for name, value in about.items() if value}})
 
     @classmethod
     def of_result(cls, dataset: xr.Dataset) -> Case:
@@ -228,8 +220,8 @@ class Case:
                 raise InputError("found no JSON object")
         except (ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
-        origin, varied, written = (data.pop(name, None) for name in ("origin", "varied", "written"))
-        return replace(_case_of(data, origin and Path(origin), None), varied=varied or {}, written=written or {})
+        origin, varied = data.pop("origin", None), data.pop("varied", {})
+        return replace(_case_of(data, origin and Path(origin), None), varied=varied)
 
 
 def read_study(path: str | Path) -> Case:
@@ -321,8 +313,7 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
         changed = _changed(case.tables, changes, case.origin)
     except InputError as error:
         raise error.prefixed(str(case.origin) if case.origin else "case") from error
-    written = {key: text for key, text in case.written.items() if key not in changes}
-    return replace(changed, varied={**case.varied, **changed.varied}, written={**written, **changed.written})
+    return replace(changed, varied={**case.varied, **changed.varied})
 
 
 def _changed(
@@ -333,10 +324,9 @@ def _changed(
         data = place(data, key, value)
     case = _case_of(data, origin, origin.parent if origin else None)
     varied = {key: value_at(case.tables, key, value) for key, value in changes.items()}
-    written = {k: v.strip() for k, v in changes.items() if isinstance(v, str) and isinstance(varied[k], float)}
     if drawn:
         varied = {key: value for key, value in varied.items() if key != SURROGATE} | drawn
-    return replace(case, varied=varied, written=written)
+    return replace(case, varied=varied)
 
 
 def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) -> Case:
@@ -351,7 +341,7 @@ def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) 
             if file is not None and key.startswith("material"):  # its columns have replaced its name in the table
                 raise error.prefixed(str(file)) from error
         text = value_at(data, error.key, None)
-        if text == error.found or in_si(text, error.key, data) != error.found:
+        if in_si(text, error.key, data) != error.found:
             raise
         message = str(error).replace(repr(error.found), repr(text))
         raise type(error)(message, key=error.key, found=text, expected=error.expected) from error

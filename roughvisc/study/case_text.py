@@ -37,7 +37,7 @@ def study_text(case: Mapping[str, Any]) -> str:
     """
     text, tables = "", ""
     for name, value in case.items():
-        if name in ("origin", "varied", "written"):
+        if name in ("origin", "varied"):
             continue
         several = isinstance(value, list) and any(isinstance(one, dict) for one in value)
         if not (several or isinstance(value, dict)):
@@ -79,9 +79,8 @@ def names_of(keys: Sequence[str]) -> dict[str, str]:
 
 
 def varied_texts(case: Mapping[str, Any]) -> dict[str, str]:
-    """Return dotted key -> varied value of a case, as written in the study, or in a suitable unit."""
-    written = case.get("written", {})
-    return {key: written.get(key) or value_text(key, value) for key, value in case.get("varied", {}).items()}
+    """Return dotted key -> varied value of a case, in a suitable unit."""
+    return {key: value_text(key, value) for key, value in case.get("varied", {}).items()}
 
 
 def value_text(key: str, value: Any) -> str:
@@ -104,8 +103,8 @@ def case_words(case: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> case_words({"varied": {"program.0.load": 2.0, "program.1.hold": 5.0}, "written": {"program.0.load": "2000 mN"}})
-    'Load 2000 mN, hold 5 s'
+    >>> case_words({"varied": {"program.0.load": 2.0, "program.1.hold": 5.0}})
+    'Load 2 N, hold 5 s'
     """
     texts = varied_texts(case)
     words = ", ".join(f"{name[:1].lower()}{name[1:]} {texts[key]}" for key, name in names_of(list(texts)).items())

@@ -5,8 +5,7 @@ A table contains the arguments of one function, which checks them; see :mod:`rou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -58,17 +57,14 @@ _MOST_SPEEDS = 1000
 _ROUNDING = 1e-12
 
 
-#: Columns of the CSV file of each model; ``stated`` is the key of the unit of a column whose heading has none.
+#: Columns of the CSV file of each model, by argument.
 COLUMNS: dict[str, dict[str, Wanted]] = {
-    "creep_table": {
-        "times": Wanted("time", "s", "time_unit"),
-        "compliances": Wanted("compliance", "1/Pa", "compliance_unit"),
-    },
-    "relaxation_table": {"times": Wanted("time", "s", "time_unit"), "moduli": Wanted("modulus", "Pa", "modulus_unit")},
+    "creep_table": {"times": Wanted("time", "s"), "compliances": Wanted("compliance", "1/Pa")},
+    "relaxation_table": {"times": Wanted("time", "s"), "moduli": Wanted("modulus", "Pa")},
     "dynamic_table": {
         "frequencies": Wanted("frequency", ""),  # in the argument frequency_unit
-        "storage": Wanted("storage", "Pa", "modulus_unit"),
-        "loss": Wanted("loss", "Pa", "modulus_unit"),
+        "storage": Wanted("storage", "Pa"),
+        "loss": Wanted("loss", "Pa"),
         "shift_factors": Wanted("shift_factor", "1", optional=True),
     },
 }
@@ -128,59 +124,39 @@ def existing_file(where: str, file: Any, folder: Path | None) -> str:
     return str(path)
 
 
-@contextmanager
-def _in_file(key: str, file: Any) -> Iterator[None]:
-    """Assign errors in a file to the key that names the file."""
-    try:
-        yield
-    except InputError as error:
-        problem = str(error) if str(file) in str(error) else f"{file}: {error}"
-        if error.key.isidentifier():  # the name of an argument
-            raise located(error, key) from error
-        raise located(InputError(problem, found=file, expected=error.expected), key) from error
-
-
 def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
     """Return a table of a material with the columns of its CSV file, without the name of the file."""
     table = a_table(where, stated)
     table |= {key: with_columns(f"{where}.{key}", table[key], folder) for key in ("a", "b", "on") if key in table}
     columns = COLUMNS.get(str(table.get("model")), {})
-    units, rest = split(table, *(one.stated for one in columns.values() if one.stated))
-    file = rest.pop("file", None) if columns else None
-    for key, unit in units.items():
-        if file is None or not isinstance(unit, str):
-            expected = "no unit of a column without a file" if file is None else "a unit"
-            raise InputError(key=f"{where}.{key}", found=unit, expected=expected)
-    if file is None:
+    if not columns or "file" not in table:
         return table
+    file = table.pop("file")
     for key in columns.keys() & table.keys():
         raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
     if "frequencies" in columns:
-        one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
-    wanted = {
-        key: one._replace(unit=one.unit or table["frequency_unit"], stated=units.get(one.stated or ""))
-        for key, one in columns.items()
-    }
+        unit = one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
+        columns = columns | {"frequencies": columns["frequencies"]._replace(unit=unit)}
     path = existing_file(f"{where}.file", file, folder)
-    with _in_file(f"{where}.file", file):
-        found, _ = read_table(path, wanted)
-    return rest | {key: values.tolist() for key, values in found.items()}
+    try:
+        found, _ = read_table(path, columns)
+    except InputError as error:
+        raise located(error, f"{where}.file") from error
+    return table | {key: values.tolist() for key, values in found.items()}
 
 
 def with_rows(where: str, stated: Any, folder: Path | None) -> Any:
     """Return a segment of a program with the rows of its file, without the name of the file."""
     table = stated.get("table") if isinstance(stated, Mapping) else None
-    if not isinstance(table, str) and not (isinstance(table, Mapping) and "file" in table):
+    if not isinstance(table, Mapping) or "file" not in table:
         return stated
-    columns = {"file": table, "thin": 0} if isinstance(table, str) else dict(table)
-    control = one_of(f"{where}.control", stated.get("control", "load"), UNITS)
-    where, file = f"{where}.table", columns.pop("file")
-    path = existing_file(where if isinstance(table, str) else f"{where}.file", file, folder)
-    if "control" in stated or not columns.keys() & UNITS:
-        columns.setdefault(control, control)
-    with _in_file(where, file):
-        history = call(read_history, "", columns, path)
-        Program.table(history.times, history.values, history.control)
+    where, columns = f"{where}.table", dict(table)
+    file = columns.pop("file")
+    if "control" in stated:
+        expected = "the name of a column in its place, such as approach = 'Displacement'"
+        raise InputError(key=f"{where}.control", found=stated["control"], expected=expected)
+    path = existing_file(f"{where}.file", file, folder)
+    history = call(read_history, where, columns, path)
     rows = {"times": history.times, "values": history.values, "note": history.note}
     return {**stated, "table": rows, "control": history.control}
 

@@ -12,7 +12,6 @@ from typing import Any
 
 from roughvisc.arguments import a_table, dotted
 from roughvisc.errors import InputError, short_repr
-from roughvisc.topography.scans import is_card, read_toml
 
 #: Keys of the number of realisations in a sweep, and of the number of a realisation in a case.
 REALISATIONS, REALISATION = "realisations", "realisation"
@@ -55,7 +54,7 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
                 expected = "a value in its own table, since it changes no result"
                 raise InputError(key=key, found=change[key], expected=expected)
         count = change.pop(REALISATIONS, None)
-        found += [(change, {})] if count is None else _realisations(change, count, data, folder)
+        found += [(change, {})] if count is None else _realisations(change, count, data)
         if len(found) > MOST_CASES:
             raise InputError(key="sweep", found=f"{len(found)} cases", expected=f"at most {MOST_CASES}")
     return found
@@ -84,9 +83,7 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
             lengths = {key: len(values) for key, values in stated.items() if isinstance(values, list)}
             if len(set(lengths.values())) > 1 or 0 in lengths.values():
                 raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
-            if (count := max(lengths.values(), default=1)) > MOST_CASES:
-                raise InputError(key=f"sweep.{number}", found=f"{count} cases", expected=f"at most {MOST_CASES}")
-            for entry in range(count):
+            for entry in range(max(lengths.values(), default=1)):
                 found.append({key: one[entry] if isinstance(one, list) else one for key, one in stated.items()})
         return found
     if not isinstance(sweep, Mapping):
@@ -135,12 +132,12 @@ def _with_files(table: Any, folder: Path) -> Any:
 
 
 def _realisations(
-    change: Mapping[str, Any], count: Any, data: Mapping[str, Any], folder: Path
+    change: Mapping[str, Any], count: Any, data: Mapping[str, Any]
 ) -> list[tuple[dict[str, Any], dict[str, int]]]:
     """Return the changes of a case for each of its realisations, and the number of each.
 
     Realisation 0 of a scan is the scan itself; the others are its surrogates. Generated faces have consecutive seeds,
-    beginning with the stated seeds.
+    beginning with the stated seeds; the stated seeds of two faces decide whether any faces are equal.
     """
     where = f"sweep.{REALISATIONS}"
     if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
@@ -152,11 +149,6 @@ def _realisations(
     if stated := [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface):
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
     if "file" in surface or "file" in second:
-        card = Path(folder, Path(str(surface.get("file"))).expanduser())
-        if is_card(card, None) and card.is_file():
-            recipe = read_toml(card, "a surface card in TOML").get("generate")
-            if recipe not in (None, "self_affine"):
-                raise InputError(key=where, found=f"a card of generate = {recipe!r}", expected="a scan, or roughness")
         surrogates = [{SURROGATE: number} for number in range(1, count + 1)]
         return [({**change, **one}, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
     seeds: dict[str, int] = {}
@@ -171,9 +163,6 @@ def _realisations(
     if not seeds:
         made = f"generate = {surface.get('generate')!r}"
         raise InputError(key=where, found=made, expected="a scan, or generate = 'self_affine'")
-    if 0 < max(seeds.values()) - min(seeds.values()) < count:  # both faces would have some seeds in common
-        expected = f"seeds of the two faces that are equal, or at least {count} apart"
-        raise InputError(key=where, found=list(seeds.values()), expected=expected)
     return [
         ({**change, **{key: seed + number - 1 for key, seed in seeds.items()}}, {REALISATION: number})
         for number in range(1, count + 1)

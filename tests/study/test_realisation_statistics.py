@@ -129,9 +129,9 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
     assert table["realisation"].tolist() == [1, 2, 3] * 2
     assert table.index.tolist() == [0, 0, 0, 1, 1, 1]
     area = over_realisations(again["contact_area"]).isel(time=-1)
-    told = realisations_table(table).set_index(["quantity", "program.0.pressure [kPa]"])
+    told = realisations_table(table).set_index(["quantity", "program.0.pressure [Pa]"])
     assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
-    for number, pressure in enumerate((10, 20)):
+    for number, pressure in enumerate((1e4, 2e4)):
         row = told.loc["contact_area", pressure]
         for name in ("mean", "standard_deviation", "lower", "patch_upper"):
             assert row[name] == pytest.approx(float(area[name][number]), rel=1e-6), name

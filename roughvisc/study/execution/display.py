@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import threading
 import time
@@ -13,6 +12,7 @@ from rich.console import Console
 from roughvisc.errors import printable
 from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case
+from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.run import Outcome
 from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
 
@@ -47,7 +47,7 @@ class Display:
         """Show the cases, in the order of the study, and the address of Dask's dashboard."""
         numbers = number_by_key(sweep_cases(cases))
         for case in reversed(cases):
-            varied = ", ".join(f"{name} = {case.written.get(name) or json.dumps(x)}" for name, x in case.varied.items())
+            varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
             shortened = varied if len(varied) <= 60 else f"{varied[:57]}..."
             self._names[case.key] = f"case {numbers[case.key]}" + (f" ({shortened})" if varied else "")
             self._at[case.key] = case.experiment.progress

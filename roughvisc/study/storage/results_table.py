@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,6 @@ from roughvisc.study.storage.folder import atomic_write, no_results, recorded_fa
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.sweep_data import SweepCase, numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
-from roughvisc.units import number, number_and_unit
 from roughvisc.variables import (
     AXES,
     ERRORS,
@@ -122,18 +120,11 @@ def _telling(entry: Entry) -> dict[str, float]:
 
 
 def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the values of varied parameters, under their keys with the first unit that the study states."""
-    columns: dict[str, Any] = {}
-    for key, values in parameters_of(stated).items():
-        numbers, unit = values.tolist(), ""
-        if values.dtype.kind in "if" and (si := unit_of(key, stated[0])):
-            written = [text for case in stated if (text := case.get("written", {}).get(key))]
-            unit = (number_and_unit(written[0])[1] if written else "") or si
-            for place, value in enumerate(numbers):
-                if math.isfinite(value):  # without the rounding error of the conversion
-                    numbers[place] = float(f"{number(f'{value!r} {si}', unit):.12g}")
-        columns[heading(key, unit)] = numbers
-    return columns
+    """Return the values of varied parameters, under their keys with the unit of numbers."""
+    return {
+        heading(key, unit_of(key, stated[0]) if values.dtype.kind in "if" else ""): values.tolist()
+        for key, values in parameters_of(stated).items()
+    }
 
 
 def realisations_table(table: pd.DataFrame) -> pd.DataFrame:

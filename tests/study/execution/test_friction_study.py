@@ -70,7 +70,7 @@ def test_sweep__opens_as_one_and_as_a_table(tmp_path):
     np.testing.assert_allclose(table["friction_coefficient"], ds.friction_coefficient.max("speed"))
     np.testing.assert_allclose(table["speed [m/s]"], ds.speed[peak])
     np.testing.assert_allclose(table["contact_area [m^2]"], ds.contact_area.isel(speed=peak))
-    assert table["friction.pressure [kPa]"].tolist() == [20, 40]
+    assert table["friction.pressure [Pa]"].tolist() == [2e4, 4e4]
     assert table["status"].tolist() == ["converged", "converged"]
     assert "time [s]" not in table
     assert (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig").count("converged") == 2

@@ -37,8 +37,8 @@ def test_table__says_what_the_results_say(folder):
     table = rv.to_table(folder)
     assert table.index.tolist() == [0, 1, 2, 3]
     assert table.index.name == "case"
-    assert table["program.0.load [uN]"].tolist() == [500, 1000, 2e6, 3e6], "in the unit that the study states first"
-    assert table["material.kelvin_viscosity [MPa s]"].tolist() == [0.1, 0.2, 0.1, 0.1]
+    assert table["program.0.load [N]"].tolist() == [5e-4, 1e-3, 2, 3]
+    assert table["material.kelvin_viscosity [Pa s]"].tolist() == [1e5, 2e5, 1e5, 1e5]
     assert set(table["solve.edge"]) == {"error"}
     assert table["status"].tolist() == ["converged", "converged", "failed", "failed"]
     assert (table["message"].str.contains("border") == [False, False, True, True]).all()
@@ -68,7 +68,7 @@ def test_table__is_written_with_the_results(folder):
     assert text.startswith(b"\xef\xbb\xbf"), "the mark by which a spreadsheet knows UTF-8"
     rows = list(csv.DictReader(text.decode("utf-8-sig").splitlines()))
     assert [row["title"] for row in rows] == ["Bälle, größer"] * 4
-    assert [row["program.0.load [uN]"] for row in rows] == ["500", "1000", "2000000", "3000000"]
+    assert [float(row["program.0.load [N]"]) for row in rows] == [5e-4, 1e-3, 2, 3]
     pd.testing.assert_frame_equal(
         pd.read_csv(folder / CASES, index_col="case", nrows=2, keep_default_na=False),
         rv.to_table(folder).iloc[:2],
@@ -97,5 +97,5 @@ def test_table__names_cases_that_were_not_reached(tmp_path):
         run_cases(read_cases(tmp_path / "balls.toml"), tmp_path / "out", workers=0, display=Stop(False))
     written = pd.read_csv(tmp_path / "out" / CASES)
     assert written["status"].tolist() == ["converged", "not computed"]
-    assert written["program.0.load [mN]"].tolist() == [1, 2]
+    assert written["program.0.load [N]"].tolist() == [1e-3, 2e-3]
     assert rv.to_table(tmp_path / "out")["status"].tolist() == ["converged", "not computed"]

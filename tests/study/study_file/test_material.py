@@ -40,17 +40,15 @@ def test_model__is_that_of_its_function(read_one, model, stated):
 
 
 @pytest.mark.parametrize(
-    ("rows", "keys"),
+    "rows",
     [
-        (f"{HEADING}0, 1e-7\n60, 2e-7\n3600, 5e-7\n", {}),
-        ("time, compliance\n0, 0.1\n1, 0.2\n60, 0.5", {"time_unit": "min", "compliance_unit": "1/MPa"}),
-        ("# rheometer\ncompliance (1/MPa),time\n0.1,0\n0.2,1\n0.5,60", {"time_unit": "min"}),
-        ("time [min], compliance [1/MPa]\n0, 0.1\n1, 0.2\n60, 0.5", {"time_unit": "min"}),
+        f"{HEADING}0, 1e-7\n60, 2e-7\n3600, 5e-7\n",
+        "# rheometer\ncompliance (1/MPa),time [min]\n0.1,0\n0.2,1\n0.5,60",
     ],
 )
-def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows, keys):
+def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows):
     (tmp_path / "creep.csv").write_text(rows)
-    case = read_one(material={"model": "creep_table", "file": "creep.csv", **keys})
+    case = read_one(material={"model": "creep_table", "file": "creep.csv"})
     listed = read_one(
         material={"model": "creep_table", "times": [0, 60, 3600], "compliances": [1e-7, 2e-7, 5e-7]},
     )
@@ -63,16 +61,16 @@ def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows, keys):
 
 
 @pytest.mark.parametrize(
-    ("rows", "keys"),
+    "rows",
     [
-        ("frequency [Hz], storage [MPa], loss [MPa]\n1, 3, 1\n10, 5, 2", {}),
-        ("storage, frequency, loss\n3, 1, 1\n5, 10, 2", {"modulus_unit": "MPa"}),
-        ("frequency, storage, loss, shift_factor\n2, 3, 1, 0.5\n2, 5, 2, 5", {"modulus_unit": "MPa"}),
+        "frequency [Hz], storage [MPa], loss [MPa]\n1, 3, 1\n10, 5, 2",
+        "storage [MPa], frequency, loss [MPa]\n3, 1, 1\n5, 10, 2",
+        "frequency, storage [MPa], loss [kPa], shift_factor\n2, 3, 1000, 0.5\n2, 5, 2000, 5",
     ],
 )
-def test_dynamic_table__from_a_file(read_one, tmp_path, rows, keys):
+def test_dynamic_table__from_a_file(read_one, tmp_path, rows):
     (tmp_path / "dma.csv").write_text(rows)
-    table = {"model": "dynamic_table", "file": "dma.csv", **keys}
+    table = {"model": "dynamic_table", "file": "dma.csv"}
     material = read_one(material=table | {"frequency_unit": "Hz"}).material
     assert material == rv.dynamic_table((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
     if "[Hz]" not in rows:
@@ -146,7 +144,7 @@ def test_temperature__sweeps_and_its_axis_has_a_unit(read, read_one):
         ({"model": "creep_table", "file": "gone.csv"}, "material.file"),
         ({"model": "creep_table", "file": "creep.csv", "times": [0, 1]}, "material.file"),
         ({"model": "creep_table", "times": [0, 1]}, "material.compliances"),
-        ({"model": "creep_table", "file": "creep.csv", "time_unit": "mm"}, "material.file"),
+        ({"model": "creep_table", "file": "bare.csv"}, "material.file"),
         ({"model": "creep_table", "file": "falling.csv", "noise": "1 %"}, "material"),
         ({"model": "dynamic_table", "file": "creep.csv"}, "material.frequency_unit"),
         ({"model": "power_law", "glassy": 0, "coefficient": 1, "exponent": 1}, "material.exponent"),
@@ -174,5 +172,6 @@ def test_temperature__sweeps_and_its_axis_has_a_unit(read, read_one):
 def test_material__is_refused_at_the_key(read, tmp_path, table, key):
     (tmp_path / "creep.csv").write_text(f"{HEADING}0, 1\n1, 2")
     (tmp_path / "falling.csv").write_text(f"{HEADING}0, 2\n1, 1")
+    (tmp_path / "bare.csv").write_text("time, compliance\n0, 1\n1, 2")
     with refused(key):
         read(material={name: value for name, value in table.items() if value is not None})

@@ -54,7 +54,6 @@ def test_pattern__stands_for_the_files_that_match_it(read, tmp_path):
 def realised(read, tmp_path):
     """Reads the cases of a sweep over realisations of a surface."""
     (tmp_path / "rough.nc").write_text("a scan, by its name")
-    (tmp_path / "ball.toml").write_text('generate = "sphere"\nradius = "1 mm"\nsize = "0.1 mm"\nshape = 9\n')
 
     def cases(surface, sweep=None, **solve):
         pressed = [{"pressure": "10 kPa", "over": 0}]
@@ -106,9 +105,7 @@ def test_realisations__of_two_generated_faces_draw_both(realised):
         (ROUGH, {"realisations": 3}),
         (GAUSSIAN, {"realisations": 3, "surface.seed": [1, 2]}),
         (SCAN | {"realisation": 2}, {"realisations": 3}),
-        ({"file": "ball.toml"}, {"realisations": 3}),
         ({"generate": "sphere", "radius": "1 mm", "size": "0.1 mm", "shape": 9}, {"realisations": 3}),
-        (GAUSSIAN | {"second": GAUSSIAN | {"seed": 7}}, {"realisations": 3}),
     ],
 )
 def test_realisations__are_refused_if_the_surface_has_none(realised, surface, sweep):
