@@ -136,10 +136,11 @@ def run(
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
     """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
     from roughvisc.cli.tables import result_table
+    from roughvisc.labels import unconverged
     from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
-    from roughvisc.study.execution.run import is_result_of, run_case, unconverged
+    from roughvisc.study.execution.run import is_result_of, run_case
     from roughvisc.study.storage.folder import is_writable, result_path
 
     path = result_path(folder, case.key)
@@ -169,10 +170,10 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.folder import LOG
     from roughvisc.study.storage.results_table import CASES, realisations_table
-    from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
+    from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
 
     found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
-    outcomes, listed = list(found.values()), sweep_cases(cases)
+    outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
     with client.as_current() if client is not None else nullcontext():
         missed = _observe(cases, folder, console)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
@@ -185,7 +186,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     bad = [outcome for outcome in outcomes if outcome.kind != "done"]
     for outcome in bad[:_SHOWN]:
         again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
-        complain(f"case {number_by_key(listed)[outcome.key]}{again}: {outcome.message}")
+        complain(f"case {numbers[outcome.key]}{again}: {outcome.message}")
     if len(bad) > _SHOWN:
         complain(f"and {len(bad) - _SHOWN} more; all of them are in {folder / LOG}")
     if all(outcome.error in REFUSED for outcome in outcomes):

@@ -28,7 +28,7 @@ from roughvisc.study.case_text import case_words, names_of, study_text, varied_t
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.results_table import realisations_table, to_table
-from roughvisc.study.storage.sweep_data import number_by_key, read_sweep
+from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of, variables_in_table
@@ -81,7 +81,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         page["failures"] = _failures(folder)
         if not sources and not page["failures"]:
             raise no_results(folder)
-        numbers = number_by_key(cases)
+        numbers = numbers_of(cases)
         sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
         page["realisations"] = realisation_rows(realisations_table(to_table(folder)))
         if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:

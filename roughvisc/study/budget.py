@@ -11,9 +11,10 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.labels import unconverged
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.run import is_result_of, result_folder, unconverged
+from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.neighbours import at_rows, compared, solve, sources_of, with_kept
 from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.folder import result_path

@@ -16,10 +16,10 @@ from roughvisc.experiment.coarser import pressure_distance
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.rows import kept_times
-from roughvisc.labels import cost_of
+from roughvisc.labels import cost_of, unconverged
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.run import result_folder, unconverged
+from roughvisc.study.execution.run import result_folder
 from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_kept
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
 from roughvisc.study.storage.netcdf import NETCDF

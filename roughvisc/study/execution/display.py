@@ -14,7 +14,7 @@ from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.run import Outcome
-from roughvisc.study.storage.sweep_data import number_by_key, sweep_cases
+from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
 
 #: Largest number of messages on failed and unconverged cases.
 _SHOWN = 8
@@ -45,7 +45,7 @@ class Display:
 
     def begin(self, cases: Sequence[Case], link: str = "") -> None:
         """Show the cases, in the order of the study, and the address of Dask's dashboard."""
-        numbers = number_by_key(sweep_cases(cases))
+        numbers = numbers_of(sweep_cases(cases))
         for case in reversed(cases):
             varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
             shortened = varied if len(varied) <= 60 else f"{varied[:57]}..."

@@ -9,19 +9,16 @@ import os
 import re
 import time
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from roughvisc.errors import ConvergenceError, InputError, RoughviscError
 from roughvisc.experiment.base import Problem
-from roughvisc.labels import warnings_of
+from roughvisc.labels import unconverged, warnings_of
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -37,7 +34,6 @@ from roughvisc.study.storage.folder import (
 from roughvisc.study.storage.index import Entry, read_entry
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
 from roughvisc.study.storage.sweep_data import labels_of_case
-from roughvisc.variables import AXES, NOT_CONVERGED, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -261,20 +257,6 @@ def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
             transient=True,
         )
     return True
-
-
-def unconverged(histories: xr.Dataset | Mapping[str, NDArray[np.generic]]) -> str:
-    """Return a message about times or speeds that did not converge; empty if all did."""
-    rows = axis_of(histories)
-    if "status" not in histories:  # over time, where a step that does not converge ends the run
-        return ""
-    status = np.asarray(histories["status"])
-    bad = np.flatnonzero(status == NOT_CONVERGED)
-    if not bad.size:
-        return ""
-    axis = AXES[rows]
-    first = axis.place(float(histories[rows][bad[0]]))
-    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}: try a looser tolerance"
 
 
 @dataclass(frozen=True)

@@ -159,9 +159,10 @@ def run_cases(
         raise InputError(key="client", found=client, expected="a Client(asynchronous=False)")
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     writable = is_writable(folder)
+    if writable:
+        folder.mkdir(parents=True, exist_ok=True)
+        clean_folder(folder)
     with log_file(folder) if writable else nullcontext():
-        if writable and folder.exists():
-            clean_folder(folder)
         index = index_of(folder) if folder.exists() else {}
         outcomes: dict[str, Outcome] = {}
         for key in distinct:
@@ -172,7 +173,6 @@ def run_cases(
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         if todo:
             require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
-            folder.mkdir(parents=True, exist_ok=True)
         if client is None and workers is None:
             workers = side_by_side(list(todo.values()), min(cores(), len(todo))) if len(todo) > 1 else 0
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))

@@ -13,7 +13,6 @@ import json
 import logging
 import os
 import secrets
-import stat
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -128,13 +127,10 @@ def require_file(path: Path) -> None:
         If the file is absent, a folder, a pipe or a device, or without read permission.
     """
     try:
-        mode = path.stat().st_mode
-        if stat.S_ISREG(mode):
+        found = "is no regular file" if path.exists() else "does not exist"
+        if path.is_file():
             path.open("rb").close()
             return
-        found = "is a folder" if stat.S_ISDIR(mode) else "is no regular file"
-    except FileNotFoundError:
-        found = "does not exist"
     except OSError as error:
         found = f"cannot be read: {error.strerror or error}"
     raise unusable(path, found)
@@ -286,28 +282,24 @@ def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
 
 
 class _LogFile(logging.FileHandler):
-    """Log file whose errors are ignored if it cannot be written."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        with suppress(OSError):  # the file cannot be opened
-            super().emit(record)
-
     def handleError(self, record: logging.LogRecord) -> None:
-        pass
+        """Ignore messages that cannot be written, for example on a full disk."""
 
 
 @contextmanager
 def log_file(folder: Path) -> Iterator[None]:
-    """Append all log messages of roughvisc to a file next to the results, within the block."""
-    handler = _LogFile(folder / LOG, delay=True, encoding="utf-8")
-    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
-    level = log.level
-    log.addHandler(handler)
-    log.setLevel(min(level or logging.INFO, logging.INFO))
+    """Append all log messages of roughvisc to a file next to the results, within the block, if it can be written."""
+    level, handler = log.level, None
+    with suppress(OSError):
+        handler = _LogFile(folder / LOG, encoding="utf-8")
+        handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
+        log.addHandler(handler)
+        log.setLevel(min(level or logging.INFO, logging.INFO))
     try:
         yield
     finally:
         log.setLevel(level)
-        log.removeHandler(handler)
-        with suppress(OSError):
-            handler.close()
+        if handler is not None:
+            log.removeHandler(handler)
+            with suppress(OSError):
+                handler.close()

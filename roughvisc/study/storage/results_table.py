@@ -11,19 +11,18 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import heading
+from roughvisc.labels import heading, unconverged
 from roughvisc.observables.frames import expect_result
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
 from roughvisc.study.storage.index import Entry, index_of
-from roughvisc.study.storage.sweep_data import SweepCase, numbers_of, parameters_of, read_sweep
+from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import (
     AXES,
     ERRORS,
     GRID_ERROR,
-    NOT_CONVERGED,
     VARIABLES,
     axis_of,
     variables_in_table,
@@ -72,21 +71,18 @@ def to_table(out: str | Path) -> pd.DataFrame:
     index, cases = index_of(folder), read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)
-    cases = cases or [SweepCase(key, entry.case) for key, entry in index.items()]
-    stated = [one.case for one in cases]
-    numbers, ends = [], []
-    for one in cases:
-        entry, message = index.get(one.key), ""
-        found = {}
+    cases = cases or {key: entry.case for key, entry in index.items()}
+    stated, numbers, ends = [*cases.values()], [], []
+    for key in cases:
+        found, message, entry = {}, "", index.get(key)
         if entry is not None:
-            bad = int((np.asarray(entry.arrays.get("status", ())) == NOT_CONVERGED).sum())
-            status = f"{bad} of {entry.rows} {AXES[entry.along].rows} not converged" if bad else "converged"
+            message = unconverged(entry.arrays)
+            status = "unconverged" if message else "converged"
             found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
             for name in variables_in_table("largest"):
-                values = np.asarray(entry.arrays.get(name, ()), float)
-                largest = values.max(where=np.isfinite(values), initial=-np.inf)
-                found[f"largest {heading(name, VARIABLES[name].units)}"] = largest if largest > -np.inf else np.nan
-        elif record := recorded_failure(folder, one.key):
+                known = filter(math.isfinite, entry.arrays.get(name, ()))
+                found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
+        elif record := recorded_failure(folder, key):
             status, message = "failed", str(record.get("message", ""))
         else:
             status = "not computed"
@@ -94,7 +90,7 @@ def to_table(out: str | Path) -> pd.DataFrame:
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)})
     table = table.join(pd.DataFrame(numbers, table.index)).dropna(axis="columns", how="all").join(pd.DataFrame(ends))
-    return table.set_index(pd.Index(numbers_of(cases), name="case"))
+    return table.set_index(pd.Index(numbers_of(cases).values(), name="case"))
 
 
 def write_table(folder: Path) -> None:

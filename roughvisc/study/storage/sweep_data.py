@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -34,38 +35,22 @@ Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 _BLOCK = 16 << 20
 
 
-class SweepCase(NamedTuple):
-    """One case of a sweep.
-
-    Two cases share a key and a result if they differ only in labels, for example scans with equal bytes.
-
-    Attributes
-    ----------
-    key : str
-        Key of the case, the name of its result.
-    case : dict
-        The case as JSON, including its varied parameters.
-    """
-
-    key: str
-    case: Mapping[str, Any]
-
-
-def sweep_cases(cases: Sequence[Case]) -> list[SweepCase]:
-    """Return key and JSON of each case, in the given order, without repeated cases of equal key and labels."""
-    distinct: dict[Any, Case] = {}
+def sweep_cases(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
+    """Return key -> JSON of each distinct case, in the order of the study."""
+    found: dict[str, dict[str, Any]] = {}
     for case in cases:
-        distinct.setdefault((case.key, json.dumps(dict(case.varied))), case)
-    return [SweepCase(case.key, json.loads(case.to_json())) for case in distinct.values()]
+        if case.key not in found:
+            found[case.key] = json.loads(case.to_json())
+    return found
 
 
-def write_sweep(folder: Path, cases: Sequence[SweepCase]) -> None:
-    """Write the list of cases of a sweep to its folder; if writing fails, the folder has no list."""
+def write_sweep(folder: Path, cases: Mapping[str, Any]) -> None:
+    """Write the cases of a sweep to its folder; if writing fails, the folder has no list of cases."""
     write_json(folder / SWEEP, cases)
 
 
-def read_sweep(folder: Path) -> list[SweepCase]:
-    """Return the cases of the last sweep in a folder; an empty list without a sweep.
+def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return key -> JSON of each case of the last sweep in a folder; empty without a sweep.
 
     Raises
     ------
@@ -74,9 +59,9 @@ def read_sweep(folder: Path) -> list[SweepCase]:
     """
     path = folder / SWEEP
     try:
-        return [SweepCase(*one) for one in read_json(path)]
+        return dict(read_json(path))
     except FileNotFoundError:
-        return []
+        return {}
     except DAMAGED as error:
         raise InputError(
             f"{path}: cannot be read, or is damaged ({error}): expected the cases of the last sweep; run it again, "
@@ -85,20 +70,15 @@ def read_sweep(folder: Path) -> list[SweepCase]:
         ) from error
 
 
-def numbers_of(cases: Sequence[SweepCase]) -> list[int]:
+def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
-    numbers: dict[Any, int] = {}
-    found = []
-    for place, one in enumerate(cases):
-        varied = one.case.get("varied", {})
-        settings = json.dumps({key: value for key, value in varied.items() if key not in (REALISATION, *DRAWN)})
-        found.append(numbers.setdefault(settings if REALISATION in varied else place, len(numbers)))
+    numbers: dict[str, int] = {}
+    found = {}
+    for key, case in cases.items():
+        varied = case.get("varied", {})
+        settings = json.dumps({name: one for name, one in varied.items() if name not in (REALISATION, *DRAWN)})
+        found[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
     return found
-
-
-def number_by_key(cases: Sequence[SweepCase]) -> dict[str, int]:
-    """Return key -> number of the first case with this key."""
-    return dict(reversed([(one.key, number) for one, number in zip(cases, numbers_of(cases), strict=True)]))
 
 
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
@@ -198,19 +178,21 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     folder = Path(out).absolute()
     index = index_of(folder)
     listed = read_sweep(folder) if cases is None else sweep_cases(cases)
-    listed = listed or [SweepCase(key, entry.case) for key, entry in index.items()]
-    here = [place for place, one in enumerate(listed) if one.key in index]
+    listed = listed or {key: entry.case for key, entry in index.items()}
+    here = [place for place, key in enumerate(listed) if key in index]
     if not here:
         raise no_results(folder)
-    entries = [index[listed[place].key] for place in here]
+    entries = [index[key] for key in listed if key in index]
     if len(axes := {entry.along: entry.file for entry in entries}) > 1:
         found = ", ".join(f"{file} over {along}" for along, file in axes.items())
         raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
-    parameters = {key: values[here] for key, values in parameters_of([one.case for one in listed]).items()}
-    number = {"case": ("case", np.array(numbers_of(listed))[here], {"long_name": "number of the case"})}
-    keys = {CASE_KEY: (("case",), np.array([entry.key for entry in entries]), VARIABLES[CASE_KEY].attributes)}
-    labels = labels_of(parameters, listed[here[0]].case, ("case",))
-    return _by_realisation(_stacked(folder, entries).assign_coords(number | keys | labels), parameters)
+    numbers, keys = numbers_of(listed), [entry.key for entry in entries]
+    parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
+    labels = labels_of(parameters, listed[keys[0]], ("case",)) | {
+        "case": (("case",), np.array([numbers[key] for key in keys]), {"long_name": "number of the case"}),
+        CASE_KEY: (("case",), np.array(keys), VARIABLES[CASE_KEY].attributes),
+    }
+    return _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
 
 
 def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
@@ -254,12 +236,7 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Return histories over (case, row); NaN after the last row of a case."""
-    if len({len(one) for one in histories}) == 1:
-        return np.stack(histories)
-    table = np.full((len(histories), max(map(len, histories))), np.nan)
-    for row, one in zip(table, histories, strict=True):
-        row[: len(one)] = one
-    return table
+    return np.array([*zip_longest(*histories, fillvalue=np.nan)]).T
 
 
 def _field(folder: Path, entries: Sequence[Entry], name: str) -> xr.Variable:

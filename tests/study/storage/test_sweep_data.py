@@ -142,23 +142,6 @@ def test_open_results__on_different_grids_has_histories(study, tmp_path, caplog)
     assert "16 x 12 cells" in caplog.text
 
 
-def test_open_results__scans_with_equal_bytes_keep_both_labels(study, tmp_path):
-    height = rv.self_affine((1e-3, 1e-3), (12, 10), hurst=0.8, rms_height=1e-7, seed=1)
-    height.rename("height").to_netcdf(tmp_path / "one.nc")
-    shutil.copy(tmp_path / "one.nc", tmp_path / "same.nc")
-    recipe = SMALL[SMALL.index("generate") : SMALL.index("[material]")]
-    text = SMALL.replace(recipe, 'file = "one.nc"\n').replace('"free"', '"periodic"')
-    cases = study(text + '[sweep]\n"surface.file" = ["one.nc", "same.nc"]\n')
-    assert cases[0].key == cases[1].key
-    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
-    assert ds.case.values.tolist() == [0, 1]
-    assert [name.rpartition("/")[2] for name in ds.surface_file.values] == ["one.nc", "same.nc"]
-    assert (ds.force[0] == ds.force[1]).all()
-    table = rv.to_table(tmp_path / "out")
-    assert table["surface.file"].tolist() == ds.surface_file.values.tolist()
-    assert table.index.tolist() == [0, 1]
-
-
 def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_path):
     cases = study()
     sweep(cases, tmp_path / "out", workers=0, progress=False)
