@@ -209,12 +209,11 @@ class Grid:
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement under a pressure, per unit contact compliance: one convolution. [m]
 
-        The result has the precision of the pressure. Under periodic and mirror boundaries the mean displacement of a
+        Under periodic and mirror boundaries the mean displacement of a
         half-space is zero.
         """
         self.convolutions += 1
-        symbol = self._single_symbol if pressure.dtype == np.float32 else self._double_symbol
-        return self._convolved(pressure, symbol, self.points)
+        return self._convolved(pressure, self._double_symbol, self.points)
 
     def inverse(self, displacement: Array) -> Array:
         """Return approximately the pressure that causes a displacement, in single precision.
@@ -252,10 +251,6 @@ class Grid:
     @cached_property
     def _double_symbol(self) -> Array:
         return self._of_all_waves(self.symbol)
-
-    @cached_property
-    def _single_symbol(self) -> Array:
-        return self._of_all_waves(self.symbol).astype(np.float32)
 
     @cached_property
     def _inverse_symbol(self) -> Array:

@@ -57,8 +57,8 @@ def test_contact__is_the_same_on_a_device(xp, boundary, prescribed, present):
 
 @BOUNDARIES
 def test_wide_contact__is_the_same_on_a_device(monkeypatch, xp, boundary):
-    """With a first guess on half the cells, steps in single precision and the second level of the preconditioner."""
-    for name, value in {"COARSE_FROM": 40, "SINGLE_FROM": 1, "BLOCKS_FROM": 40, "SPOTS": 0.0}.items():
+    """With a first guess on half the cells and the second level of the preconditioner."""
+    for name, value in {"COARSE_FROM": 40, "BLOCKS_FROM": 40, "SPOTS": 0.0}.items():
         monkeypatch.setattr(solver, name, value)
     used, blocks = [], solver.LongWaves.pressure
     monkeypatch.setattr(solver.LongWaves, "pressure", lambda self, rest: used.append(rest) or blocks(self, rest))

@@ -131,7 +131,7 @@ _take = Kernel(
 )
 _against_last = Kernel(
     "against_last",
-    "const double* direction, const double* residual, const Real* response, const double* last, "
+    "const double* direction, const double* residual, const double* response, const double* last, "
     "const long long* cells, double* former",
     "const double d = direction[i], r = residual[i], f = last[cells[i]]; const double u = response[cells[i]]; "
     "former[i] = f;",
@@ -157,9 +157,9 @@ _change = Kernel(
 )
 _inner_at = Kernel(
     "inner_at",
-    "const double* values, const Real* field, const long long* cells",
+    "const double* values, const double* field, const long long* cells",
     "",
-    sums=("values[i] * (double)field[cells[i]]",),
+    sums=("values[i] * field[cells[i]]",),
 )
 _limit = Kernel(
     "limit",
@@ -173,7 +173,7 @@ _put = Kernel(
     "const double fraction",
     "pressure[cells[i]] = fraction == 1 ? trial[i] : fmax(held[i] + fraction * change[i], 0.0);",
 )
-_add = Kernel("add", "double* field, const Real* change, const double fraction", "field[i] += fraction * change[i];")
+_add = Kernel("add", "double* field, const double* change, const double fraction", "field[i] += fraction * change[i];")
 _block_sums = Kernel(
     "block_sums",
     "const double* field, const long long nx, const long long ny, const long long mx, const long long my, "
@@ -267,7 +267,7 @@ def conjugate(
         old_cells, old_change, response, curvature = last
         former = cupy.empty(count)
         before = on_grid(old_change, old_cells)
-        sums = _against_last(count, direction, residual, response, before, cells, former, real=response.dtype)
+        sums = _against_last(count, direction, residual, response, before, cells, former)
         along, crossed, responses, descent, residuals, changes, descended = sums
         mean = along / count if under_load else 0.0
         former_mean = changes / count if under_load else 0.0
@@ -292,7 +292,7 @@ def cut_step(
 
 def inner_at(values: Array, field: Array, cells: Array) -> float:
     """Return the inner product of a vector and the values of a field at some cells."""
-    return _inner_at(values.size, values, field, cells, real=field.dtype)[0]
+    return _inner_at(values.size, values, field, cells)[0]
 
 
 def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
@@ -316,7 +316,7 @@ def advance(
 ) -> None:
     """Take a fraction of a trial step: change the pressure at the free cells, and the separation everywhere."""
     _put(cells.size, pressure, cells, held, trial, change, fraction)
-    _add(separation.size, separation, response, fraction, real=response.dtype)
+    _add(separation.size, separation, response, fraction)
 
 
 class Scatter:

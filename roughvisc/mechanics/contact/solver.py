@@ -14,9 +14,7 @@ The method is constrained conjugate gradients on an evolving contact area [1]_. 
    A projected-gradient step is also taken if the duality gap has not halved in 30 iterations.
 5. Without a first guess, under a load and from 256 cells a side, the contact is solved on half the cells first.
 6. From 768 cells a side the preconditioner has a second level for contact in many small spots.
-7. Far from the solution, steps are convolved in single precision and added to the displacement in double. Before the
-   solution is accepted, its displacement is computed in double precision and its error estimated again.
-8. Under periodic boundaries a uniform pressure does not displace a half-space. A given approach therefore needs a
+7. Under periodic boundaries a uniform pressure does not displace a half-space. A given approach therefore needs a
    separate check of the load near full contact.
 
 Vectors hold the values of the *free* cells, which carry pressure or penetrate. All pressures and lengths are divided by
@@ -35,7 +33,7 @@ import numpy as np
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.contact import passes as host
-from roughvisc.mechanics.contact.passes import inner, largest
+from roughvisc.mechanics.contact.passes import inner
 from roughvisc.mechanics.grid import Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
@@ -56,9 +54,6 @@ NEARLY_MINIMUM = 0.1
 #: Safety factor that makes the estimated error hardly ever too small; and the factor with the second level of the
 #: preconditioner.
 CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
-#: Number of cells from which steps are convolved in single precision, and the least ratio of the first error to the
-#: tolerance. About four steps pay for the final convolution in double precision.
-SINGLE_FROM, FAR = 96**2, 30.0
 #: Rounding of a displacement, relative to its largest value.
 ROUNDING = 8 * float(np.finfo(float).eps)
 #: Distance to the approach of full contact, over the approach, below which the load is undetermined.
@@ -196,7 +191,7 @@ def solve_contact(
     touching = cells.size  # number of cells in contact
     previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
     requested_size, requested_duality = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
-    length, error, best, stalled, is_single = 1.0, math.inf, math.inf, 0, False
+    length, error, best, stalled = 1.0, math.inf, math.inf, 0
     for iteration in range(max_iterations + 1):
         # The gap is closed under a given approach: the energy decreases if all cells carry less.
         if is_blind and touching == gap.size:
@@ -229,14 +224,10 @@ def solve_contact(
         if is_solved and is_blind and 4 * touching > gap.size:
             error += load_error(grid, separation.reshape(gap.shape), xp.flatnonzero(pressure), level, present, total)
             is_solved = error <= tolerance
-        if is_solved and not is_single:
+        if is_solved:
             break
         if iteration == max_iterations:
             raise ConvergenceError(unsolved(iteration, error, tolerance))
-        if is_solved:  # the error is estimated again in double precision
-            separation = separation_under(pressure)
-            is_single, previous = False, None
-            continue
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
         waves = LongWaves.of(grid, cells, held, energy, on_grid) if has_blocks else None
         rest = residual
@@ -250,8 +241,6 @@ def solve_contact(
         direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
         requested_size, requested_duality = caution * requested_size, max(duality, 1e-300)
-        if iteration == 0:
-            is_single = gap.size >= SINGLE_FROM and requested_size > FAR * tolerance * total
 
         # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15).
         slope = 0.0
@@ -265,10 +254,6 @@ def solve_contact(
             trial = onto_simplex(moved, 1.0) if under_load else xp.maximum(moved, 0)
             change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
             slope = inner(change, residual)
-            if not slope < 0 and is_single:
-                separation = separation_under(pressure)
-                is_single = False
-                continue
             if not slope < 0:  # the minimum, to rounding
                 error = requested_size / max(total, 1e-300)
                 if error > tolerance and duality > rounding:
@@ -276,11 +261,7 @@ def solve_contact(
                 break
 
         # Minimize the energy along the search direction, equation (11): one convolution.
-        if is_single:
-            most = largest(abs(change))
-            response = grid.displacement(on_grid(change, cells, most)).reshape(-1)
-            response *= most
-        elif is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
+        if is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
             response -= separation - given
         else:
@@ -288,7 +269,7 @@ def solve_contact(
         curvature = passes.inner_at(change, response, cells)
         minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
         fraction, was_cut = passes.admissible_fraction(held, trial, change, minimum)
-        if is_extrapolated and not is_single:  # take the whole step: the displacement is known exactly only for its end
+        if is_extrapolated:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
         passes.advance(pressure, separation, cells, held, trial, change, response, fraction)
