@@ -80,7 +80,7 @@ def to_table(out: str | Path) -> pd.DataFrame:
             status = "unconverged" if message else "converged"
             found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
             for name in variables_in_table("largest"):
-                known = filter(math.isfinite, entry.arrays.get(name, ()))
+                known = filter(np.isfinite, entry.arrays.get(name, ()))
                 found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
         elif record := recorded_failure(folder, key):
             status, message = "failed", str(record.get("message", ""))
