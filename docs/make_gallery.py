@@ -28,13 +28,10 @@ FIGURES = {
     "ball_on_rubber": {"section": rv.plot.section, "history": rv.plot.history},
     "load_sweep": {
         "sweep": lambda results: rv.plot.sweep(results, times=[0.01, -1]),
-        "histories": rv.plot.history,
+        "histories": lambda results: rv.plot.sweep(results, along="time"),
         "area": lambda results: rv.plot.area_against_load(by_load(results)),
     },
     "two_parameters": {
-        "map": lambda results: rv.plot.sweep(
-            results, along=["program.0.load", "material.kelvin_viscosity"]
-        ),
         "lines": lambda results: rv.plot.sweep(results, "approach", times=[0.01, 0.05]),
     },
     "thickness_sweep": {

@@ -72,8 +72,7 @@ def small_disk(tmp_path):
 @pytest.fixture
 def coarse_pictures(monkeypatch):
     """Pictures are written with few points, where nobody looks at them."""
-    write = save_module.write_png
-    monkeypatch.setattr(save_module, "write_png", lambda figure, file, _: write(figure, file, 40))
+    monkeypatch.setattr(save_module, "DPI", 40)
 
 
 @pytest.fixture

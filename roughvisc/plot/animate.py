@@ -14,8 +14,8 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, plane_ratio
-from roughvisc.plot.rows import measured_part, rows_of
+from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, map_size
+from roughvisc.plot.rows import rows_of
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.units import unit_for
 from roughvisc.variables import FIELDS, VARIABLES
@@ -61,7 +61,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
         writer = FFMpegWriter(fps=rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
     else:
         raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or, if ffmpeg is installed, .mp4")
-    dataset = measured_part(dataset.sortby(str(rows_of(dataset).name)))
+    dataset = dataset.sortby(str(rows_of(dataset).name))
     rows = rows_of(dataset).size
     chosen = np.unique(np.linspace(0, rows - 1, min(rows, frames)).round().astype(int)).tolist()
     # one colour scale for all frames
@@ -69,15 +69,11 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     low, high = min(one[0] for one in ends), max(one[1] for one in ends)
     unit = unit_for([high], VARIABLES[name].units)
     limits = {"vmin": float(unit(low)) if name == "displacement" else 1e-12 * float(unit(high))}
-    figure = style.new_figure(4.6, 1.2 + 3.3 * float(np.clip(plane_ratio(dataset), 0.3, 1.3)))
-    figure.set_dpi(100)
-    ax = figure.add_subplot()
+    figure, (ax,) = style.new_panels(1, 1, *map_size(dataset, 3.2, 4.2), lines=2)
     first = frame_of(dataset, name, chosen[0])
     image = draw_map(ax, first, unit, COLOUR_MAPS[name], vmax=float(unit(high)), **limits)
-    figure.colorbar(image, ax=ax, pad=0.02, aspect=22).set_label(unit.label(VARIABLES[name].label))
-    title, outline = ax.set_title(frame_title(dataset, chosen[0]), loc="left"), []
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # all frames use the layout of the first
+    style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
+    title, outline = ax.set_title("", loc="left"), []
 
     def draw(frame: int) -> list[Artist]:
         title.set_text(frame_title(dataset, frame))

@@ -19,7 +19,6 @@ from roughvisc.observables import history as steps_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.observables.theory import asperity_fraction, nominal_area_of, persson_fraction
 from roughvisc.plot import style
-from roughvisc.plot.sweep import sweep
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES, axis_of
@@ -51,7 +50,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     ----------
     dataset : xarray.Dataset
         One case's result. If it is merged with :func:`roughvisc.observables.area_by_theory`, the theory is drawn as
-        well. For several cases, one quantity is drawn as in :func:`sweep`.
+        well. :func:`sweep` draws several cases.
     quantities : sequence of str, optional
         One panel for each quantity. Default: force, approach, contact area, mean gap, work, friction coefficient, leak
         rate and conductances, if in the result; over the sliding distance, friction coefficient and contact area.
@@ -68,16 +67,12 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     InputError
         If the Dataset is not one case's result, or lacks a quantity.
     """
-    names = [quantities] if isinstance(quantities, str) else quantities
-    if isinstance(dataset, xr.Dataset) and "case" in dataset.dims:
-        if names is not None and len(names) != 1:
-            raise InputError(key="quantities", found=names, expected="one quantity of several cases")
-        return sweep(dataset, names[0] if names else None, along=over or axis_of(dataset.variables))
     expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
     default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _COLOURS
-    names = [name for name in default if name in dataset] if names is None else list(names)
+    wanted = [name for name in default if name in dataset] if quantities is None else quantities
+    names = [wanted] if isinstance(wanted, str) else list(wanted)
     expect_result(dataset, over, *names)
     if not names:
         raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")
@@ -88,22 +83,19 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
         steps, kept = steps.isel(time=slice(begins, None)), kept.sel(time=slice(float(steps["time"][begins]), None))
     places = (steps if over in steps else kept)[over]
     columns = 1 if len(names) <= 3 else 2
-    size = (4.6 if columns == 1 else 7.2, 1.5 * -(-len(names) // columns) + 0.8)
-    figure, axes = style.new_panels(len(names), columns, *size, sharex=True)
+    size = (3.7, 1.1) if columns == 1 else (2.8, 1.05)
+    figure, axes = style.new_panels(len(names), columns, *size, shared="x", left=0.8)
     for ax, name in zip(axes, names, strict=True):
         line = steps if name in steps and over in steps else kept
         _draw_history(ax, name, line, kept, over, style.row_unit(places))
-        style.row_axis(ax, places)
-    style.label_outer(axes, columns, along_y=False)
+    style.row_axis(axes, places)
     style.letter_panels(axes)
+    style.align(axes)
     named = style.named_in(*axes)
     if steps.sizes[axis] > kept.sizes[axis] and kept.sizes[axis] <= _DOTS:
-        named = {
-            "time steps": Line2D([], [], color="0.3"),
-            "kept times": Line2D([], [], color="0.3", ls="", marker="o"),
-        } | named
+        dots = Line2D([], [], color="0.3", ls="", marker="o")
+        named = {"time steps": Line2D([], [], color="0.3"), "kept times": dots} | named
     style.legend_above(figure, named)
-    figure.align_ylabels(axes)
     return figure
 
 
@@ -165,12 +157,11 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     lines = {str(label): steps_of(dataset) for label, dataset in results.items()}
     loads, areas = (np.concatenate([one[name].values for one in lines.values()]) for name in ("force", "contact_area"))
     across, up = unit_for(loads, "N"), unit_for(areas, "m^2")
-    figure = style.new_figure(4.2, 3.4)
-    ax = figure.add_subplot()
+    figure, (ax,) = style.new_panels(1, 1, 3.4, 2.6, lines=0)
     for (label, one), colour in zip(lines.items(), style.CYCLE * len(lines), strict=False):
         look = {"marker": "o" if one["force"].size <= _DOTS else "", "color": colour}
         ax.plot(across(one["force"]), up(one["contact_area"]), label=style.verbatim(label), **look)
-    if contact_modulus is not None:
+    if contact_modulus is not None and loads.max() > 0:
         named = contact_modulus if isinstance(contact_modulus, Mapping) else {"": contact_modulus}
         first = next(iter(results.values()))
         expect_result(first, "height")
@@ -193,7 +184,7 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
 
 
 @style.apply
-def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
+def friction(dataset: xr.Dataset) -> Figure:
     """Draw friction coefficient and contact fraction against the logarithm of the speed.
 
     Bands show the error of the grid, if it is in the result. Speeds without a solution are missing.
@@ -202,11 +193,7 @@ def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     ----------
     dataset : xarray.Dataset
         Result of :func:`roughvisc.friction`, or of a study of friction. If it is merged with the result of
-        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines. For several cases, the friction
-        coefficient is drawn as in :func:`sweep`.
-    reduced : bool
-        Whether to draw several cases against the speed times the shift factor of the temperature, ``a_T V``. Curves of
-        several temperatures then fall on one master curve.
+        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines. :func:`sweep` draws several cases.
 
     Returns
     -------
@@ -217,8 +204,6 @@ def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     InputError
         If the Dataset does not hold friction over the speed.
     """
-    if isinstance(dataset, xr.Dataset) and "case" in dataset.dims:
-        return sweep(dataset, "friction_coefficient", along="reduced_speed" if reduced else "speed")
     panels = {"friction_coefficient": "grid_error_friction", "contact_fraction": "grid_error_area"}
     for name in panels:
         if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
@@ -226,7 +211,7 @@ def friction(dataset: xr.Dataset, *, reduced: bool = False) -> Figure:
     ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
     across = unit_for(ordered["speed"].values, "m/s")
     speed = across(ordered["speed"].values)
-    figure, axes = style.new_panels(2, 2, 6.4, 2.9)
+    figure, axes = style.new_panels(2, 2, 2.4, 2.0)
     named: dict[str, Artist] = {}
     for ax, (name, error), colour in zip(axes, panels.items(), (style.BLUE, style.CONTACT), strict=True):
         values, theory = ordered[name].values, f"persson_{name}"

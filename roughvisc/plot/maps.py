@@ -21,7 +21,7 @@ from roughvisc.arguments import one_of
 from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.rows import frames_at, measured_part, representative_frames, rows_of
+from roughvisc.plot.rows import frames_at, representative_frames, rows_of
 from roughvisc.topography.grid import cell_edges, cell_side, nominal_area
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES, axis_of
@@ -40,6 +40,8 @@ _OF_BLOCK = {"pressure": "max", "gap": "min", "flux": "max", "contact": "max"}
 MOST_CELLS = 1024
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN, _SPIKE = 99.8, 1.2
+#: Direction of the motion -> arrow on a map.
+_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
 
 
 def block_side(field: xr.DataArray | xr.Dataset) -> int:
@@ -63,9 +65,10 @@ def plane_unit(field: xr.DataArray | xr.Dataset) -> Unit:
     return unit_for([np.ptp(cell_edges(field[axis])) for axis in ("x", "y")], "m")
 
 
-def plane_ratio(field: xr.DataArray | xr.Dataset) -> float:
-    """Return the side of a map along y over its side along x."""
-    return float(np.ptp(cell_edges(field["y"])) / np.ptp(cell_edges(field["x"])))
+def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> tuple[float, float]:
+    """Return the size of the panel of a map, of the shape of the map unless it is a narrow strip. [inch]"""
+    ratio = float(np.clip(np.ptp(cell_edges(field["y"])) / np.ptp(cell_edges(field["x"])), 0.1, 10.0))
+    return min(width, height / ratio), min(height, width * ratio)
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, colours: str, **limits: Any) -> AxesImage:
@@ -74,7 +77,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, colours: str, **limits: 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
-        Panel to draw in.
+        Panel to draw in, of the shape of the map.
     field : xarray.DataArray, dims (x, y)
         Field, missing where the profile is missing. [SI]
     unit : Unit
@@ -93,14 +96,14 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, colours: str, **limits: 
         origin="lower",
         extent=(x[0], x[-1], y[0], y[-1]),
         cmap=matplotlib.colormaps[colours].with_extremes(bad=bad, under=under),
-        aspect="equal" if 0.1 < plane_ratio(field) < 10 else "auto",
+        aspect="auto",
         **limits,
     )
     ax.tick_params(direction="out")
-    ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    ax.yaxis.set_major_locator(MaxNLocator(4 if plane_ratio(field) > 0.4 else 2, steps=[1, 2, 5, 10]))
-    ax.set_xlabel(plane.label("x"))
-    ax.set_ylabel(plane.label("y"))
+    for axis, side in ((ax.xaxis, ax.bbox.width), (ax.yaxis, ax.bbox.height)):
+        most = int(np.clip(2.5 * side / ax.figure.dpi, 1, 4))
+        axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
+    style.label_panels([ax], plane.label("x"), plane.label("y"))
     return image
 
 
@@ -149,8 +152,7 @@ def draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Seq
             draw_outline(ax, dataset, frame)
         named["contact"] = Line2D([], [], color=style.CONTACT)
     extend = "max" if np.nanmax(values) > high else "neither"
-    bar = axes[0].figure.colorbar(images[0], ax=list(axes), pad=0.02, aspect=22, extend=extend)
-    bar.set_label(unit.label(VARIABLES[name].label))
+    style.colour_bar(images[0], axes, unit.label(VARIABLES[name].label), extend=extend)
     return named
 
 
@@ -162,10 +164,6 @@ def draw_outline(ax: Axes, dataset: xr.Dataset, frame: int) -> list[Artist]:
     plane = plane_unit(touching)
     x, y = plane(touching["x"]), plane(touching["y"])
     return [ax.contour(x, y, touching.transpose("y", "x"), levels=[0.5], colors=style.CONTACT, linewidths=0.7)]
-
-
-#: Direction of the motion -> arrow on a map.
-_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
 
 
 def frame_title(dataset: xr.Dataset, frame: int) -> str:
@@ -187,9 +185,8 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
     the flux. On a map of the displacement the contact has an outline. Above 1024 cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
-    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. Only
-    the measured part of a mirrored surface is drawn. For friction, an arrow shows the direction of motion of the
-    profile.
+    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. For
+    friction, an arrow shows the direction of motion of the profile.
 
     Parameters
     ----------
@@ -222,33 +219,30 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     stored = [name for name in fields if name in dataset]
     if not stored:
         expect_result(dataset, *fields)
-    whole, dataset = dataset, measured_part(dataset)
     frames = representative_frames(dataset) if times is None else frames_at(dataset, times)
-    ratio = float(np.clip(plane_ratio(dataset), 0.1, 2.5))
-    columns = 1 if ratio < 0.4 else min(len(frames), 4)
-    rows = -(-len(frames) // columns)
-    width = 4.0 if ratio < 0.4 else max(1.5, 2.9 - 0.45 * columns)
-    size = (width * columns + 1.4, (0.82 * width * ratio + 0.35) * rows * len(stored) + 0.9)
-    figure = style.new_figure(*size)
-    axes = figure.subplots(rows * len(stored), columns, sharex=True, sharey=True, squeeze=False)
-    panels = axes.reshape(len(stored), -1)
-    named: dict[str, Artist] = {}
-    for name, row in zip(stored, panels, strict=True):
-        for unused in row[len(frames) :]:
-            unused.remove()
-        named |= draw_field(row[: len(frames)], dataset, name, frames)
-    shown = list(panels[:, : len(frames)].ravel())
-    for ax in shown:
-        ax.label_outer()
+    columns = min(len(frames), 4)
+    width = max(1.3, 2.9 - 0.45 * columns)
+    width, height = map_size(dataset, width, 2.5 * width)
+    if width > 3 * height:  # strips are stacked
+        columns, (width, height) = 1, map_size(dataset, 4.5, 4.0)
+    blank = -len(frames) % columns  # every field begins a row
     titles = [frame_title(dataset, frame) for frame in frames]
-    style.letter_panels(shown, titles if rows == 1 else titles * len(stored))
-    style.legend_above(figure, named)
-    notes = ["Measured area only; mirror images are not shown."] if dataset is not whole else []
+    count, lines = (len(frames) + blank) * len(stored) - blank, 1 + max(title.count("\n") for title in titles)
+    look = {"shared": "xy", "left": 0.65, "between": max(0.3, 1.5 - width), "lines": lines}  # room for the titles
+    figure, panels = style.new_panels(count, columns, width, height, **look)
+    named: dict[str, Artist] = {}
+    shown: list[Axes] = []
+    for number, name in enumerate(stored):
+        first = number * (len(frames) + blank)
+        row = panels[first : first + len(frames)]
+        for unused in panels[first + len(frames) : first + len(frames) + blank]:
+            unused.remove()
+        named |= draw_field(row, dataset, name, frames)
+        shown += row
+    style.letter_panels(shown, titles * len(stored))
     if (every := block_side(dataset)) > 1:
-        notes.append(f"One cell drawn for {every} × {every}, with its largest pressure and smallest gap.")
-    style.note_below(figure, " ".join(notes))
-    if (layout := figure.get_layout_engine()) is not None:
-        layout.execute(figure)  # panels of a fixed aspect find their place in the second pass, when they are drawn
+        style.note_below(figure, f"One cell drawn for {every} × {every}, with its largest pressure and smallest gap.")
+    style.legend_above(figure, named)
     return figure
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.topography.borders import MIRRORED, is_mirrored
 from roughvisc.units import in_si
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
@@ -28,14 +27,12 @@ def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
     wanted = np.atleast_1d(np.asarray(in_si(places, VARIABLES[name].units, f"{name}s"), dtype=float)).ravel()
     if not 0 < wanted.size <= MOST:
         raise InputError(key=f"{name}s", found=f"{wanted.size} {name}s", expected=f"1 to {MOST}")
-    frames = []
-    for place in wanted:
-        from_end = place < 0 and place == int(place) and -place <= rows.size
-        if not np.isfinite(place) or (place < 0 and not from_end):
-            expected = f"a {name} [{VARIABLES[name].units}], or -1 to -{rows.size} to count from the end"
-            raise InputError(key=name, found=float(place), expected=expected)
-        frames.append(rows.size + int(place) if from_end else int(np.abs(rows.values - place).argmin()))
-    return frames
+    from_end = (wanted < 0) & (wanted == np.floor(wanted)) & (-wanted <= rows.size)
+    if not (from_end | (wanted >= 0)).all() or not np.isfinite(wanted).all():
+        expected = f"{name}s [{VARIABLES[name].units}], or -1 to -{rows.size} to count from the end"
+        raise InputError(key=name, found=wanted.tolist(), expected=expected)
+    nearest = np.abs(rows.values - wanted[:, None]).argmin(axis=1)
+    return np.where(from_end, rows.size + wanted, nearest).astype(int).tolist()
 
 
 def largest_contact(dataset: xr.Dataset) -> int:
@@ -60,15 +57,3 @@ def representative_frames(dataset: xr.Dataset) -> list[int]:
     if largest not in spread and spread.size == 4:
         spread[1 if largest < spread[2] else 2] = largest
     return sorted({int(frame) for frame in spread})
-
-
-def measured_part(surface: Any) -> Any:
-    """Return the measured part of a result or surface that was extended by its mirror images.
-
-    A cropped surface keeps its history, so the heights must still equal their own mirror images.
-    """
-    mirrored = MIRRORED in str(surface.attrs.get("history", "")).split("\n")
-    height = surface if isinstance(surface, xr.DataArray) else surface.get("height")
-    if not mirrored or height is None or not is_mirrored(height.transpose("x", "y").values):
-        return surface
-    return surface.isel({axis: slice(0, surface.sizes[axis] // 2) for axis in ("x", "y")})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-import textwrap
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -13,7 +12,6 @@ from typing import Any, TypeVar
 
 import matplotlib
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
@@ -55,6 +53,8 @@ FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] 
     ),
     "surface": (surface, ("height",), "Surface after conditioning: heights, profile, distribution and spectrum."),
 }
+#: Resolution of pictures. [1/inch]
+DPI = 150
 #: Figures that are drawn unless all are requested.
 DEFAULT = ("friction", "history", "maps", "leakage")
 
@@ -67,7 +67,7 @@ def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Ite
 
 
 @matplotlib.rc_context(style.STYLE)
-def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = "") -> Path:
+def write_figure(figure: Figure, path: Path, title: str = "") -> Path:
     """Write a figure to a file in the format of its suffix, complete or not at all.
 
     Parameters
@@ -76,8 +76,6 @@ def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = ""
         Figure to write.
     path : Path
         File to write.
-    dpi : float
-        Resolution of pictures made of pixels.
     title : str
         Text above the figure, such as its case.
 
@@ -90,32 +88,14 @@ def write_figure(figure: Figure, path: Path, dpi: float = 150.0, title: str = ""
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is not a picture format: expected one of .png, .pdf, .svg")
     if title:
-        text = style.verbatim(textwrap.fill(title, int(13 * figure.get_figwidth())))
-        # a title of the figure would lie on its legend
-        (figure.legends[0].set_title if figure.legends else figure.suptitle)(text)
+        style.text_above(figure, title)
     with atomic_write(path) as temporary:
-        if kind == "png":
-            write_png(figure, temporary, dpi)
-        else:
-            figure.savefig(temporary, format=kind, dpi=dpi)
+        figure.savefig(temporary, format=kind, dpi=DPI)
     return path
 
 
-def write_png(figure: Figure, file: Any, dpi: float) -> None:
-    """Write a picture in one drawing; ``Figure.savefig`` draws twice and takes half as long again."""
-    figure.set_dpi(dpi)
-    FigureCanvasAgg(figure).print_png(file)
-
-
 def save_figures(
-    dataset: xr.Dataset,
-    folder: Any,
-    stem: str,
-    *,
-    suffix: str = ".png",
-    dpi: float = 150.0,
-    title: str = "",
-    names: Collection[str] | None = None,
+    dataset: xr.Dataset, folder: Any, stem: str, *, title: str = "", names: Collection[str] | None = None
 ) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
@@ -127,10 +107,6 @@ def save_figures(
         Folder for the files; created if absent.
     stem : str
         First part of every file name.
-    suffix : str
-        Format of the files, as in matplotlib: ``".png"``, ``".pdf"``, ``".svg"``.
-    dpi : float
-        Resolution of pictures made of pixels.
     title : str
         Text above each figure, such as its case.
     names : collection of str, optional
@@ -147,10 +123,8 @@ def save_figures(
         If the Dataset is not one case's result or allows no figure.
     """
     expect_result(dataset)
-    written = [
-        write_figure(figure, Path(folder, f"{stem}-{name}{suffix}"), dpi, title)
-        for name, _, figure in figures_of(dataset, names)
-    ]
+    figures = figures_of(dataset, names)
+    written = [write_figure(figure, Path(folder, f"{stem}-{name}.png"), title) for name, _, figure in figures]
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
         raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")
@@ -230,7 +204,7 @@ def results_of_sweep(folder: Path) -> xr.Dataset | None:
     return results if results["case_key"].size > 1 else None
 
 
-def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png", dpi: float = 150.0) -> list[Path]:
+def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:
     """Write the figures of a sweep, as ``sweep-contact_area.png``, ``sweep-approach.png`` and so on.
 
     Parameters
@@ -239,10 +213,6 @@ def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png"
         Result of :func:`roughvisc.open_results`.
     folder : path-like
         Folder for the files; created if absent.
-    suffix : str
-        Format of the files, as in matplotlib: ``".png"``, ``".pdf"``, ``".svg"``.
-    dpi : float
-        Resolution of pictures made of pixels.
 
     Returns
     -------
@@ -254,6 +224,4 @@ def save_sweep_figures(results: xr.Dataset, folder: Any, *, suffix: str = ".png"
     InputError
         If the Dataset does not hold several cases.
     """
-    return [
-        write_figure(figure, Path(folder, f"sweep-{name}{suffix}"), dpi) for name, _, figure in sweep_figures(results)
-    ]
+    return [write_figure(figure, Path(folder, f"sweep-{name}.png")) for name, _, figure in sweep_figures(results)]

@@ -1,10 +1,10 @@
-"""Look of all figures: fonts and colours, letters, legends and notes, linear and logarithmic axes."""
+"""Look of all figures: fonts, colours, panels of fixed size, legends, linear and logarithmic axes."""
 
 from __future__ import annotations
 
-import string
 import textwrap
 from collections.abc import Mapping, Sequence
+from string import ascii_lowercase
 from typing import Any
 
 import matplotlib
@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -27,8 +28,6 @@ STYLE = {
     "axes.linewidth": 0.7,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "figure.labelsize": 9,
-    "figure.titlesize": 9,
     "grid.color": "0.9",
     "grid.linewidth": 0.5,
     "legend.fontsize": 8,
@@ -49,8 +48,8 @@ BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "
 CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000", "0.5")
 #: Contact in all figures; cells without contact on a map of the pressure; missing cells.
 CONTACT, NO_CONTACT, MISSING = VERMILION, "#dceaf5", "0.72"
-#: Mean width of a letter in a legend, and width of an entry without its text. [inch]
-_LETTER, _ENTRY = 0.065, 0.5
+#: Mean width of a letter of 8 points, height of a line of text, and width of a colour bar with its labels. [inch]
+LETTER, _LINE, _BAR = 0.066, 0.16, 0.9
 #: Ratio of the largest to the smallest value from which an axis is logarithmic.
 _DECADES = 30.0
 
@@ -60,29 +59,115 @@ def apply(draw):
     return matplotlib.rc_context(STYLE)(draw)
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return a figure of a size [inch], independent of windows and of matplotlib's global state."""
-    return Figure(figsize=(width, height), layout="constrained")
+def new_panels(
+    count: int,
+    columns: int,
+    width: float,
+    height: float,
+    *,
+    shared: str = "",
+    left: float = 0.75,
+    bottom: float = 0.5,
+    between: float | None = None,
+    lines: int = 1,
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure, independent of windows and of matplotlib's global state, and its panels in rows of some columns.
+
+    Sizes of panels and margins are fixed, because a layout that measures every text takes longer than the drawing.
+
+    Parameters
+    ----------
+    count, columns : int
+        Numbers of panels and of columns.
+    width, height : float
+        Size of a panel without labels. [inch]
+    shared : str
+        Axes that all panels share: ``"x"``, ``"y"`` or ``"xy"``; only the outer panels have their labels.
+    left, bottom : float
+        Room for the labels of an axis. [inch]
+    between : float, optional
+        Distance of the columns. Default: room for the labels of the axis, if it has any. [inch]
+    lines : int
+        Number of lines of the titles of the panels.
+    """
+    rows, title, right = -(-count // columns), 0.15 + _LINE * lines, 0.2
+    across = (0.2 if "y" in shared else left) if between is None else between
+    up = title + (0.0 if "x" in shared else bottom)
+    whole = left + columns * width + (columns - 1) * across + right, title + rows * height + (rows - 1) * up + bottom
+    figure, axes = Figure(figsize=whole), []
+    for number in range(count):
+        row, column = divmod(number, columns)
+        x, y = left + column * (width + across), bottom + (rows - 1 - row) * (height + up)
+        place = (x / whole[0], y / whole[1], width / whole[0], height / whole[1])
+        first = axes[0] if axes else None
+        sharing = {f"share{axis}": first for axis in shared}
+        axes.append(figure.add_axes(place, **sharing))
+        axes[-1].tick_params(labelbottom="x" not in shared or number + columns >= count)
+        axes[-1].tick_params(labelleft="y" not in shared or not column)
+    return figure, axes
 
 
-def new_panels(count: int, columns: int, width: float, height: float, **options: Any) -> tuple[Figure, list[Axes]]:
-    """Return a figure of a size [inch] and its panels, in rows of some columns; `options` as in ``Figure.subplots``."""
-    figure = new_figure(width, height)
-    axes = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel()
-    for unused in axes[count:]:
-        unused.remove()
-    return figure, list(axes[:count])
+def label_panels(axes: Sequence[Axes], x: str, y: str = "") -> None:
+    """Label the horizontal axes, and with a text the vertical axes, of the panels that show their numbers."""
+    for ax in axes:
+        if ax.xaxis.get_tick_params()["labelbottom"]:
+            ax.set_xlabel(x)
+        if y and ax.yaxis.get_tick_params()["labelleft"]:
+            ax.set_ylabel(y)
 
 
-def label_outer(axes: Sequence[Axes], columns: int, *, along_y: bool = True) -> None:
-    """Keep labels of the horizontal axis at the lowest panels, and `along_y` of the vertical axis at the left ones."""
-    for number, ax in enumerate(axes):
-        is_lowest = number + columns >= len(axes)
-        ax.tick_params(labelbottom=is_lowest)
-        ax.set_xlabel(ax.get_xlabel() if is_lowest else "")
-        if along_y and number % columns:
-            ax.tick_params(labelleft=False)
-            ax.set_ylabel("")
+def align(axes: Sequence[Axes], distance: float = 0.45) -> None:
+    """Place the labels of the vertical axes at one distance [inch] from the panels."""
+    for ax in axes:
+        ax.yaxis.set_label_coords(-distance / (ax.get_position().width * ax.figure.get_figwidth()), 0.5)
+
+
+def grow(figure: Figure, *, top: float = 0.0, bottom: float = 0.0, right: float = 0.0) -> None:
+    """Add room [inch] at the edges of a figure, whose panels keep their sizes."""
+    width, height = figure.get_size_inches()
+    for ax in figure.axes:
+        x, y, side, up = ax.get_position(original=True).bounds
+        y, up = (y * height + bottom) / (height + top + bottom), up * height / (height + top + bottom)
+        ax.set_position((x * width / (width + right), y, side * width / (width + right), up))
+    figure.set_size_inches(width + right, height + top + bottom)
+
+
+def colour_bar(mappable: ScalarMappable, axes: Sequence[Axes], label: str, **options: Any) -> None:
+    """Draw a colour bar at the right of some panels; the figure grows if it has no room there."""
+    figure = axes[0].figure
+    right = max(ax.get_position().x1 for ax in axes) * figure.get_figwidth()
+    grow(figure, right=max(right + _BAR - figure.get_figwidth(), 0.0))
+    boxes, inch = [ax.get_position() for ax in axes], 1 / figure.get_figwidth()
+    low, high = min(box.y0 for box in boxes), max(box.y1 for box in boxes)
+    bar = figure.add_axes(((right + 0.1) * inch, low, 0.1 * inch, high - low))
+    figure.colorbar(mappable, cax=bar, **options).set_label(label)
+
+
+def text_above(figure: Figure, text: str) -> None:
+    """Write a text above everything else in a figure."""
+    lines = textwrap.wrap(text, int(figure.get_figwidth() / (1.2 * LETTER)))
+    grow(figure, top=0.05 + _LINE * len(lines))
+    figure.text(0.5, 1 - 0.05 / figure.get_figheight(), verbatim("\n".join(lines)), ha="center", va="top")
+
+
+def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -> None:
+    """Draw a legend above all panels, in as many columns as fit into the figure."""
+    if not named:
+        return
+    width, height = figure.get_size_inches()
+    columns = max(1, min(len(named), int(width / (0.5 + LETTER * max(map(len, named))))))
+    grow(figure, top=0.08 + 0.19 * (-(-len(named) // columns) + bool(title)))
+    look: dict[str, Any] = {"ncols": columns, "handlelength": 1.5, "columnspacing": 1.2, "title": title or None}
+    place = {"loc": "lower center", "bbox_to_anchor": (width / 2, height), "bbox_transform": figure.dpi_scale_trans}
+    figure.legend(list(named.values()), list(named), borderaxespad=0.2, **place, **look)
+
+
+def note_below(figure: Figure, note: str) -> None:
+    """Write a note below all panels, in lines no longer than the figure is wide; before any legend."""
+    if note:
+        lines = textwrap.wrap(note, int(figure.get_figwidth() / LETTER))
+        grow(figure, bottom=0.05 + _LINE * len(lines))
+        figure.text(0.5, 0.05 / figure.get_figheight(), "\n".join(lines), ha="center", va="bottom", fontsize=8)
 
 
 def verbatim(text: str) -> str:
@@ -93,29 +178,13 @@ def verbatim(text: str) -> str:
 def letter_panels(axes: Sequence[Axes], titles: Sequence[str] = ()) -> None:
     """Write (a), (b), ... and a title at the top left of the panels; a single panel has a title only."""
     for number, ax in enumerate(axes):
-        letter = rf"$\mathbf{{({string.ascii_lowercase[number]})}}$  " if 1 < len(axes) <= 26 else ""
+        letter = f"({ascii_lowercase[number]})  " if 1 < len(axes) <= 26 else ""
         ax.set_title(letter + (titles[number] if number < len(titles) else ""), loc="left")
-
-
-def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -> None:
-    """Draw a legend above all panels, in as many columns as fit into the figure."""
-    if named:
-        width = figure.get_figwidth() - 0.2
-        longest = max(len(line) for label in named for line in label.split("\n"))
-        columns = max(1, min(len(named), int(width / (_ENTRY + _LETTER * longest))))
-        look: dict[str, Any] = {"ncols": columns, "handlelength": 1.5, "columnspacing": 1.2, "title": title or None}
-        figure.legend(list(named.values()), list(named), loc="outside upper center", **look)
 
 
 def named_in(*axes: Axes) -> dict[str, Artist]:
     """Return label -> artist of everything with a label in some panels."""
     return {label: one for ax in axes for one, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-
-
-def note_below(figure: Figure, note: str) -> None:
-    """Write a note below all panels, in lines no longer than the figure is wide."""
-    if note:
-        figure.supxlabel("\n" + textwrap.fill(note, int(figure.get_figwidth() / _LETTER)), fontsize=8)
 
 
 def is_logarithmic(values: Any) -> bool:
@@ -140,8 +209,8 @@ def log_axis(axis: Axis, values: Any) -> None:
         decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
         ticks = [one for one in np.outer(decades, fine).ravel() if 0.999 * low <= one <= 1.001 * high]
         axis.set_ticks([0.0, *ticks[:: -(-len(ticks) // 5) or 1]])
-        axis.set_view_interval(-0.3 * low, 1.3 * high, ignore=True)
-        axis.axes.autoscale(axis=axis.axis_name, enable=False)
+        set_limits = axis.axes.set_xlim if axis.axis_name == "x" else axis.axes.set_ylim
+        set_limits(-0.3 * low, 1.3 * high)
     else:
         set_scale("log")
         if high < 1000 * low:
@@ -178,11 +247,11 @@ def row_unit(rows: xr.DataArray) -> Unit:
     return Unit(1.0, unit) if _spreads(rows.values) else unit_for(rows.values, unit)
 
 
-def row_axis(ax: Axes, rows: xr.DataArray) -> None:
-    """Scale and label the horizontal axis of times, speeds or distances; a logarithmic axis can show zero."""
+def row_axis(axes: Sequence[Axes], rows: xr.DataArray) -> None:
+    """Scale and label the shared horizontal axis of times, speeds or distances; a logarithmic axis can show zero."""
     if _spreads(rows.values) or str(rows.name).endswith("speed"):
-        log_axis(ax.xaxis, row_unit(rows)(rows))
-    ax.set_xlabel(row_unit(rows).label(described(rows)[0]))
+        log_axis(axes[0].xaxis, row_unit(rows)(rows))
+    label_panels(axes, row_unit(rows).label(described(rows)[0]))
 
 
 def _spreads(places: np.ndarray) -> bool:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.plot.maps import block_side, draw_map, drawn, plane_unit
-from roughvisc.plot.rows import measured_part
 from roughvisc.topography.bandwidth import off_plane
-from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.missing_points import fill
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
@@ -33,8 +33,8 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
-        Heights, peaks up; missing points are grey. Only the measured part of a mirrored surface is drawn. The colour
-        scale covers at most five robust standard deviations, so that a spike does not flatten the rest. [m]
+        Heights, peaks up; missing points are grey. The colour scale covers at most five robust standard deviations, so
+        that a spike does not flatten the rest. [m]
 
     Returns
     -------
@@ -46,19 +46,17 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
     a Hann window, after missing points are filled.
     """
-    history = getattr(height, "attrs", {}).get("history")
-    whole = checked(height, "surface", least=1).rename("height")
-    whole = whole.assign_attrs({"history": history} if history else {})
-    if not np.isfinite(whole).any():
+    height = checked(height, "surface", least=1).rename("height")
+    if not np.isfinite(height).any():
         raise InputError("the surface is all missing: nothing to draw")
-    height = measured_part(whole)
     low, high = robust_limits(height.values)
     unit, plane = unit_for(max(high - low, abs(low), abs(high)), "m"), plane_unit(height)
-    figure = style.new_figure(7.0, 5.2)
-    on_map, profile, heights, spectrum = figure.subplots(2, 2).ravel()
+    ratio = float(np.ptp(cell_edges(height["y"])) / np.ptp(cell_edges(height["x"])))
+    figure, axes = style.new_panels(4, 2, 2.4, 2.4 * float(np.clip(ratio, 0.5, 1.6)), between=1.65)
+    on_map, profile, heights, spectrum = axes
     limits = (float(unit(low)), float(unit(high)) if high > low else float(unit(low)) + 1.0)
     image = draw_map(on_map, drawn(height), unit, "cividis", vmin=limits[0], vmax=limits[1])
-    figure.colorbar(image, ax=on_map, pad=0.02, aspect=22).set_label(unit.label("Height"))
+    style.colour_bar(image, [on_map], unit.label("Height"))
     line = height.isel(y=height.sizes["y"] // 2)
     profile.plot(plane(line["x"]), unit(line), color=style.BLUE, lw=0.9)
     on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
@@ -69,20 +67,19 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     levelled = off_plane(height)
     _draw_heights(heights, levelled.values[np.isfinite(levelled.values)])
     _draw_spectrum(spectrum, levelled)
-    style.letter_panels((on_map, profile, heights, spectrum))
+    style.letter_panels(axes)
     missing, beyond = float(height.isnull().mean()), float(((height < low) | (height > high)).mean())
     every = block_side(height)
     notes = [
-        "Measured area only; mirror images are not shown." if height.size < whole.size else "",
-        f"{100 * missing:.2g} % of the points are missing (grey)." if missing else "",
-        f"{100 * beyond:.2g} % of the points lie beyond the colour scale." if beyond else "",
-        f"One point of the map is the mean of {every} × {every}." if every > 1 else "",
+        f"{100 * missing:.2g} % of the points are missing." if missing else "",
+        f"{100 * beyond:.2g} % of the heights lie beyond the colour scale." if beyond else "",
+        f"One cell drawn for {every} × {every}." if every > 1 else "",
     ]
     style.note_below(figure, " ".join(filter(None, notes)))
     return figure
 
 
-def _draw_heights(ax, known: np.ndarray) -> None:
+def _draw_heights(ax: Axes, known: np.ndarray) -> None:
     """Draw the histogram of the levelled heights, with the normal distribution of the same deviation."""
     low, high = robust_limits(known)
     unit, deviation = unit_for(max(abs(low), abs(high)), "m"), float(known.std())
@@ -103,7 +100,7 @@ def _draw_heights(ax, known: np.ndarray) -> None:
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
 
-def _draw_spectrum(ax, levelled: xr.DataArray) -> None:
+def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
     symbol, scale = "µm", 1e-6
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,6 @@ import pandas as pd
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -28,8 +27,8 @@ from roughvisc.study.sweep_table import ITSELF, REALISATION
 from roughvisc.units import in_si, unit_for
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
-#: Largest number of panels, of values of a key in a legend, and of ticks.
-_MOST_PANELS, _MOST_NAMED, _MOST_TICKS = 12, 8, 12
+#: Largest number of panels, and of values of a key in a legend.
+_MOST_PANELS, _MOST_NAMED = 12, 8
 #: Viridis without its light end, which is hard to see on a white page.
 _SHADES = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.88, 256)))
 _ITSELF_LINE = {"ls": (0, (4, 1.5)), "lw": 1.1}
@@ -103,13 +102,7 @@ def swept_keys(results: xr.Dataset) -> tuple[xr.Dataset, list[Key]]:
 
 
 @style.apply
-def sweep(
-    results: xr.Dataset,
-    quantity: str | None = None,
-    *,
-    along: str | Sequence[str] | None = None,
-    times: Any = None,
-) -> Figure:
+def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None = None, times: Any = None) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
     The key with the next most numbers colours the lines, all others make panels, up to twelve. Realisations are drawn
@@ -122,10 +115,9 @@ def sweep(
     quantity : str, optional
         A history of every case, such as ``"approach"``. Default: the contact area or, for friction, the friction
         coefficient.
-    along : str, or a pair, optional
+    along : str, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
-        ``"reduced_speed"`` for curves of all cases; or two keys for maps. Default: the key with most numbers, or the
-        speed.
+        ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the speed.
     times : float or str, or a list, optional
         The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time at which the
         cases differ by at least half of their largest difference. [s]
@@ -147,26 +139,20 @@ def sweep(
     curves = [str(name) for name, one in results.variables.items() if row in one.dims and not {"x", "y"} & {*one.dims}]
     if quantity not in curves:
         raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
-    dotted = {name: str(one.attrs.get("long_name", name)) for name, one in results.coords.items()}
+    dotted = {str(one.attrs.get("long_name", name)): str(name) for name, one in results.coords.items()}
     results, keys = swept_keys(results)
-    wanted = [along] if isinstance(along, str) else list(along or (["speed"] if axis == "speed" else []))
-    if wanted and (wanted[0] in curves or wanted[0] in VARIABLES):
-        over = wanted[0]
-        if over not in curves:
-            raise InputError(key="along", found=over, expected=f"one of {', '.join(sorted(curves))} in every case")
-        table = results[[quantity, over]].load().to_dataframe().reset_index()
-        return _draw(_known(table, quantity), results[quantity], keys, over=results[over])
-    known = {name: key for key in keys for name in (key.column, dotted[key.column])}
-    for name in wanted:
-        if name not in known:
-            raise InputError(key="along", found=name, expected=f"one of {', '.join([*known, axis])}")
-    chosen = [known[name] for name in wanted] or keys[:1]
+    along = along or ("speed" if axis == "speed" else keys[0].column if keys else "")
+    if along in curves:
+        table = _known(results[[quantity, along]].load().to_dataframe().reset_index(), quantity)
+        return _draw(table, results[quantity], keys, over=results[along])
+    chosen = [key for key in keys if key.column in (along, dotted.get(along))]
     if not chosen:
-        raise InputError("nothing varies between the cases: nothing to draw against")
-    keys = chosen + [key for key in keys if key not in chosen]
+        expected = ", ".join([*(name for name, one in dotted.items() if one in {key.column for key in keys}), *curves])
+        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=expected)
     table = _at_times(results, quantity, times)
-    keys.insert(2, Key("at", "", "", table["at"].unique().tolist()))
-    return _draw(table, results[quantity], keys, as_map=len(chosen) == 2)
+    at = Key("at", "", "", table["at"].unique().tolist())
+    others = [key for key in keys if key is not chosen[0]]
+    return _draw(table, results[quantity], [*chosen, *others[:1], at, *others[1:]])
 
 
 def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
@@ -204,15 +190,8 @@ def _at_times(results: xr.Dataset, quantity: str, times: Any = None) -> pd.DataF
     return _known(pd.concat(parts), quantity)
 
 
-def _draw(
-    table: pd.DataFrame,
-    quantity: xr.DataArray,
-    keys: list[Key],
-    *,
-    over: xr.DataArray | None = None,
-    as_map: bool = False,
-) -> Figure:
-    """Draw a table of cases: one key, or `over`, across; the next key as colours or upwards; the others as panels."""
+def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr.DataArray | None = None) -> Figure:
+    """Draw a table of cases: the first key, or `over`, across; the next key as colours; the others as panels."""
     name, units = style.described(quantity)
     values = table[str(quantity.name)].to_numpy()
     unit = unit_for([np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values, units)
@@ -225,50 +204,40 @@ def _draw(
     if over is not None:
         places = xr.DataArray(np.unique(table[str(over.name)]), name=over.name, attrs=over.attrs)
         table["across"] = style.row_unit(places)(table[str(over.name)])
-    elif across.is_numeric and not as_map:
-        table["across"] = table[across.column]
     else:
-        table["across"] = table[across.column].map(across.levels.index)
+        table["across"] = table[across.column] if across.is_numeric else table[across.column].map(across.levels.index)
     groups = {key.column: table[key.column].map(key.levels.index) for key in rest}
     panels = list(table.groupby(list(groups.values()))) if rest else [((), table)]
-    columns = 1 if not rest else len(rest[-1].levels) if len(rest[-1].levels) <= 4 else 3
-    rows = -(-len(panels) // columns)
-    size = (4.6 if columns == 1 else 1.2 + 2.3 * columns, 1.2 + (2.4 if rows == 1 else 1.8) * rows)
-    figure, axes = style.new_panels(len(panels), columns, *size, sharex=True, sharey=True)
-    norm = _norm(table["shown"])
-    for ax, (_, panel) in zip(axes, panels, strict=True):
-        if as_map:
-            cells = panel.pivot_table(index=second.column, columns=across.column, values="shown", aggfunc="mean")
-            cells = cells.reindex(index=second.levels, columns=across.levels)
-            ax.imshow(cells, origin="lower", aspect="auto", norm=norm, cmap="viridis", interpolation="nearest")
-            ax.set_facecolor(style.MISSING)
-        else:
-            for _, line in panel.groupby(families) if families else [((), panel)]:
-                colour = second.colour(line[second.column].iloc[0]) if second else style.BLUE
-                _draw_line(ax, line.sort_values("across"), colour, joined=across is None or across.is_numeric)
-            style.value_axis(ax, table["shown"])
-        ax.set_ylabel(second.label if as_map else unit.label(name))
-    ax = axes[0]
-    if as_map:
-        _level_ticks(ax.yaxis, second)
-    if over is not None:
-        style.row_axis(ax, places)
-    elif as_map or not across.is_numeric:
-        _level_ticks(ax.xaxis, across)
-    elif style.is_logarithmic(across.levels):
-        style.log_axis(ax.xaxis, across.levels)
-    for ax in axes:
-        ax.set_xlabel(axes[0].get_xlabel() if over is not None else across.label)
-    style.label_outer(axes, columns)
     titles = []
     for found, _ in panels:
         parts = (f"{key.name.lower()} {key.texts[i]} {key.symbol}".strip() for key, i in zip(rest, found, strict=True))
-        titles.append(textwrap.fill(", ".join(parts), 28))
-    style.letter_panels(axes, [one if one.startswith("t ") else one[:1].upper() + one[1:] for one in titles])
-    if as_map:
-        figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, pad=0.02, aspect=22).set_label(unit.label(name))
-    else:
-        _name_lines(figure, axes, table, second)
+        title = textwrap.fill(", ".join(parts), 26)
+        titles.append(title if title.startswith("t ") else title[:1].upper() + title[1:])
+    columns = 1 if not rest else len(rest[-1].levels) if len(rest[-1].levels) <= 4 else 3
+    width, height = (3.4, 2.0) if columns == 1 else (2.1, 1.7)
+    is_text = across is not None and not across.is_numeric
+    is_turned = is_text and style.LETTER * len(" ".join(across.texts)) > width
+    bottom = 0.45 + style.LETTER * max(map(len, across.texts)) if is_turned else 0.5
+    lines = 1 + max(title.count("\n") for title in titles)
+    figure, axes = style.new_panels(
+        len(panels), columns, width, height, shared="xy", bottom=bottom, lines=lines if any(titles) else 0
+    )
+    for ax, (_, panel) in zip(axes, panels, strict=True):
+        for _, line in panel.groupby(families) if families else [((), panel)]:
+            colour = second.colour(line[second.column].iloc[0]) if second else style.BLUE
+            _draw_line(ax, line.sort_values("across"), colour, joined=not is_text)
+        style.value_axis(ax, table["shown"])
+    if over is not None:
+        style.row_axis(axes, places)
+    elif is_text:
+        axes[0].set_xticks(range(len(across.texts)), across.texts)
+        for ax in axes:
+            ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
+    elif style.is_logarithmic(across.levels):
+        style.log_axis(axes[0].xaxis, across.levels)
+    style.label_panels(axes, axes[0].get_xlabel() if over is not None else across.label, unit.label(name))
+    style.letter_panels(axes, titles)
+    _name_lines(figure, axes, table, second)
     return figure
 
 
@@ -276,15 +245,6 @@ def _norm(values: Any) -> Normalize:
     """Return the colour scale of some values: logarithmic if they span decades."""
     low, high = float(np.min(values)), float(np.max(values))
     return LogNorm(low, high) if style.is_logarithmic(values) else Normalize(low, high if high > low else low + 1)
-
-
-def _level_ticks(axis: Axis, key: Key) -> None:
-    """Write the levels of a key at the places 0, 1, ... of an axis."""
-    places = range(0, len(key.levels), -(-len(key.levels) // _MOST_TICKS))
-    texts = [key.texts[i] for i in places]
-    axis.set_ticks(list(places), texts)
-    if axis.axis_name == "x" and sum(map(len, texts)) > 30:
-        axis.axes.tick_params(axis="x", labelrotation=90)
 
 
 def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> None:
@@ -315,8 +275,7 @@ def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: K
     """Draw the legend or colour bar of the key that colours the lines, and entries for lines and bands."""
     named: dict[str, Artist] = {}
     if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
-        bar = ScalarMappable(_norm(second.levels), _SHADES)
-        figure.colorbar(bar, ax=axes, pad=0.02, aspect=22).set_label(second.label)
+        style.colour_bar(ScalarMappable(_norm(second.levels), _SHADES), axes, second.label)
     elif second and len(second.levels) <= 2 * _MOST_NAMED:
         colours = (second.colour(level) for level in second.levels)
         named = {text: Line2D([], [], color=one, marker="o") for text, one in zip(second.texts, colours, strict=True)}

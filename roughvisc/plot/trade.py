@@ -54,7 +54,7 @@ def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> F
     shown = [name for name in wanted if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")
-    figure, axes = style.new_panels(len(shown), len(shown), 0.6 + 3.3 * len(shown), 3.7)
+    figure, axes = style.new_panels(len(shown), len(shown), 2.7, 2.6)
     for ax, name in zip(axes, shown, strict=True):
         _draw_trade(ax, dataset, name)
     style.letter_panels(axes)
@@ -141,8 +141,10 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     wide = bool(np.abs(logs).max() > 0.5)
     ends, middle = (np.exp(logs), 1.0) if wide else (100 * np.expm1(logs), 0.0)
     count = min(rows.size, 2)
-    figure, axes = style.new_panels(count, count, 2.0 + 2.4 * count, 2.9)
-    ax, places = axes[0], np.arange(len(names) + 1)[::-1]
+    names = [*names, "all together"]
+    left = 0.2 + style.LETTER * max(map(len, names))
+    figure, axes = style.new_panels(count, count, 2.1, 2.1, left=left, between=0.75)
+    ax, places = axes[0], np.arange(len(names))[::-1]
     colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
     ax.barh(places, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
     for place, state in zip(places, at["state"].values.astype(str), strict=False):
@@ -154,7 +156,7 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
         style.log_axis(ax.xaxis, ends)
     text = AXES[axis].place(float(rows[row]))
     ax.set_xlabel(f"Factor of the value at {text} [-]" if wide else f"Error at {text} [%]")
-    ax.set_yticks(places, [*names, "all together"])
+    ax.set_yticks(places, names)
     ax.tick_params(axis="y", length=0)
     ax.use_sticky_edges = False  # else a bar ends at the frame
     ax.margins(x=0.15, y=0.06)
@@ -165,7 +167,7 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
         over = style.row_unit(rows)(rows)
         curve.fill_between(over, unit(dataset["lower"]), unit(dataset["upper"]), color=style.BLUE, alpha=0.25, lw=0)
         curve.plot(over, unit(dataset["value"]), "o-", color=style.BLUE)
-        style.row_axis(curve, rows)
+        style.row_axis([curve], rows)
         curve.set_ylabel(unit.label(dataset.attrs["quantity"].replace("_", " ").capitalize()))
         if wide:
             curve.set_yscale("log")

@@ -20,7 +20,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import cost_of, warnings_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, write_png
+from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit.audit import audit
@@ -133,7 +133,7 @@ def _failures(folder: Path) -> list[dict[str, str]]:
 def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     """Return a figure as a PNG in a data URL, with its caption."""
     stream = io.BytesIO()
-    write_png(figure, stream, _DPI)
+    figure.savefig(stream, format="png", dpi=_DPI)
     src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
     return {"caption": caption, "src": src, "wide": figure.get_figwidth() > _WIDE}
 

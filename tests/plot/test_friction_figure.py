@@ -103,24 +103,16 @@ def several(shift=(1.0, 100.0)):
     return found.assign_coords(material_temperature=("case", np.array([293.0, 313.0]), kelvin))
 
 
-def test_friction_of_a_sweep__has_a_line_a_case_and_a_legend():
-    figure = rv.plot.friction(several())
+def test_sweep__of_friction_has_a_line_for_each_case_also_against_the_reduced_speed():
+    figure = rv.plot.sweep(several())
     (friction,) = figure.axes
-    full = [line for line in friction.lines if line.get_linestyle() == "-"]
-    assert [line.get_ydata().tolist() for line in full] == [[0.01, 0.2, 0.3]] * 2
+    assert [line.get_ydata().tolist() for line in friction.lines] == [[0.01, 0.2, 0.3]] * 2
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["293", "313"]
-    assert friction.get_xlabel().startswith("Speed [")
-    assert friction.get_ylabel() == "Friction coefficient"
+    assert (friction.get_xlabel(), friction.get_ylabel()) == ("Speed [mm/s]", "Friction coefficient")
     assert friction.get_xscale() == "log"
-
-
-def test_friction_of_a_sweep__against_the_reduced_speed():
-    (friction,) = rv.plot.friction(several(), reduced=True).axes
-    at = [line.get_xdata() for line in friction.lines if line.get_linestyle() == "-"]
+    (friction,) = rv.plot.sweep(several(), along="reduced_speed").axes
+    at = [line.get_xdata() for line in friction.lines]
     np.testing.assert_allclose(at[1], 100 * at[0])
-    assert "a_T V" in friction.get_xlabel()
-    with pytest.raises(rv.InputError, match="reduced_speed"):
-        rv.plot.friction(several().drop_vars("reduced_speed"), reduced=True)
 
 
 def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shifted(tmp_path, coarse_pictures):

@@ -1,6 +1,6 @@
 """Figures by their artists: what is drawn, and in which units."""
 
-import io
+import itertools
 
 import matplotlib
 import numpy as np
@@ -8,6 +8,7 @@ import pytest
 import sample_results as made
 import xarray as xr
 from matplotlib.animation import FFMpegWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
 from PIL import Image
 from support import lines, refused
@@ -23,12 +24,44 @@ def images(figure):
     return [image for ax in figure.axes for image in ax.images]
 
 
-@pytest.mark.parametrize("draw", [plot.history, plot.maps, plot.section, plot.surface, plot.area_against_load])
+def boxes(figure):
+    """Return name -> extent of each panel with its labels, the legend, and each text. [pixel]"""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    found = {f"panel {number}": ax.get_tightbbox(renderer) for number, ax in enumerate(figure.axes)}
+    artists = [*figure.legends, *figure.texts]
+    return found | {f"text {number}": one.get_window_extent(renderer) for number, one in enumerate(artists)}
+
+
+DRAWN = {
+    "history": plot.history,
+    "loop": lambda ds: plot.history(ds, "force", over="approach"),
+    "maps": lambda ds: plot.maps(ds, fields=["pressure", "gap"]),
+    "six times": lambda ds: plot.maps(ds, times=[0, 1, 1, 2, 3, -1]),
+    "strip": lambda ds: plot.maps(ds.assign_coords(y=ds.y / 12)),
+    "section": plot.section,
+    "surface": plot.surface,
+    "strip of a surface": lambda ds: plot.surface(ds.assign_coords(y=ds.y / 12)),
+    "tall surface": lambda ds: plot.surface(ds.assign_coords(x=ds.x / 12)),
+    "area against load": lambda ds: plot.area_against_load({"a": ds, "b": ds}, contact_modulus={"soft": 1e6}),
+}
+
+
+@pytest.mark.parametrize("draw", DRAWN)
 @pytest.mark.parametrize("make", [made.rough_creep, made.open_contact])
-def test_every_figure__is_drawn_without_a_warning_and_leaves_no_global_state(draw, make):
+def test_every_figure__has_nothing_cut_off_or_overlapping_and_leaves_no_global_state(draw, make):
     before = dict(matplotlib.rcParams)
-    draw(make()).savefig(io.BytesIO(), dpi=40)
+    figure = DRAWN[draw](make())
+    style.text_above(figure, "Load 5 mN, and a title that is long enough for several lines " * 2)
     assert dict(matplotlib.rcParams) == before
+    found = boxes(figure)
+    width, height = figure.get_size_inches() * figure.dpi
+    for name, box in found.items():
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0, name
+    for (name, box), (other, its) in itertools.combinations(found.items(), 2):
+        overlap = min(box.x1, its.x1) - max(box.x0, its.x0), min(box.y1, its.y1) - max(box.y0, its.y0)
+        assert min(overlap) < 2, (name, other)
 
 
 @pytest.mark.parametrize("draw", [plot.maps, plot.section])
@@ -133,19 +166,6 @@ def test_maps__of_the_flux_show_the_largest_one():
     assert any(drawn.max() == pytest.approx(unit * largest, rel=1e-9) for unit in (1e6, 1e12))
 
 
-@pytest.mark.parametrize("of", ["heights", "result"])
-def test_surface__of_a_mirrored_surface_is_the_measured_part_cut_through_its_middle(of):
-    measured = rv.self_affine((3e-4, 2e-4), (30, 21), hurst=0.8, rms_height=1e-6, seed=3)
-    mirrored = rv.mirror(measured)
-    if of == "result":
-        mirrored = (
-            mirrored.drop_attrs(deep=False).to_dataset(name="height").assign_attrs(history=mirrored.attrs["history"])
-        )
-    on_map, profile = plot.surface(mirrored).axes[:2]
-    np.testing.assert_allclose(on_map.images[0].get_array(), 1e6 * measured.T)
-    np.testing.assert_allclose(profile.lines[0].get_ydata(), 1e6 * measured.isel(y=10))
-
-
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_section__surfaces_touch_where_pressure_is(axis):
     ds = made.hertz_creep()
@@ -180,15 +200,15 @@ def test_surface__states_the_sq_and_the_spectrum_of_the_levelled_heights():
 
 
 @pytest.mark.thorough
-def test_save_figures__writes_what_the_result_allows(tmp_path):
+def test_save_figures__writes_what_the_result_allows(tmp_path, coarse_pictures):
     ds = made.hertz_creep(shape=(21, 16))
-    written = plot.save_figures(ds, tmp_path / "figures", "sphere", dpi=50)
+    written = plot.save_figures(ds, tmp_path / "figures", "sphere")
     assert [path.name for path in written] == [
         f"sphere-{name}.png" for name in ("history", "maps", "section", "surface")
     ]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
-    few = plot.save_figures(ds[["force", "approach"]].isel(time=[3]), tmp_path, "few", suffix=".pdf")
-    assert [path.name for path in few] == ["few-history.pdf"]
+    few = plot.save_figures(ds[["force", "approach"]].isel(time=[3]), tmp_path, "few")
+    assert [path.name for path in few] == ["few-history.png"]
     with pytest.raises(InputError, match="allows no figure"):
         plot.save_figures(ds[["approach_error"]], tmp_path, "none")
 

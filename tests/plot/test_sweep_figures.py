@@ -82,21 +82,6 @@ def test_sweep__of_two_keys_has_a_panel_for_each_time():
             np.testing.assert_allclose(line.get_ydata(), share * power * LOADS**0.9)
 
 
-def test_sweep__along_two_keys_is_a_map_with_the_absent_case_missing():
-    ds = stacked(by_both, program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES).isel(case=slice(1, None))
-    for turned in (False, True):
-        keys = ["program.0.load", "material.kelvin_viscosity"][:: -1 if turned else 1]
-        ax = plot.sweep(ds, along=keys).axes[0]
-        cells = np.ma.masked_invalid(ax.images[0].get_array())
-        expected = by_both(LOADS, np.array(VISCOSITIES)[:, None]) * 1e6
-        expected[0, 0] = np.nan
-        np.testing.assert_allclose(cells.filled(np.nan), expected.T if turned else expected)
-        labels = ("Load [mN]", "Kelvin viscosity [kPa s]")
-        assert (ax.get_xlabel(), ax.get_ylabel()) == labels[:: -1 if turned else 1]
-        ticks = ax.get_xticklabels() if turned else ax.get_yticklabels()
-        assert [text.get_text() for text in ticks] == ["1", "10", "100", "1000"]
-
-
 def test_sweep__along_words_and_an_infinite_number_draws_every_case():
     ds = stacked(by_load, program__0__load=LOADS)
     thickness = xr.DataArray([1e-3, 2e-3, np.inf], dims="case", attrs={"units": "m", "long_name": "material.thickness"})
@@ -106,9 +91,9 @@ def test_sweep__along_words_and_an_infinite_number_draws_every_case():
 
 
 @pytest.mark.parametrize("count", [2, 100])
-def test_history_of_a_sweep__names_its_lines_in_a_legend_or_a_colour_bar(count):
+def test_sweep__over_time_names_its_lines_in_a_legend_or_a_colour_bar(count):
     loads = np.geomspace(0.01, 1.0, count)
-    figure = plot.history(stacked(by_load, program__0__load=loads))
+    figure = plot.sweep(stacked(by_load, program__0__load=loads), along="time")
     ax = figure.axes[0]
     assert len(ax.lines) == count
     for line, load in zip(ax.lines, loads, strict=True):
@@ -159,9 +144,9 @@ def band_at_end(ax, number):
     return at_end.min(), at_end.max()
 
 
-@pytest.mark.parametrize("draw", [plot.sweep, plot.history])
-def test_figures__draw_the_mean_of_the_realisations_their_band_and_the_scan(draw):
-    figure = draw(patches())
+@pytest.mark.parametrize("along", [None, "time"])
+def test_figures__draw_the_mean_of_the_realisations_their_band_and_the_scan(along):
+    figure = plot.sweep(patches(), along=along)
     (ax,) = figure.axes
     assert legend(figure)[-3:] == ["mean of 4 Gaussian surrogates", "95 % prediction interval", "measured scan"]
     top = 1e-7 * LOADS[-1] * 3 * (1e12 if "µm²" in ax.get_ylabel() else 1e6)
@@ -174,7 +159,7 @@ def test_figures__draw_the_mean_of_the_realisations_their_band_and_the_scan(draw
 def test_figures__a_realisation_without_a_result_does_not_count():
     ds = patches(1)
     hole = (ds["program_0_load"] == LOADS[1]) & (ds["realisation"] == 3)
-    (ax,) = plot.history(ds.where(~hole)).axes
+    (ax,) = plot.sweep(ds.where(~hole), along="time").axes
     top = 1e-7 * LOADS[1] * 3 * (1e12 if "µm²" in ax.get_ylabel() else 1e6)
     assert band_at_end(ax, 1) == pytest.approx([top * end for end in interval(FACTORS[[0, 1, 3, 4]])])
 
@@ -224,9 +209,11 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
     at_end = [float(one[int(rows) - 1]) for one, rows in zip(held.approach, held.rows, strict=True)]
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
     np.testing.assert_allclose(ax.lines[0].get_ydata(), scale * np.array(at_end))
-    assert [len(ax.lines) for ax in plot.history(results, "approach").axes] == [3, 3], "a panel for each hold"
+    assert [len(ax.lines) for ax in plot.sweep(results, "approach", along="time").axes] == [3, 3], (
+        "a panel for each hold"
+    )
     assert [name for name, _, _ in sweep_figures(results)] == ["area", "histories", "approach"], "the force is known"
-    written = plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)
+    written = plot.save_sweep_figures(results, tmp_path / "figures")
     assert [path.name for path in written] == ["sweep-area.png", "sweep-histories.png", "sweep-approach.png"]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
     assert results_of_sweep(tmp_path) is None

@@ -113,7 +113,7 @@ def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coa
     heading, *rows = (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig").splitlines()
     assert "leak_rate [m^3/s]" in heading
     assert len(rows) == 2
-    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures", dpi=40)]
+    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures")]
     assert {"sweep-leak_rate.png", "sweep-leak_rate-histories.png"} <= set(written)
 
 
