@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from roughvisc.errors import InputError
@@ -13,6 +15,46 @@ _OFF, _GAP = 0.01, 0.1
 _OBLIQUE = 0.01
 #: Largest number of lattice nodes per point.
 _SPARSE = 64
+
+
+def laid_out(
+    points: np.ndarray, side: float | None, metres: float, complaints: list[str]
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """Return heights over x and y, and the sides of their cells.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height.
+    side : float, optional
+        Side of the cells into which the points are sorted, in the unit of the points; None for their own lattice.
+    metres : float
+        Metres per unit of the points, for messages.
+    complaints : list of str
+        Gains a remark if cells hold no point.
+
+    Raises
+    ------
+    InputError
+        If the points lie on a line, or on no lattice if `side` is None.
+    """
+    spread = np.ptp(points[:, :2], axis=0)
+    if not spread.all():
+        raise InputError("its points lie on one line, a profile: expected an areal scan")
+    if side is not None:
+        heights, empty = gridded(points, side)
+        if empty:
+            complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
+        return heights, (side, side)
+    found = lattice(points)
+    if found is None:
+        proposed = 2e6 * metres * math.sqrt(spread[0] * spread[1] / len(points))
+        raise InputError(
+            f'its {len(points)} points lie on no regular lattice: expected grid = "{proposed:.2g} um", or similar',
+            key="grid",
+            expected="the side of the cells into which the points are sorted",
+        )
+    return found
 
 
 def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:

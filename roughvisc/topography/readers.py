@@ -24,7 +24,7 @@ from roughvisc.topography.formats.registry import Channel, ScanFile, brief, forg
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.orientation import orientation, top_line_first
-from roughvisc.topography.points import gridded, lattice
+from roughvisc.topography.points import laid_out
 from roughvisc.units import Quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
@@ -89,14 +89,12 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     """Return the heights of a channel over x and y. [m]"""
     xy, z = _metres(channel, how)
     if how.grid is not None and (channel.kind != "points" or how.spacing is not None):
-        raise InputError(
-            "grid: expected none for a map, or with a spacing", key="grid", found=how.grid, expected="none"
-        )
+        raise InputError(key="grid", found=how.grid, expected="none for a map, or with a spacing")
     raw, sides = channel.load(), channel.spacing
     if channel.kind == "points":
         points = raw[np.isfinite(raw[:, :2]).all(axis=1)]
         points[:, 2] = _without_no_data(points[:, 2], how.no_data, file.complaints)
-        values, sides = _of_points(points, xy, how.grid, file.complaints)
+        values, sides = laid_out(points, None if how.grid is None else how.grid / xy, xy, file.complaints)
     else:
         values = _without_no_data(np.asarray(raw, dtype=float), how.no_data, file.complaints)
     values = values * z * (1.0 if how.height_scale is None else how.height_scale)
@@ -110,74 +108,42 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
-        masks = {name: one for name, one in raw.coords.items() if set(one.dims) == {"x", "y"}}
+        masks = {name: one.variable for name, one in raw.coords.items() if set(one.dims) == {"x", "y"}}
         h = h.assign_coords({name: (("x", "y"), one.transpose("x", "y").values) for name, one in masks.items()})
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
-    for axis in ("x", "y"):
-        if h.sizes[axis] > 1 and h[axis][0] > h[axis][-1]:
-            h = h.isel({axis: slice(None, None, -1)})
+    h = h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]})
     return checked(h, "grid", least=1)
 
 
 def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
-    stated = {
-        unit: number(f"1 {unit}", "m", "the unit in the file") for unit in (channel.unit, channel.lateral_unit) if unit
-    }
-    sized = channel.spacing is not None or channel.positions is not None or channel.kind == "points"
-    needs_xy = sized and channel.lateral_unit is None and how.spacing is None
+    sizes = (channel.spacing, channel.positions, how.spacing)
+    is_sized = channel.kind == "points" or any(size is not None for size in sizes)
+    needs_xy = is_sized and channel.lateral_unit is None and how.spacing is None
     needs_z = channel.unit is None
-    for key, given, serves in (
-        ("unit", how.unit, needs_xy or (needs_z and how.height_unit is None)),
-        ("height_unit", how.height_unit, needs_z),
-    ):
-        for unit, metres in stated.items() if given is not None and not serves else ():
-            factor = number(f"1 {given}", "m") / metres
+    is_used = {"unit": needs_xy or (needs_z and how.height_unit is None), "height_unit": needs_z}
+    for key in (key for key, used in is_used.items() if not used and getattr(how, key) is not None):
+        given = getattr(how, key)
+        for stated in filter(None, (channel.unit, channel.lateral_unit)):
+            factor = number(f"1 {given}", "m") / number(f"1 {stated}", "m")
             if not math.isclose(factor, 1.0):
                 hint = f"; height_scale = {factor:.6g} if its numbers are in {given}" if channel.unit else ""
-                raise InputError(
-                    f"it states its unit as {unit!r}: expected no {key} = {given!r}{hint}",
-                    key=key,
-                    found=given,
-                    expected="none",
-                )
-    lacks = ["unit of its heights"] if needs_z and how.unit is how.height_unit is None else []
-    lacks += ["unit of x and y"] if needs_xy and how.unit is None else []
-    both = " (and height_unit = ..., if heights have another unit)" if len(lacks) == 2 else ""
-    expected = {"unit": f'unit = "um", or another unit{both}'} if lacks else {}
-    if not sized and how.spacing is None:
-        lacks.append("size")
-        expected["spacing"] = 'spacing = "1 um", or another length'
-    if lacks:
-        text = f"it states no {' and no '.join(lacks)}: expected {'; and '.join(expected.values())}"
-        raise InputError(text, key=next(iter(expected)), expected=next(iter(expected.values())))
-    given = number(f"1 {how.unit}", "m") if how.unit else 1.0
-    z = stated[channel.unit] if channel.unit else number(f"1 {how.height_unit or how.unit}", "m")
-    return stated[channel.lateral_unit] if channel.lateral_unit else given, z
-
-
-def _of_points(
-    points: np.ndarray, metres: float, grid: float | None, complaints: list[str]
-) -> tuple[np.ndarray, tuple[float, float]]:
-    """Return heights and cell sides of points, in the unit of the file."""
-    spread = np.ptp(points[:, :2], axis=0)
-    if not spread.all():
-        raise InputError("its points lie on one line, a profile: expected an areal scan")
-    if grid is not None:
-        side = grid / metres
-        heights, empty = gridded(points, side)
-        if empty:
-            complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
-        return heights, (side, side)
-    found = lattice(points)
-    if found is None:
-        side = 2 * metres * math.sqrt(spread[0] * spread[1] / len(points))
-        raise InputError(
-            f'its {len(points)} points lie on no regular lattice: expected grid = "{side * 1e6:.2g} um", or similar',
-            key="grid",
-            expected="the side of the cells into which the points are sorted",
-        )
-    return found
+                text = f"it states its unit as {stated!r}: expected no {key} = {given!r}{hint}"
+                raise InputError(text, key=key, found=given, expected="none")
+    lacks = {
+        "unit of its heights": needs_z and how.unit is how.height_unit is None,
+        "unit of x and y": needs_xy and how.unit is None,
+        "size": not is_sized,
+    }
+    if any(lacks.values()):
+        no_unit = lacks["unit of its heights"] or lacks["unit of x and y"]
+        expected = ['unit = "um", and height_unit if heights have another unit'] if no_unit else []
+        expected += ['spacing = "1 um", or another length'] if lacks["size"] else []
+        what = " and no ".join(name for name, is_absent in lacks.items() if is_absent)
+        text = f"it states no {what}: expected {'; and '.join(expected)}"
+        raise InputError(text, key="unit" if no_unit else "spacing", expected=expected[0])
+    xy = channel.lateral_unit or how.unit or "m"
+    return number(f"1 {xy}", "m"), number(f"1 {channel.unit or how.height_unit or how.unit}", "m")
 
 
 def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
@@ -205,21 +171,15 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
 def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
     """Return the channel of a name or a number; the default height if None."""
     named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
+    heights = [i for i, c in enumerate(file.channels) if c.is_height]
+    if channel is None and not heights:
+        raise InputError(f"it holds no heights over x and y (channels {named or 'none'}): expected an areal scan")
     if channel is None:
-        heights = [i for i, c in enumerate(file.channels) if c.is_height]
-        if not heights:
-            kinds = " and ".join(sorted({c.kind for c in file.channels})) or "no areal height"
-            raise InputError(f"it holds {kinds} (channels {named or 'none'}): expected heights over x and y")
         return file.channels[file.default if file.default in heights else heights[0]]
-    for i, c in enumerate(file.channels):
-        if channel in (i, c.name):
-            if not c.is_height:
-                expected = f"another of {named}"
-                raise InputError(
-                    f"channel {channel!r} holds {c.kind}: expected {expected}", key="channel", found=channel
-                )
-            return c
-    raise InputError(key="channel", found=channel, expected=f"one of {named}")
+    for i in heights:
+        if channel in (i, file.channels[i].name):
+            return file.channels[i]
+    raise InputError(key="channel", found=channel, expected=f"a height of {named}")
 
 
 @quantities(spacing="m")
@@ -292,25 +252,21 @@ def supported_formats() -> dict[str, tuple[str, ...]]:
 
 
 def sha256(path: Path) -> str:
-    """Return the checksum of the content of a file, or of all files of a folder in order of their names."""
+    """Return the checksum of the content of a file."""
     regular(path)
-    if path.is_dir():
-        parts = (f"{p.relative_to(path)} {sha256(p)}" for p in sorted(path.rglob("*")) if p.is_file())
-        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def existing(path: Any) -> Path:
     """Return the path of an existing file; raise :class:`~roughvisc.errors.InputError` otherwise."""
-    try:
-        path = Path(path)
-    except TypeError as error:
-        raise InputError(f"path is {type(path).__name__}: expected the name of a file") from error
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"path is {type(path).__name__}: expected the name of a file")
+    path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: the file does not exist")
     regular(path)
-    if path.is_dir() and path.suffix != ".zarr":
+    if path.is_dir():
         raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
     return path
 

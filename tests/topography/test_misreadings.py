@@ -256,13 +256,3 @@ def test_damaged_file__gives_heights_or_is_refused(kind, tmp_path):
     path = tmp_path / f"scan.{kind.split()[0]}"
     WRITERS[kind](path)
     survive(path, path.read_bytes(), **OPTIONS.get(kind, {}))
-
-
-# -- Zarr --------------------------------------------------------------------------------------------------------------
-
-
-def test_zarr__grid_is_read(tmp_path):
-    pytest.importorskip("zarr")
-    h = from_array(tilted(), CELL)
-    h.to_dataset().to_zarr(tmp_path / "scan.zarr")
-    xr.testing.assert_equal(open_scan(tmp_path / "scan.zarr"), h)

@@ -1,11 +1,10 @@
-"""Grids in NetCDF and Zarr, through xarray: heights over coordinates x and y with units."""
+"""Grids in NetCDF, through xarray: heights over coordinates x and y with units."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -68,12 +67,6 @@ def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
     options: dict[str, Any] = {"decode_times": False}
-    if path.suffix.lower() == ".zarr":
-        if find_spec("zarr") is None:
-            raise InputError("it is in Zarr, which needs the package zarr: install it, or convert the file to netCDF")
-        with xr.open_dataset(path, engine="zarr", **options) as dataset:
-            yield dataset
-        return
     with path.open("rb") as stream:
         begins = stream.read(4)
     if begins in _CLASSIC:  # the netCDF library crashes on some damaged files; scipy allocates the content only

@@ -6,7 +6,8 @@ x3pio and sdfio return rows along y, ascending, so ``height(x, y)`` is the trans
 
 from __future__ import annotations
 
-from io import BytesIO, TextIOWrapper
+from functools import partial
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 
@@ -21,31 +22,24 @@ def read_x3p(path: Path) -> ScanFile:
     """Read X3P (ISO 5436-2): surfaces with one channel for each layer, or a point cloud."""
     import x3pio
 
-    info = x3pio.info(path, verify=False)
-    complaints: list[str] = []
-
-    def load(index: int) -> np.ndarray:
-        try:
-            content = x3pio.read(path)
-        except x3pio.X3pChecksumError as error:
-            complaints.append(f"its checksum is wrong ({brief(error)}): it was changed or damaged after it was written")
-            content = x3pio.read(path, verify=False)
-        layer = content.layers[index]
-        if kind == "points":
-            return np.stack([np.ravel(one) for one in (layer.x, layer.y, layer.z)], axis=1)
-        if not layer.is_regular_grid:
-            raise InputError("its points lie on no regular grid (absolute axes): expected equal steps in x and y")
-        return np.asarray(layer.z.T)
-
-    kind = {x3pio.FeatureType.POINT_CLOUD: "points", x3pio.FeatureType.PROFILE: "profile"}.get(
-        info.feature_type, "height" if len(info.shape) == 2 else "profile"
-    )
-    sides = (info.header.x.increment, info.header.y.increment) if kind == "height" else None
-    channels = [
-        Channel(f"layer {i}", info.shape[::-1], lambda i=i: load(i), "m", "m", sides, kind=kind)
-        for i in range(info.layer_count)
-    ]
-    maker = info.metadata.instrument if info.metadata else None
+    complaints = []
+    try:
+        content = x3pio.read(path)
+    except x3pio.X3pChecksumError as error:
+        complaints.append(f"its checksum is wrong ({brief(error)}): it was changed or damaged after it was written")
+        content = x3pio.read(path, verify=False)
+    is_cloud = content.feature_type == x3pio.FeatureType.POINT_CLOUD
+    channels = []
+    for i, layer in enumerate(content.layers):
+        heights, sides, kind = layer.z.T, None, "points" if is_cloud else "profile"
+        if is_cloud:
+            heights = np.stack([np.ravel(one) for one in (layer.x, layer.y, layer.z)], axis=1)
+        elif heights.ndim == 2:
+            kind = "height" if layer.is_regular_grid else "points on no regular grid (absolute axes)"
+            sides = (content.header.x.increment, content.header.y.increment)
+        load = partial(np.array, heights, float)
+        channels.append(Channel(f"layer {i}", layer.z.shape[::-1], load, "m", "m", sides, kind=kind))
+    maker = content.metadata.instrument if content.metadata else None
     instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
     return ScanFile("x3p", channels, 0, instrument, complaints)
 
@@ -71,7 +65,7 @@ def read_npy(path: Path) -> ScanFile:
     )
 
 
-def read_with_surface_topography(path: Path, format: str, source: BytesIO | TextIOWrapper | None = None) -> ScanFile:
+def read_with_surface_topography(path: Path, format: str, source: BytesIO | StringIO | None = None) -> ScanFile:
     """Read any format of SurfaceTopography.
 
     Parameters

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.tables import decimal_mark, plain_number
 from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import Channel, ScanFile
 
@@ -89,27 +88,17 @@ def read_esri(text: str) -> ScanFile:
     return _one("esri", heights, None, None, (sides[0], sides[1]))
 
 
-def read_keyence(text: str) -> ScanFile:
-    """Read the CSV of a Keyence microscope: unit and spacing in its header, blank cells are missing points."""
-    separator = ";" if text.count(";") > text.count(",") else ","
-    lines = text.splitlines()
-    rows = list(csv.reader(lines[:100], delimiter=separator))
-    stated = {row[0]: row[1:] for row in rows if len(row) > 1}
+def read_keyence(heading: list[str], rows: np.ndarray) -> ScanFile:
+    """Read the CSV of a Keyence microscope: unit and spacing from its heading, blank cells are missing points."""
+    separator = max(";,", key="".join(heading).count)
+    stated = {row[0]: row[1:] for row in csv.reader(heading, delimiter=separator) if row}
+    shape = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
     shown = stated.get("Output image data", ["Height"])[0]
-    columns, count = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
-    first = next(at for at, row in enumerate(rows) if len(row) >= columns)
-    cells = list(csv.reader(lines[first : first + count], delimiter=separator))
-    mark = decimal_mark((cell for row in cells for cell in row), separator)
-    heights = np.empty((count, columns))
-    for at, row in enumerate(cells):
-        numbers = [plain_number(cell, mark) if cell.strip() else "nan" for cell in row[:columns]]
-        if None in numbers or len(numbers) < columns:
-            found = row[numbers.index(None)] if None in numbers else f"{len(numbers)} of {columns} values"
-            raise InputError(f"line {first + at + 1}: found {found!r} among numbers: expected {columns} numbers")
-        heights[at] = [float(number) for number in numbers]
-    size, unit = float(plain_number(stated["XY Calibration"][0], mark)), stated["XY Calibration"][1]
+    if rows.T.shape != shape:
+        raise InputError(f"found {rows.shape[1]} x {rows.shape[0]} numbers: expected {shape[0]} x {shape[1]}")
+    side, lateral = float(stated["XY Calibration"][0].replace(",", ".")), stated["XY Calibration"][1]
     kind = "height" if shown == "Height" else "no areal height"
-    channel = Channel(shown, (columns, count), lambda: heights.T, stated["Unit"][0], unit, (size, size), kind=kind)
+    channel = Channel(shown, shape, lambda: rows.T, stated["Unit"][0], lateral, (side, side), kind=kind)
     return ScanFile("keyence", [channel], 0, stated.get("Model", [""])[0])
 
 

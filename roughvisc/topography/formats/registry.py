@@ -20,17 +20,13 @@ _OWN: dict[str, tuple[tuple[str, ...], str]] = {
     "x3p": (("x3p",), "libraries.read_x3p"),
     "sdf": (("sdf",), "libraries.read_sdf"),
     "npy": (("npy",), "libraries.read_npy"),
-    "nc": (("nc", "nc4", "cdf", "hdf5", "zarr"), "grid_file.read_grid"),
+    "nc": (("nc", "nc4", "cdf", "hdf5"), "grid_file.read_grid"),
     "h5": (("h5",), "grid_file.read_hdf5"),
-    "csv": (("csv",), "text.read_csv"),
-    "xyz": (("xyz",), "text.read_points"),
-    "asc": ((), "text.read_matrix"),
-    "zygo": ((), "text.read_headed"),
-    "keyence": ((), "text.read_headed"),
-    "wyko": ((), "text.read_headed"),
-    "esri": ((), "text.read_headed"),
     "tmd": (("tmd",), "makers.read_truemap"),
     "sur": (("sur",), "makers.read_digital_surf"),
+    "csv": (("csv",), "text.read_text_file"),
+    "xyz": (("xyz",), "text.read_text_file"),
+    **dict.fromkeys(("asc", "zygo", "keyence", "wyko", "esri"), ((), "text.read_text_file")),
 }
 _TEXT = ("xyz", "asc")
 #: Formats to try, in this order, for suffixes that several formats share.
@@ -173,9 +169,9 @@ def _reader(name: str) -> Callable[[Path], ScanFile]:
     """Return the reader of a format."""
     if name in _ADDED:
         return _ADDED[name][1]
-    module, _, function = _OWN[name][1].partition(".") if name in _OWN else ("libraries", "", "")
-    readers = import_module(f"roughvisc.topography.formats.{module}")
-    return getattr(readers, function) if function else partial(readers.read_with_surface_topography, format=name)
+    module, _, function = (_OWN[name][1] if name in _OWN else "libraries.read_with_surface_topography").partition(".")
+    read = getattr(import_module(f"roughvisc.topography.formats.{module}"), function)
+    return partial(read, format=name) if function in ("read_text_file", "read_with_surface_topography") else read
 
 
 def _detected(path: Path) -> str:

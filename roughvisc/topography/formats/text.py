@@ -5,113 +5,195 @@ A matrix has its rows along x. An index row or column next to the heights, as pa
 
 from __future__ import annotations
 
+import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from statistics import mode
+from typing import NamedTuple
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.tables import read_text
+from roughvisc.tables import decimal_mark, name_and_unit, plain_number, read_text
 from roughvisc.topography.formats import makers
 from roughvisc.topography.formats.libraries import read_with_surface_topography
 from roughvisc.topography.formats.registry import Channel, ScanFile
-from roughvisc.topography.formats.separated_values import separated_by_blanks
 from roughvisc.units import is_quantity
 
 #: First line of a file -> its reader.
 _HEADED: dict[str, Callable[[str], ScanFile]] = {
-    "Zygo XYZ Data File": makers.read_zygo_xyz,
-    "Zygo ASCII Data File": makers.read_zygo_ascii,
-    "Wyko ASCII Data File": makers.read_wyko,
+    "zygo xyz data file": makers.read_zygo_xyz,
+    "zygo ascii data file": makers.read_zygo_ascii,
+    "wyko ascii data file": makers.read_wyko,
     "ncols": makers.read_esri,
 }
 #: A text without a header is a table, not a map, if it has fewer columns than the first number, and more lines than the
 #: second number times the columns.
 _COLUMNS, _TALL = 8, 20
-#: Largest deviation of index numbers from equal steps, in steps.
-_EQUAL = 1e-3
+#: Fewest numbers of an index, and their largest deviation from equal steps, in steps.
+_FEWEST, _EQUAL = 4, 1e-3
 #: Comments of Gwyddion that state the size of a matrix, in any language, and the units of points.
-_MATRIX_SIZE = re.compile(r"#[^:=：]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[mA\u00c5]\s*$")
-_UNITS = re.compile(r"#\s*(Lateral|Value) units:\s*(\S+)")
-#: Fewest numbers of an index.
-_FEWEST = 4
+_MATRIX_SIZE = re.compile(r"^#[^:=：\n]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[mA\u00c5]\s*$", re.MULTILINE)
+_UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
+#: Length with a decimal comma in a header, such as ``# Width: 12,5 um``.
+_LENGTH = re.compile(r"(?<=[:=])(\s*)(\d[\d.]*,\d+)(?=\s*\w{0,2}m\b)")
+#: Cells of a heading, such as ``x [mm]; y [mm]; z [um]``.
+_HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
+#: Pattern of a possible number with a decimal comma, if blanks are the separators.
+_WITH_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
+#: Pattern of a row of numbers with decimal points and blanks between them.
+_DECIMAL = r"(?:[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?|nan)"
+_ROW = re.compile(rf"\s*{_DECIMAL}(?:\s+{_DECIMAL})*\s*")
+#: Marks of a missing height.
+_MISSING = ("", "nan", "bad", "-", "#n/a", "n/a")
 
 
-def read_headed(path: Path) -> ScanFile:
-    """Read a text file in the format of an instrument maker.
+class _Table(NamedTuple):
+    """Lines of a text with decimal points and blanks between the numbers, and the places of the rows of numbers."""
+
+    lines: list[str]
+    rows: list[int]
+
+    def numbers(self) -> np.ndarray:
+        """Return the rows as a matrix."""
+        return np.loadtxt([self.lines[at] for at in self.rows], ndmin=2)
+
+
+def read_text_file(path: Path, format: str) -> ScanFile:
+    """Read a text file: in the format of an instrument maker, points, or a matrix.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str
+        ``"xyz"`` for points x, y, z, one on each line, in any order; ``"asc"`` for a matrix; ``"csv"`` for either;
+        otherwise the format of a maker.
+    """
+    text = read_text(path)
+    begins = text.lstrip('\ufeff"# ').lower()
+    for words, read in _HEADED.items():
+        if begins.startswith(words):
+            return read(text)
+    is_keyence = "XY Calibration" in text[:4000] and "Horizontal" in text[:4000]
+    if format not in ("xyz", "asc", "csv", "keyence") or (format == "keyence" and not is_keyence):
+        raise InputError(f"its first line differs: expected a text in the format {format}")
+    table = _table(text)
+    if is_keyence:
+        heading = text.splitlines()[: table.rows[0]] if table.rows else []
+        return makers.read_keyence(heading, table.numbers())
+    found = None if format == "asc" else _points(table)
+    if found is None and format == "xyz":
+        raise ValueError("expected three numbers on each line")
+    return found or _matrices(path, format, "\n".join(table.lines) + "\n")
+
+
+def _table(text: str) -> _Table:
+    """Return the table in a text.
+
+    Values are separated by blanks, commas, semicolons or tabs. Empty values are missing heights. Lines of other text,
+    such as ``# Width: 26 um``, stay unchanged, but for a decimal comma.
 
     Raises
     ------
     InputError
-        If its first line is not one of the known first lines.
+        If a value of the table is not a number, a row has fewer or more values than others, or the decimal mark is
+        ambiguous. A damaged row must not be skipped like other text: the map would lose a row.
     """
-    found = _of_a_maker(read_text(path))
-    if found is None:
-        raise InputError(f"expected a text that begins with one of {', '.join(map(repr, _HEADED))}, or of Keyence")
-    return found
+    lines = _units_as_comments(text.splitlines())
+    body = [at for at, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    is_plain = all(_ROW.fullmatch(lines[at]) for at in body) and not any(map(_LENGTH.search, lines))
+    if is_plain and len({len(lines[at].split()) for at in body}) == 1:
+        return _Table(lines, body)
+    separator = mode(_separator(lines[at]) for at in body) if body else " "
+    cells = {at: _cells(lines[at], separator) for at in body}
+    sizes = Counter(map(len, cells.values()))
+    width = max(sizes, key=lambda size: size * sizes[size], default=0)  # of the rows that hold most cells
+    marked = [cell for row in cells.values() if len(row) == width for cell in row if "," in cell or "." in cell]
+    mark = decimal_mark(marked or [length[2] for line in lines for length in _LENGTH.finditer(line)], separator)
+    numbers = {at: _numbers(row, mark) for at, row in cells.items()}
+    rows = [at for at, row in numbers.items() if len(row) > 1 and None not in row and set(row) != {"nan"}]
+    if rows:
+        if separator != " " and all(lines[at].rstrip(" ").endswith(separator) for at in rows):
+            numbers = {at: row[:-1] for at, row in numbers.items()}
+        width = mode(len(numbers[at]) for at in rows)
+        rows = [at for at, row in numbers.items() if len(row) == width and None not in row]
+    for at, row in numbers.items() if rows else ():
+        known = len(row) - row.count(None)
+        is_wide = len(row) == width and known > 0 and (separator != " " or at > rows[0])
+        if at in rows or not (rows[0] < at < rows[-1] or is_wide or known >= max(3, width / 2)):
+            continue
+        found = repr(cells[at][row.index(None)]) if None in row else f"{len(row)} of {width} values"
+        expected = f"expected numbers with a decimal {'point' if mark == '.' else 'comma'}"
+        raise InputError(f"line {at + 1}: found {found} among numbers ({lines[at][:60]!r}): {expected}")
+    for at, line in enumerate(lines):
+        lines[at] = _LENGTH.sub(lambda found: found[1] + (plain_number(found[2], mark) or found[2]), line)
+    for at in rows:
+        lines[at] = " ".join(map(str, numbers[at]))
+    return _Table(lines, rows)
 
 
-def read_csv(path: Path) -> ScanFile:
-    """Read separated values: the format of an instrument maker, points, or a matrix."""
-    text = read_text(path)
-    return _of_a_maker(text) or _points(separated_by_blanks(text)) or _matrices(path, "csv", text)
+def _units_as_comments(lines: list[str]) -> list[str]:
+    """Replace a heading by comments that state its units, as Gwyddion writes them."""
+    first = next((at for at, line in enumerate(lines) if line.strip() and not line.startswith("#")), None)
+    if first is None:
+        return lines
+    line = lines[first].replace('"', "")
+    cells = [name_and_unit(cell) for cell in _HEADING.findall(line)]
+    if _HEADING.sub("", line).strip(" ;,\t") or not all(is_quantity(f"1 {unit}", "m") for _, unit in cells):
+        return lines
+    names, units = [name.lower() for name, _ in cells], [unit for _, unit in cells]
+    is_points = len(names) == 3 and names[:2] == ["x", "y"] and units[0] == units[1]
+    if not is_points and len(names) != 1:
+        expected = "expected 'x [mm], y [mm], z [um]' of points, with one unit of x and y, or 'height [um]' of a matrix"
+        raise InputError(f"line {first + 1}: found the heading {lines[first][:60]!r}: {expected}")
+    comments = f"# Lateral units: {units[0]}\n" * is_points + f"# Value units: {units[-1]}"
+    return [*lines[:first], comments, *lines[first + 1 :]]
 
 
-def read_points(path: Path) -> ScanFile:
-    """Read points x, y, z, one on each line, in any order."""
-    text = read_text(path)
-    found = _of_a_maker(text) or _points(separated_by_blanks(text))
-    if found is None:
-        raise ValueError("expected three numbers on each line")
-    return found
+def _separator(line: str) -> str:
+    """Return the separator of the cells of a line."""
+    separator = next((sign for sign in ";\t," if sign in line), " ")
+    words = line.split() if separator == "," else []
+    return " " if len(words) > 1 and all(map(_WITH_COMMA.fullmatch, words)) else separator
 
 
-def read_matrix(path: Path) -> ScanFile:
-    """Read a matrix of heights, whose rows run along x."""
-    text = read_text(path)
-    return _of_a_maker(text) or _matrices(path, "asc", text)
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    quoted = '"' in line
+    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True)) if quoted else line.split(separator)
+    return [cell.strip() for cell in cells]
 
 
-def _matrices(path: Path, format: str, text: str) -> ScanFile:
-    source = io.TextIOWrapper(io.BytesIO(separated_by_blanks(text).encode()), encoding="utf-8")
-    found = read_with_surface_topography(path, "asc", source)
-    complaints: list[str] = []
-    channels = [_matrix(channel, complaints) for channel in found.channels]
-    return replace(found, format=format, channels=channels, complaints=complaints)
+def _numbers(cells: list[str], mark: str) -> list[str | None]:
+    """Return numbers in the notation of Python, ``nan`` for a missing one, and None for other text."""
+    shown = ["nan" if cell.lower() in _MISSING else cell for cell in cells]
+    if mark == "." and _ROW.fullmatch(" ".join(shown)):
+        return list(shown)
+    return [cell if cell == "nan" else plain_number(cell, mark) for cell in shown]
 
 
-def _of_a_maker(text: str) -> ScanFile | None:
-    begins = text.lstrip('\ufeff"# ')
-    for words, read in _HEADED.items():
-        if begins.lower().startswith(words.lower()):
-            return read(text)
-    head = text[:4000]
-    return makers.read_keyence(text) if "XY Calibration" in head and "Horizontal" in head else None
-
-
-def _points(text: str) -> ScanFile | None:
-    """Return points x, y, z; None if the lines do not hold three numbers, or the header states the size of a matrix."""
-    lines = text.splitlines()
-    header = [line for line in lines if line.startswith("#")]
-    rows = [line for line in lines if line.strip() and not line.startswith("#")]
-    first = next((at for at, line in enumerate(rows) if line.split() and _is_numbers(line)), len(rows))
-    if not rows[first:] or len(rows[first].split()) != 3 or any(map(_MATRIX_SIZE.match, header)):
+def _points(table: _Table) -> ScanFile | None:
+    """Return points x, y, z; None if the rows do not hold three numbers, or the header states the size of a matrix."""
+    header = "\n".join(line for line in table.lines if line.startswith("#"))
+    if not table.rows or len(table.lines[table.rows[0]].split()) != 3 or _MATRIX_SIZE.search(header):
         return None
-    points = np.loadtxt(rows[first:], ndmin=2)
-    stated = dict(found.groups() for found in map(_UNITS.match, header) if found)
+    points, stated = table.numbers(), dict(_UNITS.findall(header))
     unit, lateral = stated.get("Value"), stated.get("Lateral")
     kind = "points" if unit is None or is_quantity(f"1 {unit}", "m") else "no areal height"
     return ScanFile("xyz", [Channel("points", (len(points),), lambda: points, unit, lateral, kind=kind)])
 
 
-def _is_numbers(line: str) -> bool:
-    try:
-        return bool([float(word) for word in line.split()])
-    except ValueError:
-        return False
+def _matrices(path: Path, format: str, text: str) -> ScanFile:
+    found = read_with_surface_topography(path, "asc", io.StringIO(text))
+    complaints: list[str] = []
+    channels = [_matrix(channel, complaints) for channel in found.channels]
+    return replace(found, format=format, channels=channels, complaints=complaints)
 
 
 def _matrix(channel: Channel, complaints: list[str]) -> Channel:
@@ -132,12 +214,10 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     z = z[int(row is not None) :, int(column is not None) :]
     z = z[:: -1 if column is not None and column < 0 else 1, :: -1 if row is not None and row < 0 else 1]
     removed = " and ".join(name for name, step in (("row", row), ("column", column)) if step is not None)
-    complaint = f"the numbers of its first {removed} are in equal steps: taken as an index, not as heights"
-    spacing = channel.spacing
+    spacing, taken = channel.spacing, "an index"
     if row is not None and column is not None and not row == column == 1.0:
-        spacing = spacing or (abs(row), abs(column))
-        complaint = f"the numbers of its first {removed} are in equal steps: taken as coordinates, not as heights"
-    complaints.append(complaint)
+        spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
+    complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
     return replace(channel, shape=z.T.shape, load=lambda: z.T, spacing=spacing)
 
 
