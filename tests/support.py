@@ -210,7 +210,7 @@ def case_of(tmp_path, text=STUDY, **changes):
 
 
 def measured(case, *settings, **options):
-    return rv.trade(case, settings, **{"progress": False, "budget": 1e4, **options})
+    return rv.trade(case, settings, **{"progress": False, **options})
 
 
 def labels(figure):

@@ -113,9 +113,9 @@ def test_plan__of_a_study_that_cannot_run_says_why_and_shows_no_table(invoke):
         (("scan", "mine.npy", "--format", "foo"), "mine.npy: format"),
         (("new", "mine.npy", "--contact", "3"), "contact"),
         (("run", "ball.toml", "--for", "much"), "for"),
-        (("trade", "ball.toml", "--budget", "much"), "budget"),
+        (("trade", "ball.toml", "--accuracy", "much"), "accuracy"),
         (("budget", "ball.toml", "--modulus-error", "much"), "modulus_error"),
-        (("budget", "ball.toml", "--at", "99 s"), "at"),
+        (("budget", "ball.toml", "--cutoff", "99 s"), "cutoff"),
     ],
 )
 def test_refused_option__is_named(invoke, tmp_path, command, option):

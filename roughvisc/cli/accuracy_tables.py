@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import xarray as xr
 from rich.console import Group
@@ -33,7 +35,7 @@ def audit_table(audit: Audit) -> Group:
     table.add_column("reason", overflow="fold")
     for one in audit:
         verdict = Text(one.verdict, style=_STYLES.get(one.verdict, ""))
-        table.add_row(one.name, verdict, one.shown, Text(one.sentence))
+        table.add_row(one.name, verdict, one.shown, Text(_by_option(one.sentence)))
     return titled(audit.title, table)
 
 
@@ -45,42 +47,40 @@ def budget_table(dataset: xr.Dataset) -> Group:
     dataset : xarray.Dataset
         Result of :func:`roughvisc.budget`, for one quantity.
     """
-    axis = axis_of(dataset.variables)
-    unit = unit_for(dataset["value"].values, dataset["value"].attrs["units"])
-    name = dataset.attrs["quantity"].replace("_", " ")
-    parts: list[Text | Table] = []
+    axis, name = axis_of(dataset.variables), str(dataset["quantity"].values)
+    unit = unit_for(dataset["value"].values, VARIABLES[name].units)
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column("source", no_wrap=True)
     table.add_column("error, %", justify="right", no_wrap=True)
     table.add_column("found by")
-    table.add_column("time", justify="right", no_wrap=True)
+    unknown = dataset.attrs["open"].split("; ")
     for source in dataset["source"].values:
         one = dataset.sel(source=source)
-        cost = float(one["cost"])
         method = str(one["method"].values)
-        table.add_row(str(source), _error(one), Text(method), f"{cost:.2g} s" if cost else "")
+        table.add_row(str(source), "open" if source in unknown else _error(one), Text(_by_option(method)))
+    lines = []
     for place in dataset[axis].values:
         at = dataset.sel({axis: place})
         low, value, high = (unit.text(float(at[end]), 3) for end in ("lower", "value", "upper"))
         interval = f"at 95 % from {low} to {high}"
         if not np.isfinite(at["upper"]):
             interval = "without an interval" + (", as zero has no logarithm" if at["value"] == 0 else "")
-        parts.append(Text(f"{AXES[axis].place(float(place), 3)}: {value}, {interval}"))
-    parts += [Text(), table]
-    spent = float(dataset["case_cost"])
-    notes = [f"The case itself took {spent:.2g} s. Errors are the smallest and the largest of all {AXES[axis].rows}."]
-    if dataset.attrs["open"]:
-        notes.append("The interval does not include open sources.")
-    title = f"{dataset.attrs['title'] or 'untitled'}: {name}"
-    return titled(title, *parts, *(Text(note, style="italic") for note in notes))
+        lines.append(Text(f"{AXES[axis].place(float(place), 3)}: {value}, {interval}"))
+    note = f"Errors are the smallest and the largest of all {AXES[axis].rows}."
+    note += " The interval does not include open sources." if dataset.attrs["open"] else ""
+    title = f"{dataset.attrs['title'] or 'untitled'}: {name.replace('_', ' ')}"
+    return titled(title, *lines, Text(), table, Text(note, style="italic"))
+
+
+def _by_option(sentence: str) -> str:
+    """Return a sentence with a missing input named as the option of its command."""
+    return re.sub(r"\w+(?= is not given)", lambda name: "--" + name[0].replace("_", "-"), sentence)
 
 
 def _error(source: xr.Dataset) -> str:
     """Return the range of the half-width of a source over the rows: in %, or as factors if it is large."""
     half = np.atleast_1d(source["half_width"].values)
     half = half[np.isfinite(half)]
-    if str(source["state"].values) != "counted":
-        return str(source["state"].values)
     if not half.size:
         return "-"
     towards = set(np.atleast_1d(source["direction"].values).tolist())
@@ -114,7 +114,7 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     for heading in ("time", "FFTs", *(name.replace("_", "\n") for name in shown)):
         table.add_column(heading, justify="right", no_wrap=True)
     best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
-    for i in np.flatnonzero(dataset["note"] == ""):
+    for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
         name = Text(str(row["setting"].values).replace(", ", ",\n"))
         mark = (">" if i == chosen else "") + ("*" if best[i] else "")
@@ -122,15 +122,15 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
         errors = [_percent(float(row["error"].sel(quantity=name))) for name in shown]
         table.add_row(mark, name, spent, transforms, *errors, style="bold" if i == chosen else "")
     words, wanted = VARIABLES[quantity].label.lower(), f"{_percent(target)} %"
-    lines = ["", f"Errors in %, worst of all {dataset.attrs['rows']}."]
-    lines.append(f"* Pareto-optimal for {words}. > Cheapest for {wanted}.")
-    lines += [f"Not run: {name}: {why}" for name, why in np.c_[dataset["setting"], dataset["note"]] if why]
     by_steps, by_grid = (
         _percent(float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity))) for part in ("time", "grid")
     )
     grid = "spacing of the surface points" if dataset.attrs["grid_is_data"] else "grid"
-    lines.append(f"Reference: {dataset.attrs['reference']}.")
-    lines.append(f"Its error of the {words}: {by_steps} % from time steps, {by_grid} % from the {grid}.")
+    lines = [
+        f"\nErrors in %, worst of all {dataset.attrs['rows']}, against the {dataset.attrs['reference']}.",
+        f"Its error of the {words}: {by_steps} % from time steps, {by_grid} % from the {grid}.",
+        f"* Pareto-optimal for {words}. > Cheapest for {wanted}.",
+    ]
     if chosen is None:
         lines.append(f"No setting is known to have an error of at most {wanted}.")
     else:

@@ -104,7 +104,6 @@ def run(
       roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
     from roughvisc.study.execution.cluster import connect
-    from roughvisc.study.execution.display import Display
     from roughvisc.study.execution.run import result_folder
 
     cases = rv.read_cases(study)
@@ -122,8 +121,9 @@ def run(
         if targets:
             from roughvisc.study.target import choose, parse_targets
 
-            watch, tell = partial(Display, not quiet, console, summary=False), partial(say, console)
-            computing = {"watch": watch, "client": client, "workers": settings["workers"] or 0, "threads": threads}
+            tell = partial(say, console)
+            computing = {"progress": not quiet, "client": client, "workers": settings["workers"] or 0}
+            computing["threads"] = threads
             case, reasons, budgets = choose(case, parse_targets(targets), folder, tell, **computing)
             tell("\n  ".join(["Chosen", *reasons]))
         problem = _run_one(case, folder, study.stem, console, not no_plots, threads)
@@ -213,9 +213,8 @@ def _observe(cases: list[Case], folder: Path, console: Console) -> str:
 @click.option("--out", type=PATH, help="Folder for the measurements. [default: folder trade in the results]")
 @quantity("--accuracy", "PART", "Target relative error.", default="1%", show_default=True)
 @click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction_coefficient]")
-@quantity("--budget", "TIME", "Total wall time of all runs.", default="5 min", show_default=True)
 @QUIET
-def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, budget: Any, quiet: bool) -> None:
+def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, quiet: bool) -> None:
     """Measure the cost and the error of several tolerances and grids.
 
     Each run is timed and compared with the finest run. Marks the cheapest setting whose error is at most --accuracy.
@@ -234,7 +233,7 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
     part = number(accuracy, "1", "accuracy", above=0, below=1)
     case, console = rv.read_study(study), screen(quiet)
     folder = out or result_folder(case) / FOLDER
-    dataset = rv.trade(case, quantity=quantity or (), budget=budget, out=folder, progress=not quiet)
+    dataset = rv.trade(case, quantity=quantity or (), out=folder, progress=not quiet)
     console.print(trade_table(dataset, str(dataset["quantity"].values[0]), part))
     _write(console, "Trade", dataset, folder / "trade.nc", rv.plot.trade)
 
@@ -244,7 +243,6 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, bu
 @click.option(
     "--quantity", multiple=True, metavar="NAME", help="Quantity of the budget; may be repeated. [default: contact_area]"
 )
-@quantity("--at", "VALUE", "Time or speed; may be repeated. [default: all kept]", multiple=True)
 @quantity("--modulus-error", "PART", "Relative error of the moduli at 95 %: 10%.")
 @quantity("--time-scale-error", "PART", "Relative error of the times of the material at 95 %.")
 @quantity("--cutoff", "LENGTH", "Shortest wavelength that the real surface has: '2 um'.")
@@ -268,14 +266,16 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
       roughvisc budget focus_variation-study.toml --modulus-error 10% --cutoff "1 um"
       roughvisc budget focus_variation-study.toml --quantity mean_gap --population ensemble
     """
-    from roughvisc.study.budget import budgets, case_of
+    from roughvisc.study.budget import FOLDER
+    from roughvisc.study.execution.run import result_folder
 
-    names, at = list(known.pop("quantity")) or ["contact_area"], list(known.pop("at")) or None
-    case = rv.open_result(study) if study.suffix == ".nc" else rv.read_study(study)
-    folder = case_of(case, out)[-1]
-    found = budgets(case, names, known, at=at, out=folder, workers=workers, progress=not quiet)
-    for name, one in found.items():
-        _show_budget(screen(quiet), one, folder, name)
+    names = list(known.pop("quantity")) or ["contact_area"]
+    is_result = study.suffix == ".nc"
+    case: Any = rv.open_result(study) if is_result else rv.read_study(study)
+    folder = out or (study.parent if is_result else result_folder(case)) / FOLDER
+    found = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
+    for name in names:
+        _show_budget(screen(quiet), found.sel(quantity=name), folder, name)
 
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:

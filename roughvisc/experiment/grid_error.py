@@ -44,7 +44,6 @@ ORDERS = {
     "friction_coefficient": (1.0, 1.5),
     "leak_rate": (1.0, 1.5),
     "thermal_conductance": (1.0, 1.5),
-    "incremental_stiffness": (1.0, 1.5),
 }
 #: Safety factor and order for one coarser grid, from which the order cannot be estimated. On the 456 contacts of
 #: ``workflows/benchmarks/grid_accuracy.py`` the error is then below 0.8 of the true one in 1 of 446 pressures, 1 of 299

@@ -131,7 +131,7 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     if "quantity" in dataset.dims:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
     axis = axis_of(dataset.variables)
-    rows, names = dataset[axis], dataset["source"].values.tolist()
+    rows, names, quantity = dataset[axis], dataset["source"].values.tolist(), str(dataset["quantity"].values)
     at = dataset.isel({axis: row})
     half, towards = at["half_width"].values, at["direction"].values
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -147,10 +147,10 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     ax, places = axes[0], np.arange(len(names))[::-1]
     colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
     ax.barh(places, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
-    for place, state in zip(places, at["state"].values.astype(str), strict=False):
-        if state != "counted":
+    for place, name in zip(places, names, strict=False):
+        if name in dataset.attrs["open"].split("; "):
             look = {"va": "center", "fontsize": 7.5, "color": "0.35", "textcoords": "offset points"}
-            ax.annotate(state, (middle, place), (5, 0), **look)
+            ax.annotate("open", (middle, place), (5, 0), **look)
     ax.axvline(middle, color="black", lw=0.7)
     if wide:
         style.log_axis(ax.xaxis, ends)
@@ -163,12 +163,12 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     if (towards != 0).any():
         ax.set_title("orange: one direction only", loc="right", fontsize=8)
     for curve in axes[1:]:
-        unit = unit_for(dataset["upper"].values, dataset["value"].attrs["units"])
+        unit = unit_for(dataset["upper"].values, VARIABLES[quantity].units)
         over = style.row_unit(rows)(rows)
         curve.fill_between(over, unit(dataset["lower"]), unit(dataset["upper"]), color=style.BLUE, alpha=0.25, lw=0)
         curve.plot(over, unit(dataset["value"]), "o-", color=style.BLUE)
         style.row_axis([curve], rows)
-        curve.set_ylabel(unit.label(dataset.attrs["quantity"].replace("_", " ").capitalize()))
+        curve.set_ylabel(unit.label(quantity.replace("_", " ").capitalize()))
         if wide:
             curve.set_yscale("log")
     style.letter_panels(axes)

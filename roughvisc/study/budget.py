@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import unconverged
 from roughvisc.study.case import Case, read_study
-from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder
-from roughvisc.study.neighbours import at_rows, compared, solve, sources_of, with_kept
+from roughvisc.study.neighbours import compared, sources_of, with_kept
 from roughvisc.study.quantities import quantity_of
 from roughvisc.study.storage.folder import result_path
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.units import Quantity, in_si, quantities
-from roughvisc.variables import VARIABLES
+from roughvisc.units import Quantity, quantities
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -36,7 +31,6 @@ def budget(
     case: Case | str | Path | xr.Dataset,
     quantity: str | Sequence[str] = "contact_area",
     *,
-    at: Sequence[Quantity] | Quantity | None = None,
     modulus_error: Quantity | None = None,
     time_scale_error: Quantity | None = None,
     cutoff: Quantity | None = None,
@@ -53,11 +47,8 @@ def budget(
     case : Case, path or xarray.Dataset
         A case, its study file, or a result, whose attribute ``case`` contains the case.
     quantity : str or sequence of str
-        ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate``,
-        ``thermal_conductance`` or ``incremental_stiffness``. The table ``observe`` of the study states the fluid or
-        the conductivities.
-    at : float, str, or a sequence of these, optional
-        Times or speeds. Default: all kept times or speeds of the study. [s] or [m/s]
+        ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate`` or
+        ``thermal_conductance``. The table ``observe`` of the study states the fluid or the conductivities.
     modulus_error, time_scale_error : float or str, optional
         Relative errors of the moduli and the times of the material at 95 %, such as the error of a measured curve or
         the scatter between batches. Without an error its source stays open. [-]
@@ -77,9 +68,9 @@ def budget(
     xarray.Dataset
         Over ``source`` and ``time`` or ``speed``: ``half_width``, of the logarithm at 95 %, missing if a source is
         open [-]; ``direction``, 1 or -1 for an error that only raises or lowers the number. Over ``source``:
-        ``method``, in words; ``cost``, wall time of its solves [s]; ``state``, ``counted`` or ``open`` (an input is
-        missing). Sources that do not apply are absent. Over the times or speeds: ``value``, ``lower`` and ``upper``, in
-        the unit of the quantity, and ``case_cost`` [s]. For several quantities also over ``quantity``.
+        ``method``, in words. Sources that do not apply are absent; the attribute ``open`` lists those that lack an
+        input. Over the times or speeds of the study: ``value``, ``lower`` and ``upper``, in the unit of the quantity.
+        For several quantities also over ``quantity``.
 
     Raises
     ------
@@ -99,60 +90,27 @@ def budget(
     roughvisc.audit : the assumptions of the model.
     """
     names = [quantity] if isinstance(quantity, str) else list(quantity)
+    if not names:
+        raise InputError(key="quantity", found=names, expected="at least one")
     known = {
         "modulus_error": modulus_error,
         "time_scale_error": time_scale_error,
         "cutoff": cutoff,
         "population": population,
     }
-    found = budgets(case, names, known, at=at, out=out, client=client, workers=workers, progress=progress)
-    if isinstance(quantity, str):
-        return found[quantity]
-    over_all = xr.concat(list(found.values()), xr.Variable("quantity", names), combine_attrs="drop_conflicts")
-    return over_all.assign_coords(units=("quantity", [one["value"].attrs["units"] for one in found.values()]))
-
-
-def budgets(
-    case: Case | str | Path | xr.Dataset,
-    names: Sequence[str],
-    known: Mapping[str, Any],
-    *,
-    at: Sequence[Quantity] | Quantity | None = None,
-    out: str | Path | None = None,
-    client: Client | None = None,
-    workers: int | None = None,
-    progress: bool = True,
-) -> dict[str, xr.Dataset]:
-    """Return the budgets of several quantities from the same solves; see :func:`budget`."""
-    case, finished, folder = case_of(case, out)
-    if not names:
-        raise InputError(key="quantity", found=names, expected="at least one")
-    observed = [quantity_of(case, name) for name in names]
-    axis = case.experiment.axis
-    given = in_si(at, VARIABLES[axis].units, "at")
-    places = None if given is None else np.atleast_1d(np.asarray(given, dtype=float)).tolist()
-    try:
-        base = with_kept(case, [field for one in observed for field in one.fields], places and sorted(set(places)))
-    except InputError as error:
-        if error.key != "keep.times":
-            raise
-        raise InputError(key="at", found=places, expected=error.expected) from error
-    own = None
-    if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
-        whole = open_result(finished)
-        found = at_rows(whole, axis, places)
-        if not unconverged(whole) and (places is None or np.allclose(found[axis], places, rtol=1e-9, atol=0)):
-            own = found
-    solved = partial(solve, folder=folder, watch=partial(Display, progress), client=client, workers=workers)
-    return compared(base, sources_of(base, base.height(), known), observed, solved, own=own, places=places)
-
-
-def case_of(case: Case | str | Path | xr.Dataset, out: str | Path | None) -> tuple[Case, Path, Path]:
-    """Return the case, the file of its result, and the folder of the further solves."""
     path = None
     if isinstance(case, xr.Dataset):
         path, case = case.encoding.get("source"), Case.of_result(case)
     elif not isinstance(case, Case):
         case = read_study(case)
     finished = Path(path or result_path(result_folder(case), case.key))
-    return case, finished, Path(out).expanduser() if out is not None else finished.parent / FOLDER
+    folder = Path(out).expanduser() if out is not None else finished.parent / FOLDER
+    observed = [quantity_of(case, name) for name in names]
+    base, own = with_kept(case, [field for one in observed for field in one.fields]), None
+    if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
+        own = open_result(finished)
+    computing = {"progress": progress, "client": client, "workers": workers}
+    found = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
+    if isinstance(quantity, str):
+        return found[quantity]
+    return xr.concat(list(found.values()), "quantity", combine_attrs="drop_conflicts")

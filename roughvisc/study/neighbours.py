@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from roughvisc.arguments import one_of
 from roughvisc.errors import RoughviscError
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.labels import cost_of
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases
@@ -241,7 +240,7 @@ def solve(
     cases: Iterable[Case],
     folder: Path,
     *,
-    watch: Callable[[], Display],
+    progress: bool = True,
     client: Client | None = None,
     workers: int | None = 0,
     threads: int | None = None,
@@ -253,8 +252,8 @@ def solve(
     cases : iterable of Case
     folder : Path
         Folder of the results.
-    watch : callable
-        Makes the display of the sweep.
+    progress : bool
+        Show a progress bar.
     client, workers, threads
         As in :func:`roughvisc.sweep`.
 
@@ -267,7 +266,7 @@ def solve(
     outcomes = run_cases(
         list(distinct.values()),
         folder,
-        display=watch(),
+        display=Display(progress, summary=False),
         client=client,
         workers=workers if client is None else None,
         threads=threads,
@@ -282,9 +281,7 @@ def solve(
 
 
 def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
-    """Return the rows of a result nearest to some times or speeds; all rows without any."""
-    if places is None:
-        return result
+    """Return the rows of a result nearest to some times or speeds."""
     apart = np.abs(result[axis].values[:, None] - np.asarray(places, dtype=float))
     return result.isel({axis: apart.argmin(axis=0)})
 
@@ -297,11 +294,9 @@ def compared(
     case: Case,
     sources: Mapping[str, Source],
     observed: Sequence[Observable],
-    solved: Callable[[list[Case]], dict[str, xr.Dataset]],
-    *,
+    folder: Path,
     own: xr.Dataset | None = None,
-    places: Sequence[float] | None = None,
-    loaded: bool = False,
+    **computing: Any,
 ) -> dict[str, xr.Dataset]:
     """Solve the neighbours of a case and return the budget of each quantity by name.
 
@@ -311,14 +306,12 @@ def compared(
     sources : mapping
         Sources of error, as :func:`sources_of` returns them.
     observed : sequence of Observable
-    solved : callable
-        Solves cases and returns the results by their keys: :func:`solve` with its settings.
+    folder : Path
+        Folder of the results.
     own : xarray.Dataset, optional
-        Result of the case, if it is known.
-    places : sequence of float, optional
-        Times [s] or speeds [m/s] of the rows. Default: all.
-    loaded : bool
-        Whether only rows with a force count.
+        Those rows of the result of the case that count. Default: the case is solved, and all of its rows count.
+    **computing
+        Further arguments of :func:`solve`.
 
     Returns
     -------
@@ -327,30 +320,21 @@ def compared(
     """
     near = [one for source in sources.values() for one in source.neighbours]
     wanted = [case, *(one.case for one in near), *(one.against for one in near)]
-    results = solved([one for one in wanted if own is None or one.key != case.key])
+    results = solve([one for one in wanted if own is None or one.key != case.key], folder, **computing)
+    results = results if own is None else results | {case.key: own}
     axis = case.experiment.axis
-    own = at_rows(results[case.key] if own is None else own, axis, places)
-    if loaded:
-        own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
-    results[case.key] = own
-    seconds = {key: cost_of(result)[0] for key, result in results.items()}
-    rows = {key: at_rows(result, axis, own[axis].values) for key, result in results.items()}
-    return {one.name: _budget(case, sources, one, rows, seconds) for one in observed}
+    rows = {key: at_rows(result, axis, results[case.key][axis].values) for key, result in results.items()}
+    return {one.name: _budget(case, sources, one, rows) for one in observed}
 
 
 def _budget(
-    case: Case,
-    sources: Mapping[str, Source],
-    quantity: Observable,
-    rows: Mapping[str, xr.Dataset],
-    seconds: Mapping[str, float],
+    case: Case, sources: Mapping[str, Source], quantity: Observable, rows: Mapping[str, xr.Dataset]
 ) -> xr.Dataset:
     """Return the budget of a quantity from the results of a case and its neighbours, at the same rows."""
     own, axis, units = rows[case.key], case.experiment.axis, VARIABLES[quantity.name].units
     values = {key: quantity.of(result, case) for key, result in rows.items()}
     value = values[case.key]
-    half_width = np.zeros((len(sources), value.size))
-    direction = np.zeros(half_width.shape, dtype="int8")
+    half_width, direction = np.zeros((2, len(sources), value.size))
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithms = {key: np.log(one) for key, one in values.items()}
         for i, (name, source) in enumerate(sources.items()):
@@ -366,24 +350,15 @@ def _budget(
             if change and name == OCTAVE:
                 half_width[i] *= quantity.octave_factor
                 direction[i] = -np.sign(np.nan_to_num(change[0]))
-    costs = [sum(seconds[one.case.key] for one in source.neighbours) for source in sources.values()]
     table = xr.Dataset(
         {
-            "half_width": (
-                ("source", axis),
-                half_width,
-                {"units": "1", "long_name": "half-width of the logarithm at 95 %"},
-            ),
-            "direction": (("source", axis), direction, _DIRECTIONS),
-            "state": ("source", ["open" if source.is_open else "counted" for source in sources.values()]),
+            "half_width": (("source", axis), half_width, {"units": "1"}),
+            "direction": (("source", axis), direction.astype("int8")),
             "method": ("source", [source.method for source in sources.values()]),
-            "cost": ("source", costs, {"units": "s", "long_name": "wall time of the solves"}),
             "value": (axis, value, {"units": units}),
-            "case_cost": ((), seconds[case.key], {"units": "s", "long_name": "wall time of the case"}),
         },
-        {"source": list(sources), axis: own[axis].variable},
+        {"source": list(sources), axis: own[axis].variable, "quantity": quantity.name},
         {
-            "quantity": quantity.name,
             "case": case.to_json(),
             "title": case.title,
             "open": "; ".join(name for name, source in sources.items() if source.is_open),
@@ -391,15 +366,12 @@ def _budget(
     )
     for name, side in (("lower", -1), ("upper", 1)):
         bound = np.where(value == 0, math.nan, value) * np.exp(side * together(table, side))
-        table[name] = (axis, bound, {"units": units, "long_name": f"{name} bound at 95 %"})
+        table[name] = (axis, bound, {"units": units})
     return table
 
 
-_DIRECTIONS = {"flag_values": np.array([-1, 0, 1], dtype="int8"), "flag_meanings": "lowers both raises"}
-
-
 def together(table: xr.Dataset, side: int) -> Array:
-    """Return the half-width of all counted sources of a budget on the upper (1) or the lower (-1) side. [-]"""
-    counts = table["direction"].isin((0, side)) & (table["state"] != "open")
+    """Return the half-width of all sources of a budget but the open ones, on the upper (1) or lower (-1) side. [-]"""
+    counts = table["direction"].isin((0, side)) & ~table["source"].isin(table.attrs["open"].split("; "))
     squares = table["half_width"].where(counts, 0.0) ** 2
     return np.asarray(np.sqrt(squares.sum("source", skipna=False)))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
-from roughvisc.observables.conductance import conductance, incremental_stiffness
+from roughvisc.observables.conductance import conductance
 from roughvisc.observables.leakage import leakage
 from roughvisc.study.case import Case
 
@@ -89,16 +89,6 @@ def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
     return leakage(result, **observe.get("leakage", {}))["leak_rate"]
 
 
-def _incremental_stiffness(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    """Return the stiffness for a fast increment of load, with the instantaneous modulus."""
-    body = Case.of_result(result).body
-    compliance = float(body.material.contact_compliance(0.0))
-    if compliance == 0:
-        expected = "a material with an instantaneous compliance"
-        raise InputError(key="quantity", found="incremental_stiffness", expected=expected)
-    return incremental_stiffness(result, 1 / compliance, kernel=body.kernel)["incremental_stiffness"]
-
-
 #: Name -> quantity.
 QUANTITIES = {
     one.name: one
@@ -110,7 +100,6 @@ QUANTITIES = {
         Observable("friction_coefficient", octave_factor=1.8),
         Observable("leak_rate", _leak_rate, ("gap",), follows="gap"),
         Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, "area"),
-        Observable("incremental_stiffness", _incremental_stiffness, ("pressure",), 2.5, "area"),
     )
 }
 

@@ -11,7 +11,6 @@ import logging
 import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,6 @@ from roughvisc.study import neighbours
 from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
 from roughvisc.study.quantities import QUANTITIES, quantity_of
 from roughvisc.study.storage.folder import atomic_write, require_writable, result_path
@@ -104,7 +102,7 @@ def run(
 ) -> xr.Dataset:
     """Choose grid and tolerance for wanted errors and return the result; see :func:`roughvisc.run`."""
     folder = result_folder(case, out)
-    computing = {"watch": partial(Display, progress, summary=False), "client": default_client(), "threads": threads}
+    computing = {"progress": progress, "client": default_client(), "threads": threads}
     chosen, reasons, budgets = choose(case, want, folder, log.info, **computing)
     for name, one in budgets.items():
         write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
@@ -149,14 +147,13 @@ def choose(
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
     require_writable(folder, "since what is wanted takes several solves")
-    solved = partial(neighbours.solve, folder=folder / FOLDER, **computing)
     height, smallest = case.height(), min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
         tolerance = min(tolerance, case.settings.tolerance)
-    places = case.settings.times if isinstance(case.settings.times, tuple) else None
-    if places is None and case.experiment.axis == "time":
+    axis, places = case.experiment.axis, case.settings.times if isinstance(case.settings.times, tuple) else None
+    if places is None and axis == "time":
         places = case.program.corners
 
     # the coarsest grid resolves the waves of the surface, and leaves some cells to the third grid
@@ -168,7 +165,10 @@ def choose(
         base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
         chosen = neighbours.on_cells(base, height, 2.0**level)
         sources = neighbours.sources_of(base, height, want, 2.0**level, 2.0**coarsest)
-        found = neighbours.compared(chosen, sources, observed, solved, places=places, loaded=True)
+        [own] = neighbours.solve([chosen], folder / FOLDER, **computing).values()
+        own = own if places is None else neighbours.at_rows(own, axis, places)
+        own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
+        found = neighbours.compared(chosen, sources, observed, folder / FOLDER, own, **computing)
         cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
         reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
         tell(f"{cells}: {'; '.join(reached)}")
@@ -180,7 +180,7 @@ def choose(
             break
         # neither a finer grid nor a smaller tolerance reduces the errors of other sources
         _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
-        level, places = level - 1, next(iter(found.values()))[case.experiment.axis].values
+        level, places = level - 1, own[axis].values
 
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):

@@ -100,19 +100,9 @@ def test_scan__on_a_coarser_grid_is_another_surface_and_has_no_finer_one(tmp_pat
         measured(case, (1e-3, 0.5))
 
 
-# ----------------------------------------------------------------------------------------------------------------
-# time
-
-
-def test_budget__stops_runs_and_refuses_a_reference_that_takes_too_long(tmp_path):
-    with pytest.raises(rv.InputError, match="reference"):
-        measured(case_of(tmp_path, ROUGH), (1e-2, 1), budget=1e-6)
-
-
 @pytest.mark.parametrize(
     ("settings", "options", "key", "found"),
     [
-        ([(1e-3, 1)], {"budget": 0}, "budget", 0),
         ([(2.0, 1)], {}, "settings", 2.0),
         ([(1e-3, 0.0)], {}, "settings", 0.0),
         ([], {}, "settings", []),
@@ -147,7 +137,6 @@ def made_up(rows=MADE_UP, unsure=0.0, grid_unsure=0.0, grid_is_data=0):
     }
     variables = {
         "error": (("setting", "quantity"), error[:, None] * np.ones(3)),
-        "note": ("setting", ["" if np.isfinite(time) else "would take a day" for time in spent]),
         "reference_time_uncertainty": ("quantity", [unsure] * 3),
         "reference_grid_uncertainty": ("quantity", [grid_unsure] * 3),
         **dict.fromkeys(("run_time", "transforms"), ("setting", spent)),
@@ -209,7 +198,7 @@ def test_command__writes_its_files_and_marks_the_cheapest(invoke, tmp_path, monk
 
 
 def test_figure__draws_every_setting_and_the_front():
-    ds = made_up([*MADE_UP, (3e-3, 1, np.nan, np.nan)], unsure=0.001)
+    ds = made_up(unsure=0.001)
     (ax,) = rv.plot.trade(ds, [AREA]).axes
     lines = {line.get_label(): line.get_xydata() for line in ax.lines}
     assert lines["96 × 90 cells"] == pytest.approx(np.array(MADE_UP[:4])[:, 2:] * [1, 100])

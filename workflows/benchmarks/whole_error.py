@@ -9,8 +9,7 @@ and longer. ``rv.budget`` gets the scan and the cut-off. Its interval is compare
 Five families (Hurst exponent, cut-off in cells of the scan), three loads and three materials give 45 scenes, each with
 three times, or with ``--friction`` with three speeds: 135 cases for each quantity. Lines are appended to OUT; scenes in
 this file are not run again. The factors of the budget were chosen with ``--seed 1``; the default is another seed. At
-the end the coverage is printed by quantity and population, with the median half-width over the median error and the
-cost relative to one solve.
+the end the coverage is printed by quantity and population, with the median half-width over the median error.
 """
 
 import argparse
@@ -130,7 +129,6 @@ def scene(family, load, material, number, friction, start, cells):
                     "half_width": dict(
                         zip(one["source"].values.tolist(), one["half_width"].values.tolist(), strict=True)
                     ),
-                    "cost": float(one["cost"].sum() / one["case_cost"]),
                 }
                 for name, one in ((name, stated.sel(quantity=name)) for name in names)
             }
@@ -170,12 +168,12 @@ def summary(lines):
                     if value and value > 0 and true > 0:
                         error = np.log(true / value)
                         width = np.log(upper / value) if error > 0 else np.log(value / lower)
-                        rows.append((lower <= true <= upper, abs(error), width, one["cost"]))
-            within, error, width, cost = np.array(rows, dtype=float).T
+                        rows.append((lower <= true <= upper, abs(error), width))
+            within, error, width = np.array(rows, dtype=float).T
             print(
                 f"{label:16s} {name:20s} {len(rows):4d} cases  within {100 * within.mean():5.1f} %  median error "
                 f"{100 * np.median(error):6.2f} %  half-width {100 * np.nanmedian(width):6.2f} %  "
-                f"ratio {np.nanmedian(width) / max(np.median(error), 1e-12):5.1f}  cost {np.median(cost):4.1f}"
+                f"ratio {np.nanmedian(width) / max(np.median(error), 1e-12):5.1f}"
             )
 
 

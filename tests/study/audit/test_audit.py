@@ -350,7 +350,7 @@ def test_study__states_values_that_change_no_key(tmp_path, invoke):
     out = invoke("audit", tmp_path / "results")[1]
     assert "600 µm" in out
     assert "heat_conductivity" not in out, "nothing slides"
-    assert "linear_strain" in out, "a missing property is named"
+    assert "--linear-strain" in out, "a missing property is named as the option"
     assert "6 mm" in invoke("audit", tmp_path / "results", "--thickness", "6 mm")[1]
     path.write_text(AUDITED.replace("0.6 mm", "7 mm"))
     assert "7 mm" in invoke("audit", tmp_path / "results", "--study", path)[1]
