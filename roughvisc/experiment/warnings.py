@@ -164,17 +164,14 @@ def border_warning(height: xr.DataArray, dataset: xr.Dataset) -> str:
     dataset : Dataset
         The result. If it has the pressure, the warning gives the pressure of the outermost cells.
     """
-    borders = border_mismatch(height)
-    if not borders.jumps:
+    x, y = border_mismatch(height)
+    if max(x, y) <= JUMP:
         return ""
-    (x, y), (nx, ny) = borders.of_rms, borders.of_neighbours
-    note = (
-        f"The surface repeats with a step: opposite borders differ by {x:.2g} Sq along x and {y:.2g} Sq along y, "
-        f"{nx:.2g} and {ny:.2g} times as much as neighbouring rows."
-    )
+    note = f"The surface repeats with a step: opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as "
+    note += "neighbouring rows."
     if "pressure" in dataset and float(dataset["force"][-1]) > 0:
         last = dataset["pressure"].isel(time=-1)
-        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (nx, ny), strict=True) if jump > JUMP]
+        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (x, y), strict=True) if jump > JUMP]
         ratio = max(float(side.mean()) for side in sides) / float(last.mean())
         note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
     return note + " Use boundary = 'mirror'."

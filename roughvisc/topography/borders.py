@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -20,29 +19,8 @@ MIRRORED = "mirrored along x and y"
 _ROUNDING = 16 * float(np.finfo(float).eps)
 
 
-@dataclass(frozen=True)
-class BorderMismatch:
-    """Difference of opposite borders of a surface, along x and along y.
-
-    Attributes
-    ----------
-    of_rms : pair of float
-        Root mean square difference of the first and the last row over the root mean square height Sq. [-]
-    of_neighbours : pair of float
-        The same difference over the root mean square difference of neighbouring rows. [-]
-    """
-
-    of_rms: tuple[float, float]
-    of_neighbours: tuple[float, float]
-
-    @property
-    def jumps(self) -> bool:
-        """Whether the repeated surface has a step: its borders differ more than twice as much as neighbouring rows."""
-        return max(self.of_neighbours) > JUMP
-
-
-def border_mismatch(h: xr.DataArray) -> BorderMismatch:
-    """Return the mismatch of opposite borders.
+def border_mismatch(h: xr.DataArray) -> tuple[float, float]:
+    """Return the difference of opposite borders over the difference of neighbouring rows, along x and along y.
 
     Parameters
     ----------
@@ -51,19 +29,15 @@ def border_mismatch(h: xr.DataArray) -> BorderMismatch:
 
     Returns
     -------
-    BorderMismatch
-        Zero along an axis of one cell, and for a flat surface.
+    pair of float
+        Ratio of root mean square differences. Zero along an axis of one cell, and for a flat surface. Above
+        :data:`JUMP`, the repeated surface has a step. [-]
     """
     values = h.transpose("x", "y").values
-    known = values[np.isfinite(values)]
-    rms = known.std() if known.size else 0.0
-    of_rms, of_neighbours = [], []
-    for axis in (0, 1):
-        across = _rms(np.take(values, 0, axis) - np.take(values, -1, axis))
-        beside = _rms(np.diff(values, axis=axis))
-        of_rms.append(across / rms if rms > 0 else 0.0)
-        of_neighbours.append(across / beside if beside > 0 else 0.0)
-    return BorderMismatch((of_rms[0], of_rms[1]), (of_neighbours[0], of_neighbours[1]))
+    across = [_rms(np.take(values, 0, axis) - np.take(values, -1, axis)) for axis in (0, 1)]
+    beside = [_rms(np.diff(values, axis=axis)) for axis in (0, 1)]
+    x, y = (one / other if other > 0 else 0.0 for one, other in zip(across, beside, strict=True))
+    return x, y
 
 
 def period_of(h: xr.DataArray) -> list[float]:
@@ -86,7 +60,7 @@ def is_periodic(h: xr.DataArray) -> bool:
     period = np.asarray(h.attrs.get("period", ()))
     if period.shape != (2,) or not np.allclose(period, period_of(h), rtol=1e-6, atol=0):
         return False
-    return max(border_mismatch(h).of_neighbours) <= 2 * JUMP
+    return max(border_mismatch(h)) <= 2 * JUMP
 
 
 def is_analytic(h: xr.DataArray) -> bool:

@@ -11,12 +11,12 @@ import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
 from roughvisc.topography.bandwidth import gaussian_filter, level
-from roughvisc.topography.borders import border_mismatch
+from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import crop
 from roughvisc.topography.grid import cell_edges, checked, filled_points, nominal_area, spacing
 from roughvisc.topography.missing_points import fill, in_large_holes, mask_outliers
-from roughvisc.topography.parameters import parameters
+from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
 
@@ -26,9 +26,8 @@ _HOLES = 0.01
 _MOST_SPIKES = 0.02
 #: Share of a quadratic form in the mean square height from which its removal is recommended.
 _FORM = 0.5
-#: Root mean square slope above which a unit or the spacing is probably wrong, and range of the kurtosis of samples of
-#: Gaussian heights. [-]
-_STEEP, _GAUSSIAN = 1.0, (2.4, 4.0)
+#: Root mean square slope above which a unit or the spacing is probably wrong. [-]
+_STEEP = 1.0
 #: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. If the spectrum
 #: is below this multiple of the tail, noise is at least as strong as the surface.
 _WHITE, _ABOVE = -1.5, 2.0
@@ -126,18 +125,20 @@ def inspect(h: xr.DataArray) -> Inspection:
 
     void = in_large_holes(np.isnan(h.values))
     if share := float(void.mean()):
-        step, advice = {}, "too small to crop; fill them with the other missing points"
-        if limits := _largest_part(h, void) if share >= _HOLES else {}:
-            step, h = {"crop": limits}, crop(h, **limits)
-            part = f"{h.shape[0]} x {h.shape[1]} points, to which the findings below refer"
-            advice = f'crop to the largest part without holes, {part}; missing = "absent" if holes contain no material'
-        find("Holes", f"{_percent(share)} of the scan lies in holes wider than a few points", advice, step, share=share)
+        limits = _largest_part(h, void) if share >= _HOLES else {}
+        h = crop(h, **limits) if limits else h
+        part = f"{h.shape[0]} x {h.shape[1]} points, to which the findings below refer"
+        advice = f'crop to the largest part without holes, {part}; missing = "absent" if holes contain no material'
+        advice = advice if limits else "too small to crop; fill them with the other missing points"
+        seen = f"{_percent(share)} of the scan lies in holes wider than a few points"
+        find("Holes", seen, advice, {"crop": limits} if limits else {}, share=share)
 
-    seen, advice, step = "none", "", {}
-    if missing := int(h.isnull().sum()):
-        seen, step = f"{missing} ({_percent(missing / h.size)})", {"fill": "harmonic"}
-        advice = 'fill = "harmonic"; the result marks the filled points'
-    find("Missing points", seen, advice, step, points=missing)
+    missing = int(h.isnull().sum())
+    if missing:
+        advice, step = 'fill = "harmonic"; the result marks the filled points', {"fill": "harmonic"}
+        find("Missing points", f"{missing} ({_percent(missing / h.size)})", advice, step, points=missing)
+    else:
+        find("Missing points", "none", points=0)
 
     levelled = level(h)
     kept = mask_outliers(levelled)
@@ -158,67 +159,50 @@ def inspect(h: xr.DataArray) -> Inspection:
 
     rms_flat = float(np.nanstd(level(kept, 2).values)) if min(h.shape) > 2 else rms
     form = 1 - (rms_flat / rms) ** 2 if rms > 0 else 0.0
-    # a plane would break the periodicity
-    repeats = border_mismatch(kept).jumps and not border_mismatch(h).jumps
+    repeats = max(border_mismatch(kept)) > JUMP >= max(border_mismatch(h))  # a plane would break the periodicity
     order = 2 if form > _FORM else 0 if repeats else 1
     treated = kept if order == 1 else level(h, order).where(kept.notnull())
-    plane = h.values - levelled.values
-    slopes = [float(np.nanmean(np.diff(plane, axis=axis)) / d) for axis, d in enumerate(spacing(h))]
+    slopes = tuple(float(np.nanmean((h - levelled).diff(axis))) / d for axis, d in zip("xy", spacing(h), strict=True))
     seen = f"{_angle(slopes[0])} along x, {_angle(slopes[1])} along y: Sq is {_length(rms_levelled)} without the plane"
-    advice = f"level = {order} subtracts the plane{' too' if order == 2 else ''}"
-    advice = advice if order else "level = 0 subtracts the mean only; a plane would break the periodicity"
-    find("Tilt", seen, advice, {"level": order}, slopes=(slopes[0], slopes[1]))
-    seen, advice = f"a quadratic form accounts for {_percent(form)} of Sq squared", ""
-    if order == 2:
-        seen += f"; Sq is {_length(rms_flat)} without it"
-        advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
-    find("Form", seen, advice, share=form, rms_without=rms_flat)
+    advice = "level = 0 subtracts the mean only; a plane would break the periodicity"
+    advice = f"level = {order} subtracts the plane{' too' if order == 2 else ''}" if order else advice
+    find("Tilt", seen, advice, {"level": order}, slopes=slopes)
+    seen = f"a quadratic form accounts for {_percent(form)} of Sq squared; Sq is {_length(rms_flat)} without it"
+    advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
+    find("Form", seen, advice if order == 2 else "", share=form, rms_without=rms_flat)
 
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
-    x, y = borders.of_neighbours
-    times = [f"{one:.2g}" if one > 1e-3 else "0" for one in (x, y)]  # rounding of a surface that repeats
+    boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
+    times = [f"{one:.2g}" if one > 1e-3 else "0" for one in borders]  # rounding of a surface that repeats
     seen = f"opposite borders differ {times[0]} (x) and {times[1]} times (y) as much as neighbouring rows"
-    advice = 'boundary = "mirror"; with "periodic" the step at the seam carries load'
-    find("Borders", seen, advice if borders.jumps else 'boundary = "periodic"', of_neighbours=borders.of_neighbours)
+    why = '; with "periodic" the step at the seam carries load' if boundary == "mirror" else ""
+    find("Borders", seen, f'boundary = "{boundary}"{why}', of_neighbours=borders)
 
     noise, cell = _noise(treated), max(spacing(treated))
     cutoff = None
     if noise and noise["noisy_slopes"] > _HARMLESS and noise["wavelength"] >= 3 * cell:
         cutoff = max(float(f"{noise['wavelength']:.2g}"), 3.001 * cell)
         treated = gaussian_filter(treated, cutoff)
-    measures = parameters(treated)
-    slope, kurtosis = float(measures["Sdq"]), float(measures["Sku"])
+    slope = rms_slope(treated)
     seen, advice = f"the rms slope is {slope:.2g} after these steps", ""
     if slope > _STEEP:
         seen += ", which is steeper than 45°, unlike almost any measured surface"
         advice = "check unit, spacing and height_scale; the half-space model holds for small slopes only"
     find("Slope", seen, advice, rms_slope=slope)
-    seen, advice = f"their kurtosis is {kurtosis:.2g} (3: Gaussian)", ""
-    if not _GAUSSIAN[0] <= kurtosis <= _GAUSSIAN[1] and not math.isnan(kurtosis):
-        why = "plateaus, or few long waves" if kurtosis < _GAUSSIAN[0] else "outlying summits or pits"
-        seen += f": {why}; the spectrum alone may not determine its contact"
-        advice = "realisations = 24 in [sweep] compares the scan with random surfaces of the same spectrum"
-    find("Heights", seen, advice, kurtosis=kurtosis)
 
     seen = "not known: the scan is flat, smaller than 16 points, or mostly missing"
-    if noise is not None:
-        seen = f"no noise floor down to two cells; noise is below {_length(noise['rms'])} rms"
-    if noise is not None and noise["floor"]:
+    if noise and noise["floor"]:
         part = f"{_percent(noise['noisy_slopes'])} of the mean square slope"
         seen = f"{_length(noise['rms'])} rms: wavelengths below {_length(noise['wavelength'])} are noise, {part}"
+    elif noise:
+        seen = f"no noise floor down to two cells; noise is below {_length(noise['rms'])} rms"
     step, advice = ({"filter": cutoff}, "filter out these wavelengths") if cutoff else ({}, "")
-    find("Noise", seen, advice, step, **(noise or {}))
+    find("Noise", seen, advice, step, **noise)
 
     proposed = {name: value for one in findings.values() for name, value in one.step.items()}
-    return Inspection(
-        findings,
-        {name: proposed[name] for name in STEPS if name in proposed},
-        "mirror" if borders.jumps else "periodic",
-        (treated.shape[0], treated.shape[1]),
-        nominal_area(treated),
-        slope,
-    )
+    steps = {name: proposed[name] for name in STEPS if name in proposed}
+    return Inspection(findings, steps, boundary, treated.shape, nominal_area(treated), slope)
 
 
 def _largest_part(h: xr.DataArray, void: np.ndarray) -> dict[str, tuple[float, float]]:
@@ -245,8 +229,8 @@ def _largest_part(h: xr.DataArray, void: np.ndarray) -> dict[str, tuple[float, f
     return limits
 
 
-def _noise(h: xr.DataArray) -> dict[str, Any] | None:
-    """Measure the short-wave end of the spectrum; None if too few points were measured or the surface is flat.
+def _noise(h: xr.DataArray) -> dict[str, Any]:
+    """Measure the short-wave end of the spectrum; nothing if too few points were measured or the surface is flat.
 
     Filled points raise this end of the spectrum. Noise of 2 % of the rms height is overestimated by up to a third if
     10 % of the points are missing, and weaker noise by more.
@@ -265,29 +249,22 @@ def _noise(h: xr.DataArray) -> dict[str, Any] | None:
     gaps = gaps | scipy.ndimage.binary_dilation(in_large_holes(gaps))
     rms = float(h.values.std())
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
-        return None
+        return {}
     q, density, modes = _short_waves(h, gaps)
-    octave = q > q[-1] / 2
+    octave, area = q > q[-1] / 2, math.prod(spacing(h))
     tail = float(np.median(density[octave]))
     power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
     below = np.flatnonzero(scipy.ndimage.median_filter(density, 5, mode="nearest") < _ABOVE * tail)
-    area = math.prod(spacing(h))
     floor = bool(power > _WHITE and below.size and below[0] > 0 and math.sqrt(tail / area) > _ROUNDING * rms)
     more = gaps | np.roll(gaps, [n // 2 for n in gaps.shape], (0, 1))
     if floor and gaps.any() and more.mean() <= _MOST_MISSING:
         q_more, density_more, _ = _short_waves(h, more)
         floor = not float(np.median(density_more[q_more > q_more[-1] / 2])) > _OF_GAPS * tail
-    if not floor:
-        strength = float(np.median(density[q > 0.8 * q[-1]]))
-        return {
-            "rms": math.sqrt(strength / area),
-            "floor": False,
-            "wavelength": 2 * max(spacing(h)),
-            "noisy_slopes": 0.0,
-        }
-    shortest, slopes = float(2 * np.pi / q[below[0] - 1]), density * modes * q**2
-    noisy = float(slopes[q > 2 * np.pi / shortest].sum() / slopes.sum())
-    return {"rms": math.sqrt(tail / area), "floor": True, "wavelength": shortest, "noisy_slopes": noisy}
+    strength = tail if floor else float(np.median(density[q > 0.8 * q[-1]]))
+    shortest = float(2 * np.pi / q[below[0] - 1]) if floor else 2 * max(spacing(h))
+    slopes = density * modes * q**2
+    noisy = float(slopes[q > 2 * np.pi / shortest].sum() / slopes.sum()) if floor else 0.0
+    return {"rms": math.sqrt(strength / area), "floor": floor, "wavelength": shortest, "noisy_slopes": noisy}
 
 
 def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -199,7 +199,7 @@ def border(scene: Scene) -> Found:
         return None
     if scene.boundary == "mirror":
         return 0.0, "The surface repeats with its mirror images: its borders meet."
-    number = max(border_mismatch(scene.height).of_neighbours)
+    number = max(border_mismatch(scene.height))
     advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
     return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
 
