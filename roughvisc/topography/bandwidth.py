@@ -6,16 +6,13 @@ import math
 from typing import Literal
 
 import numpy as np
-import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
+import scipy.fft
 import xarray as xr
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
 from roughvisc.units import Quantity, format_quantity, quantities
-
-#: Half-width of a filter [points] up to which a sum is as fast as FFTs, whose library takes half a second to import.
-_SUMMED = 64
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
@@ -149,34 +146,24 @@ def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray
 def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np.ndarray:
     """Return the waves longer than a cut-off along each axis (in cells); missing points stay missing. [m]"""
     mean, present = np.nanmean(heights), np.isfinite(heights)
-    long = np.where(present, heights - mean, 0.0)
+    long, share = np.where(present, heights - mean, 0.0), present.astype(float)
     for axis, cutoff in enumerate(cutoffs):
-        long = _smoothed(long, axis, cutoff, periodic)
-    if present.all():  # the sum of weights at a point is a product of sums along the axes
-        shares = [_smoothed(np.ones((n, 1)), 0, c, periodic) for n, c in zip(heights.shape, cutoffs, strict=True)]
-        share = shares[0] * shares[1].T
-    else:
-        share = present.astype(float)
-        for axis, cutoff in enumerate(cutoffs):
-            share = _smoothed(share, axis, cutoff, periodic)
+        long, share = (_smoothed(field, axis, cutoff, periodic) for field in (long, share))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(present, long / share + mean, np.nan)
 
 
 def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:
     """Apply a Gaussian filter along one axis (cut-off in cells), without normalisation at the border."""
-    alpha = math.sqrt(math.log(2) / math.pi)
+    alpha, count = math.sqrt(math.log(2) / math.pi), field.shape[axis]
     if periodic:
-        transmission = np.exp(-np.pi * (alpha * cutoff * scipy.fft.rfftfreq(field.shape[axis])) ** 2)
-        field_q = scipy.fft.rfft(field, axis=axis)
-        field_q *= transmission[:, None] if axis == 0 else transmission
-        return scipy.fft.irfft(field_q, field.shape[axis], axis=axis)
-    reach = min(math.ceil(1.5 * cutoff), field.shape[axis] - 1)  # where the weight is 1e-14
-    at = np.arange(-reach, reach + 1)
-    weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
-    weights /= weights.sum()
-    if reach <= _SUMMED:
-        return scipy.ndimage.convolve1d(field, weights, axis, mode="constant")
-    from scipy.signal import oaconvolve  # slow to import
-
-    return oaconvolve(field, weights[:, None] if axis == 0 else weights[None], mode="same", axes=axis)
+        length = count
+        transmission = np.exp(-np.pi * (alpha * cutoff * scipy.fft.rfftfreq(count)) ** 2)
+    else:  # zeros beyond the border, as far as the weights reach
+        length = scipy.fft.next_fast_len(count + min(math.ceil(1.5 * cutoff), count), real=True)
+        at = np.minimum(np.arange(length), length - np.arange(length))
+        weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
+        transmission = scipy.fft.rfft(weights / weights.sum())
+    field_q = scipy.fft.rfft(field, length, axis=axis)
+    field_q *= transmission[:, None] if axis == 0 else transmission
+    return np.take(scipy.fft.irfft(field_q, length, axis=axis), range(count), axis)

@@ -53,21 +53,19 @@ def crop(
     InputError
         If limits are not a pair, or fewer than two cells lie within them along an axis.
     """
-    chosen = {}
-    for axis, limits in (("x", x), ("y", y)):
-        if limits is not None:
-            low, high = limits if isinstance(limits, Sequence | np.ndarray) and len(limits) == 2 else (np.nan, np.nan)
-            if not (isinstance(low, Real) and isinstance(high, Real) and low < high):
-                raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
-            chosen[axis] = (float(low), float(high))
+    chosen = {axis: limits for axis, limits in (("x", x), ("y", y)) if limits is not None}
+    for axis, limits in chosen.items():
+        is_pair = isinstance(limits, Sequence | np.ndarray) and len(limits) == 2
+        if not (is_pair and all(isinstance(one, Real) for one in limits) and limits[0] < limits[1]):
+            raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
+        chosen[axis] = (float(limits[0]), float(limits[1]))
     h = checked(h, "crop")
-    whole = h.shape
-    for axis, (low, high) in chosen.items():
-        part = h.sel({axis: slice(low, high)})
-        if part.sizes[axis] < 2:
-            held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
-            raise InputError(key=axis, found=(low, high), expected=f"limits that hold at least two cells of {held} m")
-        h = part
+    whole, first = h.shape, h
+    h = h.sel({axis: slice(*limits) for axis, limits in chosen.items()})
+    for axis, limits in chosen.items():
+        if h.sizes[axis] < 2:
+            held = f"{float(first[axis][0]):.6g} to {float(first[axis][-1]):.6g}"
+            raise InputError(key=axis, found=limits, expected=f"limits that hold at least two cells of {held} m")
     line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
     return noted(h, line, **({} if h.shape == whole else {"period": None}))
 
@@ -91,9 +89,9 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
         raise InputError(key="turns", found=turns, expected="a whole number of quarter turns")
     h = checked(h, "rotate90")
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
-    heights = np.rot90(h.values, turns)
     filled = filled_points(h)
-    grid = with_filled_points(labelled(heights, sides, h.attrs), None if filled is None else np.rot90(filled, turns))
+    grid = labelled(np.rot90(h.values, turns), sides, h.attrs)
+    grid = with_filled_points(grid, None if filled is None else np.rot90(filled, turns))
     kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
     return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
 
@@ -162,13 +160,12 @@ def combine(
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
-    if flip is not None:
-        one_of("flip", flip, ("x", "y"))
+    one_of("flip", flip, (None, "x", "y"))
     one_of("align", align, ("grid", "centre"))
     if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
         raise InputError(key="offset", found=offset, expected="a pair of lengths, along x and along y [m]")
     apart = [number(d, "m", "offset") for d in offset]
-    if align == "grid" and apart != [0.0, 0.0]:
+    if align == "grid" and any(apart):
         raise InputError(key="offset", found=offset, expected="none with align='grid'; align='centre' takes one")
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
@@ -181,15 +178,12 @@ def combine(
         h1, h2 = _on_common_cells(h1, h2, apart)
         centre = ", ".join(f"{d:.6g}" for d in apart)
         line += f", its centre ({centre}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
-    near = [1e-6 * d for d in spacing(h1)]
-    if h1.shape != h2.shape or any(
-        np.abs(h1[a].values - h2[a].values).max() > d for a, d in zip("xy", near, strict=True)
+    elif h1.shape != h2.shape or not all(
+        np.allclose(h1[axis], h2[axis], rtol=0, atol=1e-6 * d) for axis, d in zip("xy", spacing(h1), strict=True)
     ):
         described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
-        raise InputError(
-            f"combine: found {described[0]} and {described[1]}: expected one grid, or align='centre' "
-            "(see also resample and crop)"
-        )
+        expected = "one grid, or align='centre' (see also resample and crop)"
+        raise InputError(f"combine: found {described[0]} and {described[1]}: expected {expected}")
     both = like(h1, h1.values + h2.values)
     lost = {"recipe", "highest", "missing"} | (set() if repeats else {"period"})
     both.attrs = {key: value for key, value in h1.attrs.items() if key not in lost}
@@ -250,8 +244,8 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> 
     heights = laid(membrane(h2.values), 3)
     heights[laid(missing.astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
     marked = None if filled is None else laid(filled.astype(float), 1) > _ON_BORDER
-    x, y = (first[axis].values for axis in ("x", "y"))
-    return first, with_coordinates(heights, x, y, h2.attrs, filled=marked)
+    second = with_coordinates(heights, first["x"].values, first["y"].values, h2.attrs)
+    return first, with_filled_points(second, marked)
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:
@@ -272,10 +266,8 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
         Twice as many points along each axis. [m]
     """
     h = checked(h, "mirror")
-    there_and_back = {axis: np.r_[0:n, n - 1 : -1 : -1] for axis, n in h.sizes.items()}
-    axes = {
-        axis: (axis, float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d, h[axis].attrs)
-        for axis, d in zip(("x", "y"), spacing(h), strict=True)
-    }
-    doubled = h.isel(there_and_back).assign_coords(axes)
+    doubled = h.isel({axis: np.r_[0:n, n - 1 : -1 : -1] for axis, n in h.sizes.items()})
+    for axis, d in zip(("x", "y"), spacing(h), strict=True):
+        centres = float(h[axis][0]) + np.arange(doubled.sizes[axis]) * d
+        doubled = doubled.assign_coords({axis: (axis, centres, h[axis].attrs)})
     return noted(doubled, MIRRORED, period=period_of(doubled))

@@ -40,14 +40,7 @@ def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] |
     return with_coordinates(values, x, y, attrs)
 
 
-def with_coordinates(
-    values: np.ndarray,
-    x: Any,
-    y: Any,
-    attrs: dict[str, Any] | None = None,
-    *,
-    filled: np.ndarray | None = None,
-) -> xr.DataArray:
+def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] | None = None) -> xr.DataArray:
     """Return heights over given cell-centre coordinates, with the declared attributes.
 
     Parameters
@@ -58,18 +51,10 @@ def with_coordinates(
         Cell centres. [m]
     attrs : dict, optional
         Attributes in addition to the declared ones.
-    filled : ndarray of bool, shape (nx, ny), optional
-        See :func:`filled_points`.
     """
-    coordinates = {"x": x, "y": y}
-    h = xr.DataArray(
-        values,
-        coords={axis: (axis, at, VARIABLES[axis].attributes) for axis, at in coordinates.items()},
-        dims=("x", "y"),
-        name="height",
-        attrs={**VARIABLES["height"].attributes, **(attrs or {})},
-    )
-    return h if filled is None else with_filled_points(h, filled)
+    coordinates = {axis: (axis, at, VARIABLES[axis].attributes) for axis, at in (("x", x), ("y", y))}
+    stated = VARIABLES["height"].attributes | (attrs or {})
+    return xr.DataArray(values, coordinates, ("x", "y"), "height", stated)
 
 
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
@@ -110,11 +95,10 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
         raise InputError(f"{step}: found dimensions {tuple(map(str, h.dims))}: expected heights over ('x', 'y')")
     h = h.transpose("x", "y").compute()
     h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
-    for axis in ("x", "y"):
-        if axis in h.coords:
-            centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
-            h = h.assign_coords({axis: (axis, centres, h[axis].attrs | {"units": "m"})})
     spacing(h, step)
+    for axis in ("x", "y"):
+        centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
+        h = h.assign_coords({axis: (axis, centres, h[axis].attrs | {"units": "m"})})
     for axis in ("x", "y"):
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
@@ -220,12 +204,10 @@ def cell_side(centres: Any, name: str = "the coordinate") -> float:
         if not at[0] > 0:
             raise InputError(f"{name} has its only cell centred at {at[0]:g} m: expected half its side")
         return 2 * float(at[0])
-    d = float(at[-1] - at[0]) / (at.size - 1)
-    if not d > 0 or np.abs(np.diff(at) - d).max() > 1e-4 * d:
-        steps = np.diff(at)
-        raise InputError(
-            f"{name} has steps from {steps.min():.6g} to {steps.max():.6g} m: expected a uniform, ascending grid"
-        )
+    d, steps = float(at[-1] - at[0]) / (at.size - 1), np.diff(at)
+    if not d > 0 or np.abs(steps - d).max() > 1e-4 * d:
+        found = f"steps from {steps.min():.6g} to {steps.max():.6g} m"
+        raise InputError(f"{name} has {found}: expected a uniform, ascending grid")
     return float(f"{d:.15g}")
 
 

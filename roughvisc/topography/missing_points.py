@@ -99,11 +99,9 @@ def fill(h: xr.DataArray, method: Literal["harmonic", "nearest"] = "harmonic") -
         raise InputError("fill: the missing cells are absent (without material): expected a scan with missing points")
     require_heights(h, "fill")
     missing = np.isnan(h.values)
-    if method == "harmonic":
-        heights = membrane(h.values)
-    else:
+    if method == "nearest":
         nearest = scipy.ndimage.distance_transform_edt(missing, spacing(h), return_distances=False, return_indices=True)
-        heights = h.values[tuple(nearest)]
+    heights = membrane(h.values) if method == "harmonic" else h.values[tuple(nearest)]
     before = filled_points(h)
     marked = with_filled_points(like(h, heights), missing if before is None else missing | before)
     return noted(marked, f"filled: {int(missing.sum())} missing points, {method}", fill_method=method)
@@ -126,15 +124,11 @@ def _local_median(values: np.ndarray, window: int) -> np.ndarray:
     def median(windows: np.ndarray, axis: tuple[int, ...]) -> np.ndarray:
         ordered = np.sort(windows.reshape(*windows.shape[:-2], -1), axis=-1)  # NaN last
         count = np.isfinite(ordered).sum(axis=-1, keepdims=True)
-        low, high = (
-            np.take_along_axis(ordered, np.clip(at, 0, ordered.shape[-1] - 1), axis=-1)
-            for at in ((count - 1) // 2, count // 2)
-        )
-        return np.where(count > 0, (low + high) / 2, np.nan)[..., 0]
+        middle = np.concatenate([np.maximum(count - 1, 0) // 2, count // 2], axis=-1)
+        return np.take_along_axis(ordered, middle, axis=-1).mean(axis=-1)
 
-    return scipy.ndimage.vectorized_filter(
-        values, median, size=window, mode="constant", cval=np.nan, batch_memory=_MEMORY
-    )
+    options = {"size": window, "mode": "constant", "cval": np.nan, "batch_memory": _MEMORY}
+    return scipy.ndimage.vectorized_filter(values, median, **options)
 
 
 def membrane(heights: np.ndarray) -> np.ndarray:

@@ -19,9 +19,6 @@ PARAMETERS = {
     "Sz": ("m", "maximum height, highest peak to lowest valley"),
     "Sdq": ("1", "root mean square gradient, the rms slope"),
     "Sdr": ("1", "developed interfacial area ratio, excess of the surface over its projection"),
-    "rms_slope_x": ("1", "root mean square slope along x"),
-    "rms_slope_y": ("1", "root mean square slope along y"),
-    "rms_curvature": ("1/m", "root mean square of the mean curvature, half the Laplacian"),
     "missing_fraction": ("1", "share of the points that are missing"),
 }
 
@@ -39,9 +36,9 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr, rms_slope_x, rms_slope_y [-], rms_curvature [1/m] and
-        missing_fraction [-], each with units and a name. Missing points and differences with them are ignored; a
-        parameter without any valid point is NaN. On a strip one cell wide, heights do not vary across it.
+        Scalars Sa, Sq, Sz [m], Ssk, Sku, Sdq, Sdr and missing_fraction [-], each with units and a name. Missing points
+        and differences with them are ignored; a parameter without any valid point is NaN. On a strip one cell wide,
+        heights do not vary across it.
 
     Raises
     ------
@@ -50,9 +47,8 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
 
     Notes
     -----
-    Slopes are first differences to the next point, curvatures second differences about a point, as in
-    SurfaceTopography. They underestimate short wavelengths: a wavelength of :math:`n` cells by the factor
-    :math:`\mathrm{sinc}(1/n)`. Sdr is a ratio, not in per cent.
+    Slopes are first differences to the next point, as in SurfaceTopography. They underestimate short wavelengths: a
+    wavelength of :math:`n` cells by the factor :math:`\mathrm{sinc}(1/n)`. Sdr is a ratio, not in per cent.
 
     References
     ----------
@@ -65,12 +61,6 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     square = _mean(z**2)
     slope_x, slope_y = _slopes(h, periodic)
     gradient = slope_x**2 + slope_y**2
-    (dx, dy), (nx, ny) = spacing(h), h.shape
-    padded = np.pad(h.values, [(n, n) for n in (int(periodic or nx == 1), int(periodic or ny == 1))], mode="wrap")
-    middle = padded[1:-1, 1:-1]
-    laplacian = (padded[2:, 1:-1] - 2 * middle + padded[:-2, 1:-1]) / dx**2
-    laplacian += (padded[1:-1, 2:] - 2 * middle + padded[1:-1, :-2]) / dy**2
-    laplacian = laplacian[np.isfinite(laplacian)]  # where all five points are present
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
             "Sa": _mean(np.abs(z)),
@@ -80,9 +70,6 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
             "Sz": z.max() - z.min(),
             "Sdq": np.sqrt(_mean(gradient)),
             "Sdr": _mean(gradient / (1 + np.sqrt(1 + gradient))),
-            "rms_slope_x": np.sqrt(_mean(slope_x**2)),
-            "rms_slope_y": np.sqrt(_mean(slope_y**2)),
-            "rms_curvature": np.sqrt(_mean((laplacian / 2) ** 2)),
             "missing_fraction": (h.size - known.size) / h.size,
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}

@@ -22,6 +22,7 @@ from roughvisc.topography.grid import (
     require_complete,
     spacing,
     with_coordinates,
+    with_filled_points,
 )
 from roughvisc.topography.missing_points import membrane
 from roughvisc.units import Quantity, quantities
@@ -83,7 +84,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
     marked = None if filled is None else _shares(filled, shape) > _ROUNDING
-    grid = with_coordinates(heights, *axes, h.attrs, filled=marked)
+    grid = with_filled_points(with_coordinates(heights, *axes, h.attrs), marked)
     stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
     line = f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}"
     return noted(grid, line, **stated)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 import xarray as xr
 
-from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
@@ -17,9 +15,7 @@ from roughvisc.topography.spectrum import psd, wavevectors
 from roughvisc.topography.synthesis import random_heights
 
 
-def surrogates(
-    h: xr.DataArray, count: int, *, seed: int, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
-) -> xr.DataArray:
+def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     r"""Generate random surfaces with the spectrum of a surface, as models of other samples of the same roughness.
 
     Parameters
@@ -30,9 +26,6 @@ def surrogates(
         Number of surfaces.
     seed : int
         Source of random phases and amplitudes. A seed and a number define one surface, on any grid of this size.
-    amplitudes : {"gaussian", "fixed"}
-        As in :func:`self_affine`. With "fixed" each surface has exactly the rms height of the spectrum, and quantities
-        that depend on it scatter too little.
 
     Returns
     -------
@@ -42,11 +35,12 @@ def surrogates(
     Raises
     ------
     InputError
-        If points are missing, `count` is not a positive whole number, `seed` is not valid, or `amplitudes` is unknown.
+        If points are missing, `count` is not a positive whole number, or `seed` is not valid.
 
     Notes
     -----
-    The spectrum is the radial average of :func:`psd`, up to the largest wave number with a complete ring. Direction and
+    Phases and amplitudes are those of a Gaussian random field, as in :func:`self_affine` with Gaussian amplitudes. The
+    spectrum is the radial average of :func:`psd`, up to the largest wave number with a complete ring. Direction and
     shape (skewness, kurtosis, ridges) of the surface are lost. A surface that is not periodic is used with its mirror
     images. A surface made by :func:`mirror` gives surfaces as large as the original part, because only that part was
     measured.
@@ -64,17 +58,14 @@ def surrogates(
     """
     if not (isinstance(count, int | np.integer) and not isinstance(count, bool) and count >= 1):
         raise InputError(key="count", found=count, expected="a positive whole number")
-    found = [surrogate(h, number, seed=seed, amplitudes=amplitudes) for number in range(1, int(count) + 1)]
+    found = [surrogate(h, number, seed=seed) for number in range(1, int(count) + 1)]
     return xr.concat(found, xr.DataArray(np.arange(1, count + 1), dims="realisation", name="realisation"))
 
 
-def surrogate(
-    h: xr.DataArray, number: int, *, seed: int = 0, amplitudes: Literal["fixed", "gaussian"] = "gaussian"
-) -> xr.DataArray:
+def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     """Return one surface of :func:`surrogates`, by its number. [m]"""
     if not (isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 1):
         raise InputError(key="number", found=number, expected="the number of a surrogate, from 1")
-    one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
     if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
         raise InputError(key="seed", found=seed, expected="a whole number >= 0")
     h = checked(h, "surrogates")
@@ -93,8 +84,7 @@ def surrogate(
     inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
     variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
     entropy = [int(seed), int(number)]
-    heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=amplitudes == "gaussian")
+    heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=True)
     grid = labelled(heights, sides).assign_coords(x=h["x"], y=h["y"])
-    return noted(
-        grid, f"surrogate {number} of seed {seed}: random phases, {amplitudes} amplitudes", period=period_of(grid)
-    )
+    line = f"surrogate {number} of seed {seed}: random phases, gaussian amplitudes"
+    return noted(grid, line, period=period_of(grid))

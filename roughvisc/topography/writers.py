@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from importlib.metadata import version
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +32,7 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
         Height over (x, y), NaN where missing. [m]
     path : path
         ``.nc`` stores everything: coordinates, attributes and the mask of filled points.
-        ``.x3p`` and ``.sdf`` store heights in full precision and the spacing; their grids begin at zero. X3P stores the
-        history as its comment.
+        ``.x3p`` and ``.sdf`` store heights in full precision and the spacing; their grids begin at zero.
 
     Raises
     ------
@@ -42,21 +41,13 @@ def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
     """
     h, path = checked(h, "save_scan"), Path(path)
     known_suffix(path)
-    cell = spacing(h)
     if path.suffix.lower() == ".nc":
         compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
         h.rename("height").to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
-    elif path.suffix.lower() == ".x3p":
-        import x3pio
-
-        metadata = x3pio.Metadata.for_software("roughvisc", version("roughvisc"))
-        metadata.comment = str(h.attrs.get("history", "")) or None
-        x3pio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
-    else:
-        import sdfio
-
-        metadata = sdfio.Metadata(manufacturer_id="roughvisc")
-        sdfio.write(path, h.values.T, x_scale=cell[0], y_scale=cell[1], metadata=metadata)
+        return
+    library = import_module(f"{path.suffix[1:].lower()}io")
+    x_scale, y_scale = spacing(h)
+    library.write(path, h.values.T, x_scale=x_scale, y_scale=y_scale)
 
 
 def known_suffix(path: Path) -> None:
@@ -95,6 +86,7 @@ def surface_table(
     folder: str | os.PathLike[str],
     options: Mapping[str, Any],
     steps: Mapping[str, Any],
+    remarks: Mapping[str, str] | None = None,
 ) -> str:
     """Return the ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
 
@@ -108,10 +100,16 @@ def surface_table(
         Options of :func:`roughvisc.open_scan` that the file needs; None for unused options.
     steps : mapping
         Conditioning steps, as for :func:`~roughvisc.topography.conditioning.condition`. [m]
+    remarks : mapping, optional
+        Comment at the end of a line, by its key.
     """
+    remarks = remarks or {}
     near = Path(os.path.relpath(file, folder))
     entries = _entries(Path(file).resolve() if near.parts[0] == ".." else near, options, steps)
-    return "\n".join(["[surface]", *(f"{key} = {value}" for key, value in entries.items())]) + "\n"
+    lines = {key: f"{key} = {value}" for key, value in entries.items()}
+    width = max((len(line) for key, line in lines.items() if key in remarks), default=0)
+    shown = [f"{line:<{width}}  # {remarks[key]}" if key in remarks else line for key, line in lines.items()]
+    return "\n".join(["[surface]", *shown]) + "\n"
 
 
 def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:

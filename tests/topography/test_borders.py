@@ -35,7 +35,6 @@ CAP = rv.sphere(2e-3, SIDE, SHAPE, exact=True)
         (rv.mirror(SCAN), "periodic"),
         (rv.mirror(BALL), "periodic"),
         (rv.resample(rv.mirror(SCAN), (32, 32)), "periodic"),
-        (rv.self_affine(SIDE, SHAPE, hurst=0.8, rms_height=1e-6, seed=np.random.default_rng(1)), "periodic"),
         (ROUGH * 2, "periodic"),
         (SCAN, None),
         (xr.zeros_like(SCAN), None),

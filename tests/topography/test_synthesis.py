@@ -119,11 +119,8 @@ def test_self_affine__spectrum_follows_the_power_law_between_rolloff_and_shortcu
 
 
 def test_self_affine__phases_are_random_and_the_seed_decides():
-    first, again, other, drawn = (
-        self_affine(1.0, (45, 32), hurst=0.5, rms_slope=1.0, seed=seed) for seed in (5, 5, 6, np.random.default_rng(5))
-    )
+    first, again, other = (self_affine(1.0, (45, 32), hurst=0.5, rms_slope=1.0, seed=seed) for seed in (5, 5, 6))
     assert first.equals(again)
-    assert first.equals(drawn)
     assert abs(float(xr.corr(first, other))) < 0.6
     phases = np.angle(np.fft.rfft2(first.values)[1:20, 1:10])
     assert abs(np.exp(1j * phases).mean()) < 0.25
