@@ -167,12 +167,6 @@ def test_table__is_in_the_built_page_and_printed_by_the_command_that_stands_for_
     assert row in done.stdout, done.stderr
 
 
-def test_python_files__that_pages_name_are_there():
-    for page in PAGES:
-        for name in re.findall(r"`([\w./-]+/[\w-]+\.py)`", page.read_text(encoding="utf-8")):
-            assert any((folder / name).exists() for folder in (ROOT, ROOT / "roughvisc")), f"{named(page)}: {name}"
-
-
 def test_functions_and_comments__that_pages_name_are_there():
     named_there = re.compile(r'`([\w./-]+\.py)`:\s`([\w.]+)(?:\(\))?`((?:(?:,| and) "[^"]+")*)')
     found = [one for page in PAGES for one in named_there.findall(page.read_text(encoding="utf-8"))]
@@ -184,7 +178,10 @@ def test_functions_and_comments__that_pages_name_are_there():
             assert f"# {comment}" in code, f"{path}: {comment}"
 
 
-def test_links__lead_somewhere():
+def test_links_and_files__are_there():
     for path in [README, *PAGES]:
-        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text(encoding="utf-8")):
+        text = path.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", text):
             assert (path.parent / target).exists(), f"{named(path)}: {target}"
+        for name in re.findall(r"`([\w./-]+/[\w-]+\.py)`", text):
+            assert any((folder / name).exists() for folder in (ROOT, ROOT / "roughvisc")), f"{named(path)}: {name}"

@@ -1,6 +1,5 @@
 """At the ends of every axis: right to a stated tolerance, or refused with a clear message; never NaN, never endless."""
 
-import logging
 import math
 
 import numpy as np
@@ -14,7 +13,7 @@ from roughvisc import closed_forms
 from roughvisc.labels import cost_of
 from roughvisc.variables import NOT_CONVERGED, STATUS_MEANINGS
 
-long = pytest.mark.long
+thorough = pytest.mark.thorough
 ELASTIC, ZENER = rv.elastic(0.25), rv.zener(0.25, 0.25, 0.25)  # contact modulus 1; retardation time 1
 R, SIZE, SHAPE = 10.0, 2.6, (33, 31)
 BALL = rv.sphere(R, SIZE, SHAPE)
@@ -80,37 +79,29 @@ def step_load(material, duration, tolerance=TOLERANCE):
 # materials and times
 
 
-@pytest.mark.parametrize(
-    "exponent", [-12, 12, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-6, -3, 0, 3, 6))]
-)
-@pytest.mark.parametrize(
-    "material",
-    [pytest.param(rv.maxwell(0.25, 0.25), marks=pytest.mark.thorough), ZENER, rv.kelvin_voigt(0.25, 0.25)],
-    ids=["maxwell", "zener", "kelvin_voigt"],
-)
+@pytest.mark.parametrize("exponent", [-12, pytest.param(0, marks=thorough), 12])
+@pytest.mark.parametrize("material", [rv.maxwell(0.25, 0.25), ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=repr)
 def test_time_over_retardation_time(material, exponent):
     assert_follows(*step_load(material, 10.0**exponent))
 
 
-@pytest.mark.parametrize("exponent", [-8, -2, 8, *(pytest.param(n, marks=pytest.mark.thorough) for n in (-4, 2, 4))])
-@pytest.mark.parametrize("duration", [pytest.param(1.0, marks=pytest.mark.thorough), 1e3])
-def test_shear_modulus_over_kelvin_modulus(exponent, duration):
+@pytest.mark.parametrize("exponent", [-8, -2, pytest.param(4, marks=thorough), 8])
+def test_shear_modulus_over_kelvin_modulus(exponent):
     kelvin = 0.25 / 10.0**exponent
-    assert_follows(*step_load(rv.zener(0.25, kelvin, kelvin), duration))
+    assert_follows(*step_load(rv.zener(0.25, kelvin, kelvin), 1e3))
 
 
-@pytest.mark.parametrize("duration", [1e-6, 1.0, 1e6])
-@pytest.mark.parametrize("exponent", [0.5, *(pytest.param(n, marks=pytest.mark.thorough) for n in (0.1, 0.9))])
+@pytest.mark.parametrize("duration", [1e-6, 1e6])
+@pytest.mark.parametrize("exponent", [0.5, pytest.param(0.1, marks=thorough), pytest.param(0.9, marks=thorough)])
 @pytest.mark.parametrize("glassy", [0.0, 1.0])
 def test_power_law(glassy, exponent, duration):
     assert_follows(*step_load(rv.power_law(glassy, 1.0, exponent), duration))
 
 
-@pytest.mark.parametrize("count", [1, 2, 12, 60])
-@pytest.mark.parametrize("duration", [1e-11, 1.0, 1e11])
+@pytest.mark.parametrize("count", [2, 60])
+@pytest.mark.parametrize("duration", [1e-11, 1e11])
 def test_exponentials_over_24_decades(count, duration):
-    times = tuple(np.geomspace(1e-12, 1e12, count)) if count > 1 else (duration,)
-    material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, times)
+    material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, tuple(np.geomspace(1e-12, 1e12, count)))
     ds, exact = step_load(material, duration)
     assert_follows(ds, exact)
     assert ds.attrs["memory"].startswith(f"{count} exponential")
@@ -157,18 +148,11 @@ def test_what_cannot_be_represented__is_refused(program, settings, message):
         simulate(ROUGH, ZENER, program, **{"edge": "accept", **settings})
 
 
-def test_shortest_segment__is_computed():
-    """A segment just as short as may be, after a long one."""
-    program = rv.Program().load(0.1 / R, over=1.0).hold(1e9).load(0.2 / R, over=1.0)
-    ds = simulate(BALL, ZENER, program, times=program.corners[1:])
-    assert_follows(ds, closed_forms.lee_radok(R, ZENER, program).approach(ds.time.values))
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # loads, lengths, programs
 
 
-@pytest.mark.parametrize("exponent", [-300, -200, -30, -6])
+@pytest.mark.parametrize("exponent", [-300, -6])
 @pytest.mark.parametrize("material", [ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=["zener", "kelvin_voigt"])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_small_load__is_carried_by_the_highest_cell(boundary, material, exponent):
@@ -186,22 +170,21 @@ def test_small_load__is_carried_by_the_highest_cell(boundary, material, exponent
         assert ratio == pytest.approx(love / (a * b), rel=2 * TOLERANCE)
 
 
-@pytest.mark.parametrize("load", [1e-3, 1e-2, 1.0, 1e6, 1e12])
+@pytest.mark.parametrize("load", [1.0, 1e12])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_large_load__makes_full_contact_and_no_more(boundary, load):
     ds = simulate(ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), boundary=boundary, edge="accept")
     assert_a_contact_state(ds)
-    if load >= 1:
-        assert (ds.contact_fraction == 1).all()
-        if boundary == "periodic":
-            assert ds.approach.values == pytest.approx(float(ROUGH.max() - ROUGH.mean()), rel=1e-9)
-            assert ds.mean_gap.values == pytest.approx(0, abs=1e-15)
-        elif load >= 1e6:  # the heights do not matter: a flat square
-            flat = simulate(0 * ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), edge="accept")
-            assert ds.approach.values == pytest.approx(flat.approach.values, rel=1e-3)
+    assert (ds.contact_fraction == 1).all()
+    if boundary == "periodic":
+        assert ds.approach.values == pytest.approx(float(ROUGH.max() - ROUGH.mean()), rel=1e-9)
+        assert ds.mean_gap.values == pytest.approx(0, abs=1e-15)
+    elif load > 1:  # the heights do not matter: a flat square
+        flat = simulate(0 * ROUGH, ZENER, rv.Program().load(load, over=0).hold(1.0), edge="accept")
+        assert ds.approach.values == pytest.approx(flat.approach.values, rel=1e-3)
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1e3, pytest.param(1e-6, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("scale", [1e-9, 1e3])
 def test_lengths__are_neutral(scale):
     """Nanometres to kilometres, at the same modulus: loads scale with the square."""
     runs = []
@@ -235,7 +218,7 @@ def test_approach__pulls_fully_out_and_comes_back(boundary, over):
     assert float(ds.force[-1]) == pytest.approx(float(fresh.force[0]), rel=2 * TOLERANCE)
 
 
-@pytest.mark.parametrize("ratio", [1e-12, 1e-3, 1e3, 1e12])
+@pytest.mark.parametrize("ratio", [1e-12, 1e12])
 def test_jumps_of_any_size(ratio):
     """Up or down by any factor and back: a punch tells the exact approach."""
     program = rv.Program().load(1.0, over=0).hold(1.0).load(ratio, over=0).hold(1.0).load(1.0, over=0).hold(1.0)
@@ -245,17 +228,13 @@ def test_jumps_of_any_size(ratio):
     exact = punch_approach(1.0, ZENER, program, ds.time.values)
     found = ds.approach.values / ds.approach.values[0] * exact[0]  # what the cells make of the radius apart
     assert np.abs(found - exact).max() < TOLERANCE * exact.max()
-    ball = simulate(BALL, ZENER, rv.Program().load(1e-2, over=0).hold(1.0).load(1e-2 * ratio, over=0), edge="accept")
-    assert_a_contact_state(ball)
 
 
 # ----------------------------------------------------------------------------------------------------------------
 # grids and surfaces
 
 
-@pytest.mark.parametrize(
-    "shape", [(1, 1), (1, 7), (7, 1), (2, 2), (31, 37), (2, 4096), pytest.param((4096, 3), marks=long)], ids=str
-)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (2, 2), (31, 37), (2, 4096)], ids=str)
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_grids_of_any_shape(shape, boundary):
     side = 1 / max(shape)
@@ -275,7 +254,7 @@ def test_grids_of_any_shape(shape, boundary):
         assert float(ds.approach[-1]) == deep
 
 
-@pytest.mark.parametrize("shape", [(37, 41), (64, 64), (129, 33), (16, 256), (256, 16)], ids=str)
+@pytest.mark.parametrize("shape", [(37, 41), (16, 256), (256, 16)], ids=str)
 def test_hertz__on_cells_of_any_aspect(shape):
     ds = simulate(rv.sphere(R, SIZE, shape), ELASTIC, rv.Program().load(4 / 3 / R, over=0))
     coarse = SIZE / min(shape)
@@ -288,7 +267,6 @@ X, Y = np.meshgrid(np.arange(32), np.arange(32), indexing="ij")
 SHAPES = {
     "flat": 0.0 * X,
     "spike": np.where((X == 13) & (Y == 17), 0.1, 0.0),
-    "two spikes, equal": np.where(((X == 5) & (Y == 9)) | ((X == 21) & (Y == 25)), 0.1, 0.0),
     "step": np.where(X < 16, 0.0, -0.1),
     "checkerboard": 1e-2 * ((X + Y) % 2),
     "plateau": np.minimum(rv.self_affine(1.0, 32, hurst=0.8, rms_slope=0.1, seed=1).values, 0.0),
@@ -296,7 +274,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize("load", [1e-6, 1e-2, 10.0])
+@pytest.mark.parametrize("load", [1e-6, 1e-2])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_surfaces_of_any_shape(name, boundary, load):
@@ -305,23 +283,17 @@ def test_surfaces_of_any_shape(name, boundary, load):
     fields = ("pressure", "gap", "displacement")
     ds = simulate(height, ZENER, program, boundary=boundary, edge="accept", fields=fields)
     assert_a_contact_state(ds)
-    if name == "flat" and boundary == "periodic":
-        uniform = ds.force.values[:, None, None] * np.ones((32, 32))
-        np.testing.assert_allclose(ds.pressure.values, uniform, rtol=1e-9)
-        assert np.abs(ds.approach.values).max() <= 1e-12 * load
-    if name in ("two spikes, equal", "equal maxima", "checkerboard") and boundary == "periodic":
+    if name in ("equal maxima", "checkerboard") and boundary == "periodic":
         # equal cells in equal surroundings carry equal pressure: exactly known without solving anything
         highest = SHAPES[name] == SHAPES[name].max()
         for frame in ds.pressure.values[1:]:
             assert np.ptp(frame[highest]) <= 30 * TOLERANCE * frame[highest].max()
 
 
-@pytest.mark.parametrize(("slope", "warns"), [(0.1, False), (0.25, False), (0.5, True), (10.0, True)])
-def test_slopes_that_are_not_small__warn(slope, warns, caplog):
+@pytest.mark.parametrize(("slope", "warns"), [(0.25, False), (0.5, True)])
+def test_slopes_that_are_not_small__warn(slope, warns):
     height = rv.self_affine(1.0, (64, 60), hurst=0.8, rms_slope=slope, shortcut=0.2, seed=1)
-    with caplog.at_level(logging.WARNING, "roughvisc"):
-        ds = simulate(height, ELASTIC, rv.Program().load(0.01 * slope, over=0), boundary="periodic")
-    assert ("rms slope of the loaded surface is" in caplog.text) is warns
+    ds = simulate(height, ELASTIC, rv.Program().load(0.01 * slope, over=0), boundary="periodic")
     assert ("slope:" in ds.attrs.get("warnings", "")) is warns
 
 
@@ -330,22 +302,8 @@ def test_slopes_that_are_not_loaded__do_not_warn():
     ball = rv.sphere(1.0, 1.9, (65, 65))
     tip = simulate(ball, ELASTIC, rv.Program().load(1e-3, over=0))
     assert "slope:" not in tip.attrs.get("warnings", "")
-    deep = simulate(ball, ELASTIC, rv.Program().load(0.5, over=0))
-    assert "slope:" in deep.attrs.get("warnings", "")
     punch = simulate(rv.flat_punch(1.0, SIZE, SHAPE), ELASTIC, rv.Program().load(1.0, over=0))
     assert "slope:" not in punch.attrs.get("warnings", "")
-
-
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_scan_with_nine_tenths_missing(boundary):
-    height = rv.self_affine(1.0, (48, 45), hurst=0.8, rms_slope=0.1, seed=1)
-    holes = height.where(np.random.default_rng(1).random(height.shape) > 0.9)
-    program = rv.Program().load(1e-4, over=0.1).hold(1.0).load(1e-2, over=0.1)
-    with pytest.raises(rv.InputError, match="height is missing at"):
-        simulate(holes, ZENER, program, boundary=boundary)
-    fields = ("pressure", "gap", "displacement")
-    ds = simulate(holes, ZENER, program, boundary=boundary, missing="absent", edge="accept", fields=fields)
-    assert_a_contact_state(ds)
 
 
 def test_single_cell_left__carries_all():
@@ -353,15 +311,6 @@ def test_single_cell_left__carries_all():
     ds = simulate(height, ZENER, rv.Program().load(1.0, over=0.1).hold(1.0), boundary="free", missing="absent")
     assert_a_contact_state(ds)
     assert ds.pressure.values[1:, 5, 6] == pytest.approx(32**2, rel=1e-12)
-
-
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_float32_heights__differ_by_their_rounding(boundary):
-    program = rv.Program().load(1e-2, over=0.1).hold(1.0)
-    runs = [simulate(h, ZENER, program, boundary=boundary, edge="accept") for h in (ROUGH, ROUGH.astype("float32"))]
-    assert runs[1].height.dtype == np.float64
-    rounding = 2**-24 * float(abs(ROUGH).max()) / float(runs[0].approach.max())
-    assert runs[1].approach.values == pytest.approx(runs[0].approach.values, rel=4 * rounding + 1e-3 * TOLERANCE)
 
 
 # ----------------------------------------------------------------------------------------------------------------

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
@@ -41,45 +41,37 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("name", "value"),
     [
-        {"boundary": "open"},
-        {"missing": None},
-        {"edge": "wrap"},
-        {"tolerance": 1},
-        {"tolerance": "1 mm"},
-        {"tolerance": float("nan")},
-        {"time_step": 0},
-        {"time_step": "10 mm"},
-        {"times": 0},
-        {"times": {0.1}},
-        {"times": [0.1, "soon"]},
-        {"fields": None},
-        {"fields": ("gap", "stress")},
+        ("boundary", "open"),
+        ("missing", None),
+        ("tolerance", 1),
+        ("tolerance", float("nan")),
+        ("time_step", 0),
+        ("time_step", "10 mm"),
+        ("times", 0),
+        ("times", {0.1}),
+        ("times", [0.1, "soon"]),
+        ("fields", None),
+        ("fields", ("gap", "stress")),
+        ("device", "tpu"),
     ],
-    ids=str,
 )
-def test_settings__refuse_and_name_the_setting(wrong):
-    ((name, value),) = wrong.items()
-    with pytest.raises(InputError) as caught:
-        Settings(**wrong)
-    assert (caught.value.key, repr(caught.value.found)) == (name, repr(value))
-
-
-def test_times__are_numbers_or_text():
-    assert Settings(time_step="10 ms", times=["1 s", 0.25]) == Settings(time_step=0.01, times=(0.25, 1.0))
+def test_settings__refuse_and_name_the_setting(name, value):
+    with refused(name, value):
+        Settings(**{name: value})
 
 
 @pytest.mark.parametrize("name", [one.name for one in fields(Numerics)])
-def test_numerics__are_checked_and_one_argument(name):
-    with pytest.raises(InputError, match=name):
+def test_numerics__are_checked(name):
+    with refused(name, "wrong"):
         rv.Numerics(**{name: "wrong"})
-    with pytest.raises(InputError, match="numerics"):
+    with pytest.raises(rv.InputError, match="numerics"):
         rv.simulate(None, rv.elastic(1e6), rv.Program(), numerics={"time_step": 0.1})
 
 
 def test_settings__are_one_frozen_value():
-    one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step=1)
+    one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step="1 s")
     assert one == Settings(times=(0.25, 0.5), fields=("gap",), time_step=1.0)
     assert len({one, Settings(times=[0.25, 0.5], fields=iter(["gap"]), time_step=1.0)}) == 1
     with pytest.raises(FrozenInstanceError):

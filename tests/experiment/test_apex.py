@@ -49,13 +49,3 @@ def test_open__the_approach_is_that_of_the_highest_cells():
     ds = pressed(height, rv.Program().approach(0.1, over=1.0), times=21)
     apart = ds.approach.values <= 0.5 * side / np.sqrt(2)
     assert np.array_equal(ds.force.values == 0, apart)
-
-
-def test_periodic__approach_is_the_mean_undeformed_gap_less_the_mean_gap():
-    even = rv.sphere(1.0, 1.0, 10)
-    full = float(-even.mean())
-    for approach in (0.2 * full, 0.9 * full):
-        ds = pressed(even, rv.Program().approach(approach, over=0), boundary="periodic")
-        assert full - float(ds.mean_gap[0]) == pytest.approx(approach, rel=1e-4)
-    with pytest.raises(rv.InputError, match="contact is full"):
-        pressed(even, rv.Program().approach(1.001 * full, over=0), boundary="periodic")

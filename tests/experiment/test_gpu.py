@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import device
 import numpy as np
 import pytest
-from support import BALL, refused
+from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -141,8 +141,3 @@ def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeyp
     assert "device" in said
     assert expected in said
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
-
-
-def test_device__of_an_unknown_name_is_refused():
-    with refused("device", "tpu"):
-        rv.Numerics(device="tpu")

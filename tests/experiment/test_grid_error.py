@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from support import EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.experiment.coarser import pressure_distance
 
 
 def pressed(shape, **settings):
@@ -124,14 +122,3 @@ def test_grid_error__holds_an_opening_that_full_contact_hides(cells, offset):
     assert 1 - closed <= float(nearly.grid_error_area[0]) <= 5 * (1 - closed)
     assert float(nearly.grid_error_gap[0]) > 0
     assert float(well.grid_error_area[0]) < 1e-6
-
-
-def test_pressure_distance__counts_what_lies_outside_the_other_grid():
-    def uniform(low, high, pressure):
-        centres = np.arange(low + 0.5, high)
-        field = (("time", "x", "y"), np.full((1, len(centres), len(centres)), pressure))
-        return xr.Dataset({"pressure": field}, coords={"time": [0.0], "x": centres, "y": centres})
-
-    small, large = uniform(0, 2, 3.0), uniform(-1, 3, 1.0)
-    assert pressure_distance(small, large).tolist() == [4 * 2.0 + 12 * 1.0]
-    assert pressure_distance(large, small).tolist() == [20.0]

@@ -18,8 +18,7 @@ def pressed(height, body, program, **settings):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("poissons", POISSONS)
-@pytest.mark.parametrize("wide", [0.1, 1.0, 10.0])
-@pytest.mark.parametrize("ratio", [0.01, 0.5, 100.0])
+@pytest.mark.parametrize(("ratio", "wide"), [(0.01, 0.1), (0.5, 1.0), (100.0, 10.0)])
 def test_elastic_ball__agrees_with_the_integral_equation(ratio, wide, poissons):
     assert max(errors(ratio, wide, poissons, 129)) < 1e-3
 
@@ -52,45 +51,32 @@ def test_pressure__is_that_of_the_integral_equation_and_converges():
     assert -np.polyfit(np.log([33, 65, 129]), np.log(left), 1)[0] > 1.2  # 1.5 on a half-space
 
 
-def far_apart(ratio, creeps):
-    """A layer on a half-space whose moduli are so many times smaller."""
+def far_apart(ratio, thickness):
+    """A layer on a half-space whose moduli are so many times smaller, and a program for it."""
     top = 1e6 * ratio
-    if not creeps:
-        return rv.elastic(top, 0.4), rv.elastic(1e6, 0.5)
-    return rv.zener(2 * top, top, 0.1 * top, 0.4), rv.zener(2e6, 1e6, 5e5, 0.5)
+    body = rv.layer(rv.zener(2 * top, top, 0.1 * top, 0.4), thickness, on=rv.zener(2e6, 1e6, 5e5, 0.5))
+    c = float(effective_compliance(3e4, (thickness,), (0.4, 0.5), (1e-6 / ratio, 1e-6)))
+    return body, rv.Program().pressure(0.01 / c, over=0.05).hold(0.05)
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 1e3])
-@pytest.mark.parametrize(
-    ("creeps", "boundary"),
-    [(creeps, boundary) for creeps in (False, True) for boundary in ("free", "periodic", "mirror")],
-)
-def test_moduli_far_apart__converge(boundary, ratio, creeps):
+@pytest.mark.parametrize("ratio", [1e-5, 1e3])
+@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+def test_moduli_far_apart__converge(boundary, ratio):
     """The pressure at two tolerances differs by less than the larger one states."""
     height = rv.self_affine(1e-3, (21, 24), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
-    layer, base = far_apart(ratio, creeps)
-    for thickness in (5e-5,) if creeps else (3e-6, 5e-5):
-        body = rv.layer(layer, thickness, on=base)
-        c = float(effective_compliance(3e4, (thickness,), (0.4, 0.5), (1e-6 / ratio, 1e-6)))
-        program = rv.Program().pressure(0.01 / c, over=0.05).hold(0.05)
-        edge = {"edge": "accept"} if boundary == "free" else {}
-        coarse, fine = (
-            pressed(height, body, program, boundary=boundary, times=2, tolerance=tolerance, **edge)
-            for tolerance in (1e-3, 2e-4)
-        )
-        apart = abs(coarse.pressure - fine.pressure).sum(["x", "y"]) / fine.pressure.sum(["x", "y"])
-        assert float(apart.max()) < 1.3e-3
-        assert float(coarse.stated_error.max()) <= 1e-3
+    body, program = far_apart(ratio, 5e-5)
+    coarse, fine = (
+        pressed(height, body, program, boundary=boundary, times=2, tolerance=one, edge="accept") for one in (1e-3, 2e-4)
+    )
+    apart = abs(coarse.pressure - fine.pressure).sum(["x", "y"]) / fine.pressure.sum(["x", "y"])
+    assert float(apart.max()) < 1.3e-3
+    assert float(coarse.stated_error.max()) <= 1e-3
 
 
-@pytest.mark.parametrize("boundary", [pytest.param("free", marks=pytest.mark.thorough), "periodic"])
-def test_stiff_film__that_does_not_converge_is_refused_before_the_run(boundary):
+def test_stiff_film__that_does_not_converge_is_refused_before_the_run():
     """It bends over a good part of the surface."""
     height = rv.self_affine(1e-3, (64, 63), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
-    layer, base = far_apart(1e4, creeps=True)
-    body, edge = rv.layer(layer, 1.5e-5, on=base), {"edge": "accept"} if boundary == "free" else {}
-    c = float(effective_compliance(3e4, (1.5e-5,), (0.4, 0.5), (1e-10, 1e-6)))
-    program = rv.Program().pressure(0.01 / c, over=0.05).hold(0.1)
+    body, program = far_apart(1e4, 1.5e-5)
     with refused("material", body):
-        pressed(height, body, program, boundary=boundary, **edge)
+        pressed(height, body, program, boundary="periodic")

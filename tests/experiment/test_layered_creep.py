@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from references.layered import line_contact_history, relaxation_of_wave
+from support import relative_errors
 
 import roughvisc as rv
 
@@ -28,9 +29,7 @@ def simulated(height, pair, thickness, program, **settings):
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-@pytest.mark.parametrize(
-    "thickness", [2e-4, *(pytest.param(h, marks=pytest.mark.thorough) for h in (2e-6, 2e-5, 1e-3))]
-)
+@pytest.mark.parametrize("thickness", [2e-4, pytest.param(2e-6, marks=pytest.mark.thorough)])
 def test_wave_in_full_contact__relaxes_as_the_inverted_transform(pair, thickness):
     """The displacement is that of the profile from the first instant on; its pressure is 1 / (s C(q, s))."""
     amplitude, cells, q, t = 1e-6, (15, 3), 2 * math.pi / SIDE, np.array([1e-3, 0.03, 0.3, 2.0, 20.0])
@@ -62,22 +61,28 @@ def test_contact_that_grows_and_recedes__is_that_of_a_dense_sum_over_past_steps(
     assert areas[0] <= areas[1] >= areas[3]
 
 
+@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+@pytest.mark.parametrize("material", [TWICE, rv.maxwell(1e6, 3e5), rv.kelvin_voigt(1e6, 1e5)], ids=repr)
+def test_nearly_equal_materials__are_a_half_space(material, boundary):
+    """Times that differ by a part in a million need the memory of waves, and change nothing."""
+    height = rv.self_affine((SIDE, 0.8 * SIDE), (22, 17), hurst=0.8, rms_slope=0.05, rolloff=5e-4, seed=4)
+    program = rv.Program().pressure(2e4, over=0.05).hold(0.2).pressure(5e3, over=0.1).hold(0.1)
+    settings = {"boundary": boundary, "edge": "accept", "times": 6, "fields": ("pressure",)}
+    found = simulated(height, (material, rv.shift(material, 1 + 1e-6)), 1e-4, program, **settings)
+    expected = rv.simulate(height, material, program, progress=False, **settings)
+    assert "waves" in found.attrs["memory"]
+    assert relative_errors(found, expected).max() < 1e-3
+
+
 #: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.
 QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("pair", "cells"),
-    [
-        pytest.param((SPRING, QUICK), (24, 48), id="elastic on quick"),
-        pytest.param((SPRING, QUICK), (32, 64, 128), id="elastic on quick, finer", marks=pytest.mark.thorough),
-        pytest.param((QUICK, SLOW), (32, 64, 128), id="quick on slow", marks=pytest.mark.thorough),
-    ],
-)
-def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair, cells):
+@pytest.mark.parametrize("pair", [(SPRING, QUICK), (QUICK, SLOW)], ids=["elastic on quick", "quick on slow"])
+def test_slide__settles_at_steady_sliding_to_second_order_in_the_cell(pair):
     """Of a third of the wave in contact."""
-    errors = []
+    errors, cells = [], (32, 64, 128)
     for count in cells:
         height = rv.wavy(4e-6, SIDE, (SIDE, 3 * SIDE / count), (count, 3), waves=1)
         steady = rv.friction(height, rv.layer(pair[0], 1.5e-4, on=pair[1]), speeds=SPEED, pressure=1.2e4)

@@ -36,25 +36,19 @@ def test_result__holds_declared_variables_with_units():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("program", [rv.Program().load(0.1, over=0), rv.Program().load(0.1, over=0.2).hold(1.0)])
-def test_analytic_profile__grows_and_ends_as_on_a_large_grid(program):
+def test_analytic_profile__grows_and_ends_as_on_a_large_grid():
     """Growth changes nothing but cost; what was kept before it is reported on the final grid."""
+    program = rv.Program().load(0.1, over=0.2).hold(1.0)
     small = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29))
     large = rv.sphere(1e-3, size=(702e-6, 698e-6), shape=(351, 349))
     settings = {"tolerance": 1e-2, "times": 3, "fields": FIELDS}
     grown, exact = (simulate(h, rv.maxwell(1e6, 1e6), program, **settings) for h in (small, large))
     assert grown.sizes["x"] > 100
     assert grown.approach.values == pytest.approx(exact.approach.values, rel=3e-3)
-    inside, same = (
-        ds.isel(
-            x=slice(ds.sizes["x"] // 2 - 15, ds.sizes["x"] // 2 + 16),
-            y=slice(ds.sizes["y"] // 2 - 14, ds.sizes["y"] // 2 + 15),
-        )
-        for ds in (exact, grown)
-    )
-    assert same.height.values == pytest.approx(inside.height.values, abs=1e-12)
-    for name, scale in (("pressure", exact.pressure.max()), ("displacement", exact.displacement.max())):
-        assert np.abs(same[name].values - inside[name].values).max() < 2e-2 * float(scale)
+    x, y = ((exact.sizes[axis] - grown.sizes[axis]) // 2 for axis in ("x", "y"))
+    inside = exact.isel(x=slice(x, x + grown.sizes["x"]), y=slice(y, y + grown.sizes["y"]))
+    for name in ("height", "pressure", "displacement"):
+        assert np.abs(grown[name].values - inside[name].values).max() < 2e-2 * float(abs(exact[name]).max())
     assert "grown from" in grown.attrs["history"]
 
 
@@ -81,17 +75,11 @@ def test_kept_times__are_counted_listed_or_snapped(times, expected):
     assert kept_times(rv.Program().load(1.0, over=0.5).hold(1.5), times) == expected
 
 
-def with_value(value):
-    height = BALL.copy()
-    height[3, 4] = value
-    return height
-
-
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"height": with_value(np.nan)}, "height is missing at 1 of 1054"),
-        ({"height": with_value(np.inf)}, "height holds infinite"),
+        ({"height": BALL.where(BALL.max() > BALL)}, "height is missing at 2 of 1054"),
+        ({"height": BALL / (BALL.max() > BALL)}, "height holds infinite"),
         ({"height": BALL * np.nan}, "height is missing everywhere"),
         ({"height": BALL.values}, "height: found ndarray"),
         ({"height": BALL.assign_attrs(units="K")}, "height: .* 'K'"),
@@ -132,13 +120,11 @@ FOLLOWED = {
         rv.Program().load(2e-3, over=0.5).hold(0.5).load(0, over=0.3).load(1e-3, over=0.2),
     ),
     "stress relaxation": (ZENER, rv.Program().approach(7e-7, over=0.2).hold(0.5).approach(1e-7, over=0.2)),
-    "soft": (rv.kelvin_voigt(1e6, 1e5), rv.Program().load(1e-3, over=0.2).hold(0.2)),
-    "jump": (rv.maxwell(1e6, 1e6), rv.Program().load(2e-3, over=0).hold(0.5)),
 }
 
 
 @pytest.mark.parametrize(
-    "name", [n if n == "stress relaxation" else pytest.param(n, marks=pytest.mark.thorough) for n in FOLLOWED]
+    "name", ["stress relaxation", pytest.param("loading and unloading", marks=pytest.mark.thorough)]
 )
 @pytest.mark.parametrize("margin", [None, 0.4], ids=["", "outgrown"])
 def test_part_of_the_surface__changes_nothing_but_cost(name, margin, solved_on, monkeypatch):

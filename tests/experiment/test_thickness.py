@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from references import OnSheet, Paraboloid
 from support import BALL, refused
 
 import roughvisc as rv
@@ -14,26 +13,12 @@ from roughvisc.study.case import Case, read_cases
 RADIUS, THICKNESS = 1e-3, 1e-4
 
 
-def pressed(height, material, program, *, thickness=THICKNESS, **settings):
-    """On a sheet, bonded unless a base is given; on a half-space if it has no thickness."""
-    base = {name: settings.pop(name) for name in ("base",) if name in settings}
-    body = material if thickness is None else rv.sheet(material, thickness, **base)
-    return rv.simulate(height, body, program, **{"progress": False, **settings})
-
-
-@pytest.mark.parametrize("wide", [0.3, 3.0])
-@pytest.mark.parametrize(("poisson", "base"), [(0.3, "bonded"), (0.5, "bonded"), (0.45, "slipping")])
-def test_elastic_sphere__agrees_with_the_integral_equation(wide, poisson, base):
-    exact, a = OnSheet(Paraboloid(RADIUS), Sheet(THICKNESS, poisson, base)), wide * THICKNESS
-    load = rv.Program().load(float(exact.scaled_force(a)) * 2e6 / (1 - poisson), over=0)
-    ds = pressed(rv.sphere(RADIUS, 2.6 * a, 128), rv.elastic(1e6, poisson), load, base=base)
-    assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
-    assert math.sqrt(float(ds.contact_area[0]) / math.pi) == pytest.approx(a, rel=2e-3)
+def pressed(height, material, program, *, thickness=THICKNESS, base="bonded", **settings):
+    return rv.simulate(height, rv.sheet(material, thickness, base), program, progress=False, **settings)
 
 
 @pytest.mark.parametrize(
-    ("poisson", "base", "control"),
-    [(0.3, "bonded", "load"), (0.5, "bonded", "load"), (0.5, "slipping", "load"), (0.5, "slipping", "approach")],
+    ("poisson", "base", "control"), [(0.3, "bonded", "load"), (0.5, "bonded", "load"), (0.5, "slipping", "approach")]
 )
 def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base, control):
     side, amplitude, cells = 1e-3, 1e-6, (15, 12)
@@ -83,10 +68,9 @@ def test_sheet_thinner_than_a_fiftieth_of_its_cells__is_refused_in_free_space(tm
     assert float(pressed(ball, rv.elastic(1e6), load, thickness=thickness, boundary="periodic").force[0]) > 0
     study = tmp_path / "gel.toml"
     study.write_text(STUDY.replace('"0.1 mm"', f"{thickness}"))
-    for verb in (["plan"], ["run", "--out", tmp_path / "out", "--no-plots"]):
-        status, out, wrong = invoke(*verb, study)
-        assert status == 2
-        assert "51 times the thickness" in " ".join((out + wrong).split())
+    status, _, wrong = invoke("run", "--out", tmp_path / "out", "--no-plots", study)
+    assert status == 2
+    assert "51 times the thickness" in " ".join(wrong.split())
     assert not list(tmp_path.glob("out/*.nc"))
 
 
@@ -95,8 +79,6 @@ def test_python__refuses(case):
     thick = rv.Body(rv.elastic(1e6), Sheet(1.0))
     with refused("material", thick):
         pressed(case.height(), thick, load)
-    with refused("material", thick):
-        rv.Body(thick, Sheet(1.0))
     with pytest.raises(rv.InputError, match="kernel is a float: expected a Kernel; it has no influence"):
         rv.Body(rv.elastic(1e6), 1e-4)
     for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.power_law(1e-7, 1e-6, 0.3), rv.elastic(1e9))):

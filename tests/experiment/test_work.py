@@ -82,6 +82,7 @@ def test_work_of_an_elastic_ball__is_two_fifths_of_load_times_approach():
     ds, exact = (pressed(BALL, rv.elastic(1.0), program, t, times=[0.5, 1.0, 2.0]) for t in (1e-2, 1e-8))
     assert_stated(ds, exact.work.values, most=1e-2)
     assert float(exact.work[1]) == pytest.approx(0.4 * 0.1 * float(exact.approach[1]), rel=0.02)
+    assert abs(float(exact.work[2])) < 1e-12 * float(exact.work[1]), "what was put in comes back"
 
 
 def test_work_of_a_nearly_elastic_ball__comes_back_within_its_error():
@@ -94,24 +95,3 @@ def test_work_of_a_nearly_elastic_ball__comes_back_within_its_error():
         ds = pressed(BALL, material, program, times=[0.5, 0.75])
         assert float(ds.work_error[1]) < 0.2 * float(ds.work[0])
         assert abs(float(ds.work[1])) <= float(ds.work_error[1])
-
-
-HISTORIES = {
-    "loads": rv.Program().load(0.02, over=0.3).hold(0.3).load(0.0, over=0.2).hold(0.2).load(0.01, over=0.2),
-    "approaches": rv.Program().approach(0.05, over=0.3).hold(0.3).approach(-0.01, over=0.2).approach(0.03, over=0.3),
-    "taps": rv.Program.cycle(0.0, 0.03, 0.5, 2, control="approach"),
-}
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("history", HISTORIES)
-@pytest.mark.parametrize("material", [*MATERIALS, "elastic"])
-def test_work_error__covers_the_true_one_and_not_by_far(material, history):
-    """Rows in the middle of pairs of steps as well, and contact that is lost and found."""
-    body, program = (MATERIALS | {"elastic": rv.elastic(1.0)})[material], HISTORIES[history]
-    times = np.linspace(0, program.duration, 14)[1:]
-    ds, exact = (pressed(BALL, body, program, t, times=times) for t in (1e-2, 1e-4))
-    error, stated = np.abs(ds.work - exact.work).values, ds.work_error.values
-    seen = error > 2e-4 * float(np.abs(exact.work).max())
-    assert (stated[seen] >= 0.5 * error[seen]).all()
-    assert (stated <= 0.2 * float(np.abs(exact.work).max())).all()

@@ -44,16 +44,6 @@ def test_taps__work_as_in_steps_eight_times_as_short():
     assert found[-1].state.work == pytest.approx(finer[-1].state.work, rel=5e-3)
 
 
-@pytest.mark.parametrize(("control", "largest", "lost"), [("load", 0.02, 0.05), ("approach", 0.05, 0.015)])
-def test_nearly_elastic_sphere__returns_its_work_when_contact_is_lost(control, largest, lost):
-    """Only the rule for the work matters: the time steps have hardly any error and become long."""
-    program = getattr(getattr(rv.Program(), control)(largest, over=0.5), control)(0.0, over=0.25)
-    scene = sphere(program, rv.Prony(1.0, 0.0, (1e-6,), (0.1,)), times=(0.5, 0.75), tolerance=1e-3)
-    work = [step.state.work for step in march(scene)]
-    assert len(work) < 20
-    assert abs(work[-1]) < lost * max(work)
-
-
 def found_again(steps, after):
     """Time up to which surfaces that were apart stayed apart."""
     apart_since = next(i for i, step in enumerate(steps) if step.point.time >= after and step.point.force == 0)

@@ -6,7 +6,6 @@ from hypothesis import given
 from strategies import examples, seeds, shapes
 from support import direct
 
-import roughvisc as rv
 from roughvisc.mechanics import grid as grids
 from roughvisc.mechanics.grid import Grid, transform_library
 
@@ -40,20 +39,6 @@ def test_periodic_displacement__of_a_wave(shape, waves):
     wave_number = np.hypot(*(2 * np.pi * k / (n * d) for k, n, d in zip(waves, shape, spacing, strict=True)))
     found = Grid(shape, spacing, "periodic").displacement(np.cos(phase))
     assert found == pytest.approx(2 / wave_number * np.cos(phase), abs=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("shape", "halves"), [((9, 8), (0, 3)), ((9, 8), (2, 1)), ((12, 15), (5, 14)), ((1, 21), (0, 1)), ((2, 1), (1, 0))]
-)
-def test_mirror_displacement__of_half_waves(shape, halves):
-    """Cosines of whole numbers of half waves, with crests at the borders, are their own mirror images."""
-    spacing = (0.4, 0.9)
-    lengths = [n * d for n, d in zip(shape, spacing, strict=True)]
-    centres = [(np.arange(n) + 0.5) * d for n, d in zip(shape, spacing, strict=True)]
-    along_x, along_y = (np.cos(np.pi * k * x / length) for k, x, length in zip(halves, centres, lengths, strict=True))
-    wave = np.outer(along_x, along_y)
-    wave_number = np.hypot(*(np.pi * k / length for k, length in zip(halves, lengths, strict=True)))
-    assert Grid(shape, spacing, "mirror").displacement(wave) == pytest.approx(2 / wave_number * wave, abs=1e-13)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -113,23 +98,6 @@ def test_half_space__is_the_same_by_both(boundary, shape, monkeypatch):
         assert a.dtype == b.dtype
         precision = 1e-14 if a.dtype == np.float64 else 1e-5
         np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
-
-
-def test_results__are_the_same_by_both_and_go_by_the_one_that_is_stated(by_ducc0, monkeypatch):
-    ball, rubber, press = rv.sphere(1e-3, 3e-4, (16, 15)), rv.zener(1e6, 1e6, 1e5), rv.Program().load(1e-3, over=0)
-    rough = rv.self_affine(1e-3, (15, 12), hurst=0.8, rms_slope=0.1, seed=1)
-    calls, sound = [], grids.ducc0.fft.r2c
-    monkeypatch.setattr(grids.ducc0.fft, "r2c", lambda *a, **kw: calls.append(a) or sound(*a, **kw))
-
-    def results():
-        pressed = rv.simulate(ball, rubber, press, progress=False)
-        return pressed, rv.friction(rough, rubber, pressure=2e4, speeds=1e-3, fields=("pressure",), progress=False)
-
-    fast, by_ducc0 = results(), len(calls)
-    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
-    for one, other in zip(fast, results(), strict=True):
-        np.testing.assert_allclose(one.pressure, other.pressure, rtol=0, atol=1e-9 * float(other.pressure.max()))
-    assert len(calls) == by_ducc0 > 0
 
 
 def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):

@@ -19,12 +19,6 @@ def xp(monkeypatch):
     return device.install(monkeypatch)
 
 
-def absent_cells():
-    present = np.ones(SHAPE, bool)
-    present[5:9, 3:6] = present[-1] = False
-    return present
-
-
 def assert_equal(one, other):
     """Compare an array of the device with one of the host."""
     np.testing.assert_allclose(one.get(), other, rtol=0, atol=1e-12 * np.abs(other).max(initial=1e-300))
@@ -44,15 +38,6 @@ def solved_on_both(xp, boundary, gap, present=None, **given):
     assert other.approach == pytest.approx(found.approach, rel=1e-12)
     assert other.load == pytest.approx(found.load, rel=1e-12)
     return found
-
-
-@BOUNDARIES
-@pytest.mark.parametrize("prescribed", ["load", "approach"])
-@pytest.mark.parametrize("present", [None, absent_cells()], ids=["all", "absent"])
-def test_contact__is_the_same_on_a_device(xp, boundary, prescribed, present):
-    gap = support.rough_gap(SHAPE)
-    given = {"load": 20.0} if prescribed == "load" else {"approach": 0.7 * float(gap.mean())}
-    assert solved_on_both(xp, boundary, gap, present, **given).iterations > 3
 
 
 @BOUNDARIES
@@ -91,18 +76,12 @@ def test_nearly_full_contact__is_the_same_on_a_device(xp, given):
     [
         lambda xp, here, there: there + here,
         lambda xp, here, there: here * there,
-        lambda xp, here, there: np.maximum(there, here),
         lambda xp, here, there: xp.maximum(here, 0),
         lambda xp, here, there: np.stack([there, here]),
-        lambda xp, here, there: xp.where(there > 0, there, here),
         lambda xp, here, there: there[here > 0],
-        lambda xp, here, there: there[np.arange(2)],
         lambda xp, here, there: here[there > 0],
-        lambda xp, here, there: there.take(np.arange(2)),
         lambda xp, here, there: there.__setitem__(slice(None), here),
-        lambda xp, here, there: here.__setitem__(slice(None), there),
         lambda xp, here, there: here.__iadd__(there),
-        lambda xp, here, there: there.__iadd__(here),
         lambda xp, here, there: np.multiply(there, 2.0, out=here),
         lambda xp, here, there: np.asarray(there),
         lambda xp, here, there: np.add.reduce(there),

@@ -1,7 +1,5 @@
 """The march through time: order, tolerance, events, contact lost and found, going on from a state."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from support import MATERIALS, STEP_LOAD, UNIT_RADIUS, displaced, scene
@@ -10,28 +8,7 @@ import roughvisc as rv
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.stepping import march
 
-
-def final(steps):
-    *_, last = steps
-    return last
-
-
 TRIANGLE = rv.Program().load(0.05, over=1.0).load(0.01, over=1.0)
-
-
-@pytest.mark.parametrize("name", MATERIALS)
-def test_chosen_steps__keep_the_tolerance(name):
-    """The grid's error drops out: the reference runs on the same grid at a fiftieth of the tolerance."""
-    times, tolerance = (0.2, 1.0, 2.0), 1e-3
-    program = rv.Program().load(5e-4 if name == "zener_soft" else 0.05, over=0).hold(2.0)
-    found, exact = (
-        [s.point for s in march(scene(MATERIALS[name], program, times=times, tolerance=one)) if s.point.time in times]
-        for one in (tolerance, tolerance / 50)
-    )
-    for one, other in zip(found, exact, strict=True):
-        assert one.time == other.time
-        assert abs(one.approach / other.approach - 1) < tolerance
-        assert np.abs(one.pressure - other.pressure).sum() < tolerance * other.pressure.sum()
 
 
 def test_memory_of_both_fields__knows_the_pressure_that_causes_the_displacement():
@@ -42,21 +19,6 @@ def test_memory_of_both_fields__knows_the_pressure_that_causes_the_displacement(
         assert np.array_equal(displacement, displaced(alone, other))
         exact = settings.grid.displacement(effective)
         assert np.abs(displacement - exact).max() <= 1e-6 * np.abs(exact).max()
-
-
-def test_march__goes_on_from_any_state_bit_for_bit():
-    program = rv.Program().load(5e-4, over=1.0).load(1e-4, over=1.0).hold(0.5, control="approach")
-    settings = scene(MATERIALS["zener_soft"], program, tolerance=3e-2, times=(0.7, 2.4))
-    whole = list(march(settings))
-    assert len(whole) > 30
-    ends = [number for number, step in enumerate(whole) if step.is_end]
-    for cut in (*ends[:3], ends[len(ends) // 2], ends[-2]):
-        resumed = list(march(settings, whole[cut].state))
-        assert len(resumed) == len(whole) - cut - 1
-        assert np.array_equal(resumed[-1].point.pressure, whole[-1].point.pressure)
-        assert [s.point.force for s in resumed] == [s.point.force for s in whole[cut + 1 :]]
-        for name in ("work", "work_apart", "work_curved", "convolutions"):
-            assert getattr(resumed[-1].state, name) == getattr(whole[-1].state, name)
 
 
 def test_jump__shows_the_right_hand_state():
@@ -77,14 +39,6 @@ def test_no_instantaneous_compliance__refuses_a_jump_of_approach_only(material):
     assert steps[0].point.force == 0  # the left-hand state
     exact = closed_forms.lee_radok(UNIT_RADIUS, material, 0.05)
     assert steps[-1].point.approach == pytest.approx(float(exact.approach(2.0)), rel=1e-2)
-
-
-def test_work__of_an_elastic_ball_is_two_fifths_of_load_times_approach():
-    settings = scene(rv.elastic(1.0), rv.Program().load(0.03, over=0), times=(0.0,), tolerance=1e-6)
-    at_once = final(march(settings))
-    slow = final(march(replace(settings, program=rv.Program().load(0.03, over=1.0), kept=None)))
-    for step in (at_once, slow):
-        assert step.state.work == pytest.approx(0.4 * 0.03 * step.point.approach, rel=5e-3)
 
 
 @pytest.mark.parametrize("ratio", [1e4, 1e8])

@@ -70,11 +70,3 @@ def test_error__relaxes_faster_than_it_creeps():
     left = [many.remaining(time) for time in (0.0, 1e-3, 0.1, 10.0)]
     assert left[0] == pytest.approx(1.0)
     assert all(after < before for before, after in pairwise(left))
-
-
-def test_roll__moves_all_that_is_remembered():
-    memory = Memory(SERIES["prony"], 10.0)
-    history = history_after(memory, [0.1, 0.1], np.sin, "linear")
-    rolled = memory.roll(history, 1, 0)
-    np.testing.assert_array_equal(memory.displacement(rolled)[0], np.roll(memory.displacement(history)[0], -1, 0))
-    np.testing.assert_array_equal(memory.roll(rolled, -1, 0).modes, history.modes)

@@ -1,54 +1,14 @@
 """Which memory models a material, and the error that it states."""
 
-import re
-
 import numpy as np
 import pytest
 
 import roughvisc as rv
 from roughvisc.labels import warnings_of
-from roughvisc.mechanics.memory_choice import SERIES_SHARE, choose_memory
+from roughvisc.mechanics.memory_choice import choose_memory
 
 ROWS = np.geomspace(1e-3, 10.0, 40)
 NOISY = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
-
-
-@pytest.mark.parametrize("exponent", [0.1, 0.5])
-@pytest.mark.parametrize("glassy", [0.0, 0.01, 0.3])
-def test_power_law__is_right_at_once_and_from_the_shortest_age_on(exponent, glassy):
-    material = rv.power_law(glassy, 1.0, exponent)
-    choice = choose_memory(material, 1e4, 1e-3, 1e-7)
-    series = choice.memory.series
-    assert series.glassy == glassy
-    t = np.geomspace(1e-7, 1e4, 977)
-    off = series.contact_compliance(t) / material.contact_compliance(t) - 1
-    assert np.abs(off).max() <= 1.02 * choice.series_error <= 1.02 * SERIES_SHARE * 1e-3
-    early = np.geomspace(1e-12, 1e-7, 200)
-    crept = float(material.contact_compliance(1e-7) - material.contact_compliance(0.0))
-    assert np.abs(series.contact_compliance(early) - material.contact_compliance(early)).max() <= 1.001 * crept
-    assert choice.note.endswith(f"within {choice.series_error:.1e} of it at time zero and from 1e-07 s")
-
-
-@pytest.mark.parametrize("first", [(), (0.0,)])
-def test_noisy_table__says_how_far_off_the_rows_are(first):
-    t = np.append(first, ROWS)
-    raw = np.append(np.zeros(len(first)), ROWS**0.4 * NOISY)
-    material = rv.creep_table(t, raw, noise=0.1)
-    choice = choose_memory(material, 10.0, 1e-3, 1e-5)
-    assert choice.series_error <= SERIES_SHARE * 1e-3
-    assert choice.memory.series.glassy == material.creep_compliance(0.0)
-    off = material.creep_compliance(ROWS) / (ROWS**0.4 * NOISY) - 1
-    stated = re.search(r"largest misfit ([\d.]+), rms ([\d.]+) ", choice.note)
-    assert [float(one) for one in stated.groups()] == pytest.approx(
-        [np.abs(off).max(), np.sqrt(np.mean(off**2))], rel=0.05
-    )
-    assert 0.005 < np.sqrt(np.mean(off**2)) < 0.02, "noise of 1 %, evened out"
-
-
-def test_table_shorter_than_the_program__is_refused():
-    material = rv.creep_table(tuple(ROWS), tuple(0.5 + ROWS**0.4))
-    with pytest.raises(rv.InputError, match="the table ends at 10 s"):
-        choose_memory(material, 11.0, 1e-3, 1e-5)
 
 
 @pytest.mark.parametrize(

@@ -176,18 +176,3 @@ def test_slow_slide__is_not_frozen_by_the_tolerance():
         found, steps = settled(rough((32, 24)), rubber(), 1e-4, 2e-3, periods=1, tolerance=tolerance)
         forces.append(force(found, steps[-1]))
     assert forces[0] == pytest.approx(forces[1], rel=1e-3)
-
-
-def test_march__goes_on_from_any_step_of_a_slide_to_the_same_bits():
-    program = (
-        rv.Program().load(2e-3, over=0).slide(0.5e-3, speed=0.1).hold(1e-3).slide(0.35e-3, speed=0.1, direction="y")
-    )
-    found = scene(rough((20, 21)), rubber(), program, times=(1e-3, 2e-3, program.duration))
-    whole = list(march(found))
-    for at in [number for number, step in enumerate(whole[:-1]) if step.is_end][2::7]:
-        again = list(march(found, whole[at].state))
-        assert len(again) == len(whole) - at - 1
-        assert [step.point.time for step in again] == [step.point.time for step in whole[at + 1 :]]
-        np.testing.assert_array_equal(again[-1].point.history.modes, whole[-1].point.history.modes)
-        assert again[-1].state.distance == whole[-1].state.distance
-        assert again[-1].difference == whole[-1].difference

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from references.contact_problems import rows
 from strategies import boundaries, examples, shapes
-from support import direct, rough_gap
+from support import rough_gap
 
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError
@@ -35,26 +35,6 @@ def check_optimal(operator, gap, state, precision, present=None):
 
 
 # ------------------------------------------------------------------------------------------------- exact solutions
-
-
-def test_given_load__agrees_with_dense_linear_algebra():
-    """Active set with a dense matrix, independent of the solver; cells leave, and none of them would penetrate."""
-    shape, spacing, load = (11, 9), (1.0, 0.8), 12.0
-    x, y = np.indices(shape)
-    gap = ((x - 4.7) ** 2 + (0.8 * (y - 4.2)) ** 2) / 30
-    matrix = np.array([direct(cell, spacing).ravel() for cell in np.eye(99).reshape(99, *shape)])
-    active, expected = np.ones(99, bool), np.full(99, -1.0)
-    while (expected < 0).any():
-        m = int(active.sum())
-        system = np.ones((m + 1, m + 1))
-        system[:m, :m], system[:m, m], system[m, m] = matrix[np.ix_(active, active)], -1, 0
-        solution = np.linalg.solve(system, np.append(-gap.ravel()[active], load))
-        expected = np.zeros(99)
-        expected[active] = solution[:m]
-        active &= expected > 0
-    state = solve_contact(Grid(shape, spacing), gap, load=load, tolerance=1e-9)
-    assert state.pressure.ravel() == pytest.approx(expected, abs=1e-8 * expected.max())
-    assert state.approach == pytest.approx(solution[m], rel=1e-10)
 
 
 def hertz_errors(n, ny):
@@ -205,17 +185,6 @@ def test_known_displacement_of_a_single_cell__leaves_its_error_behind(boundary):
     assert np.array_equal(found.pressure, pressure)
     assert np.abs(found.displacement - exact).max() < 1e-14 * exact.max()
     assert found.approach == pytest.approx(exact[7, 5], rel=1e-14)
-
-
-@pytest.mark.parametrize("known", [{"load": 3000.0}, {"approach": 5.0}], ids=["load", "approach"])
-@BOUNDARIES
-def test_displacement__belongs_to_the_pressure(boundary, known):
-    operator, gap = Grid((101, 96), (1.0, 1.0), boundary), rough_gap((101, 96))
-    state = solve_contact(operator, gap, **known)
-    expected = operator.displacement(state.pressure)
-    assert np.abs(state.displacement - expected).max() < 1e-12 * expected.max()
-    tight = solve_contact(operator, gap, **known, tolerance=1e-9)
-    assert l1(state.pressure, tight.pressure) < 1e-4
 
 
 @BOUNDARIES

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from references.dense import PERIOD, TIME, dense, line_profiles, rubber, slid, strong_errors
+from references.dense import PERIOD, line_profiles, rubber, slid, strong_errors
 from support import refused
 
 import roughvisc as rv
@@ -46,44 +46,17 @@ def test_full_contact_of_a_wave__is_exact(loss, speed, body):
     assert mean_traction(wave(21, amplitude, 3), found.pressure) / pressure == pytest.approx(exact, rel=1e-5)
 
 
-@pytest.mark.parametrize("speed", [2e-2, 0.2, 2.0])
-@pytest.mark.parametrize("ratio", [3.0, 20.0])
-def test_partial_contact__agrees_with_a_dense_solution(speed, ratio):
-    height, load, material = wave(63, 1e-5), 3e-5, rubber(ratio)
-    exact = dense(height[:, 0], material, speed, load)
-    found = slid(height, material, speed, load, tolerance=1e-8)
-    assert 0.05 < np.mean(exact > 0) < 0.9
-    assert np.abs(found.pressure[:, 0] - exact).sum() < 1e-5 * exact.sum()
-    traction = mean_traction(height, found.pressure)
-    assert traction == pytest.approx(mean_traction(height, exact[:, None]), rel=1e-4)
-
-
-def assert_strong(rows, tolerance, too_cautious=0):
-    errors, stated, converged, _ = rows.T
+@pytest.mark.parametrize("load", [3e-6, 1e-4])
+@pytest.mark.parametrize("ratio", [3.0, 30.0, 3000.0])
+@pytest.mark.parametrize("profile", ["wave", "rough", "broad"])
+def test_partial_contact__agrees_with_a_dense_solution(profile, ratio, load):
+    height, speeds, tolerance = line_profiles(81)[profile], [3e-3, 0.06, 1.0], 1e-3
+    errors, stated, converged, _ = strong_errors(height, ratio, load, speeds, tolerance).T
     assert converged.all()
     assert errors.max() < 2 * tolerance
     large = errors > tolerance / 50
     assert (stated[large] > 0.8 * errors[large]).all()
-    assert (stated[large] > 5 * errors[large]).sum() <= too_cautious
-
-
-@pytest.mark.parametrize("load", [3e-6, 1e-4])
-@pytest.mark.parametrize("ratio", [30.0, 3000.0])
-@pytest.mark.parametrize("profile", ["wave", "rough", "broad"])
-def test_strong_materials__agree_with_a_dense_solution(profile, ratio, load):
-    rows = strong_errors(line_profiles(81)[profile], ratio, load, [3e-3, 0.06, 1.0], 1e-3)
-    assert_strong(rows, 1e-3)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
-@pytest.mark.parametrize("cells", [256, 512])
-@pytest.mark.parametrize("ratio", [3.0, 30.0, 300.0, 3000.0])
-@pytest.mark.parametrize("profile", ["wave", "rough", "broad"])
-def test_strong_materials__agree_at_all_speeds(profile, ratio, cells, tolerance):
-    for load in (3e-6, 1e-4):
-        rows = strong_errors(line_profiles(cells)[profile], ratio, load, np.geomspace(1e-4, 10, 10), tolerance)
-        assert_strong(rows, tolerance, too_cautious=1)  # one state of all of them
+    assert (stated[large] <= 5 * errors[large]).all()
 
 
 def test_power_and_slopes__agree_as_the_grid_is_refined():
@@ -136,18 +109,6 @@ def test_low_speed__has_the_friction_of_a_tighter_tolerance():
     assert exact.power_force == pytest.approx(10 * low.power_force, rel=0.05)
 
 
-@pytest.mark.parametrize("speed", [0.1, 1.0])
-def test_material_without_compliance_at_once__slides(speed):
-    """A Kelvin-Voigt solid at loss tangents of 13 and 130: the energy that it dissipates is that of the slopes."""
-    solid = rv.kelvin_voigt(1e6, 1e6 * TIME)
-    found = slid(ROUGH, solid, speed, LOAD)
-    tight = slid(ROUGH, solid, speed, LOAD, tolerance=1e-7)
-    assert found.converged
-    assert tight.converged
-    assert np.abs(found.pressure - tight.pressure).sum() < 2e-3 * tight.pressure.sum()
-    assert found.power_force == pytest.approx(tight.power_force, rel=2e-3)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_loss_tangent_of_ten_thousand__is_solved_despite_a_preconditioner_in_single_precision(seed):
     height = rv.from_array(1e-7 * np.random.default_rng(seed).standard_normal((16, 12)), spacing=1e-6)
@@ -172,15 +133,6 @@ def test_not_converged__says_so():
     assert not found.converged
     assert found.iterations == 3
     assert max(found.residual, found.friction_residual) > 1e-6
-
-
-@pytest.mark.parametrize("material", [rv.maxwell(1e6, 1e3), rv.power_law(1e-7, 1e-6, 0.3)])
-def test_endless_creep__is_refused_where_waves_stand_still(material):
-    with refused("material"):
-        slid(ROUGH, material, 0.1, LOAD)
-    ridge = slid(wave(33, 1e-5), material, 0.1, 1e-5)
-    assert ridge.converged
-    assert ridge.power_force > 0
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.inf, math.nan])
