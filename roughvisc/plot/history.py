@@ -23,18 +23,11 @@ from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES, axis_of
 
-#: Quantities that are drawn if the result holds them, and their colours.
-_COLOURS = {
-    "force": style.BLUE,
-    "approach": style.GREEN,
-    "contact_area": style.CONTACT,
-    "mean_gap": style.PURPLE,
-    "work": style.ORANGE,
-    "friction_coefficient": style.BLUE,
-    "leak_rate": style.SKY,
-    "thermal_conductance": style.VERMILION,
-    "electrical_conductance": style.VERMILION,
-}
+#: Quantities that are drawn if the result holds them.
+_QUANTITIES = (
+    *("force", "approach", "contact_area", "mean_gap", "work", "friction_coefficient"),
+    *("leak_rate", "thermal_conductance", "electrical_conductance"),
+)
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
@@ -70,7 +63,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
-    default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _COLOURS
+    default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
     wanted = [name for name in default if name in dataset] if quantities is None else quantities
     names = [wanted] if isinstance(wanted, str) else list(wanted)
     expect_result(dataset, over, *names)
@@ -78,9 +71,6 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
         raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
-    if over == "sliding_distance":  # the loading before the first slide has one sliding distance
-        begins = max(int((steps[over].values > 0).argmax()) - 1, 0)
-        steps, kept = steps.isel(time=slice(begins, None)), kept.sel(time=slice(float(steps["time"][begins]), None))
     places = (steps if over in steps else kept)[over]
     columns = 1 if len(names) <= 3 else 2
     size = (3.7, 1.1) if columns == 1 else (2.8, 1.05)
@@ -102,19 +92,17 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
 def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over: str, across: Unit) -> None:
     """Draw a quantity as a line through the steps and dots at the kept rows, with Persson's theory if known."""
     label, si = style.described(kept[name])
-    colour, theory = _COLOURS.get(name, style.BLUE), f"persson_{name}"
-
-    def known(values: xr.DataArray) -> xr.DataArray:
-        drawn = values.where(np.isfinite(values))
-        return drawn.where(drawn > 0) if name == "leak_rate" else drawn  # a logarithmic axis has no zero
-
-    unit = unit_for(known(steps[name]), si)
-    ax.plot(across(steps[over]), unit(known(steps[name])), color=colour)
-    if kept[over].size <= _DOTS:
-        ax.plot(across(kept[over]), unit(known(kept[name])), "o", color=colour)
-    if theory in kept:
-        ax.plot(across(kept[over]), unit(kept[theory]), "--", color="k", lw=0.9, label="Persson")
-    style.value_axis(ax, *(line.get_ydata() for line in ax.lines))
+    look = {"color": style.CONTACT if name == "contact_area" else style.BLUE}
+    line, dots = (one[name].where(np.isfinite(one[name])) for one in (steps, kept))
+    if name == "leak_rate":  # a logarithmic axis has no zero
+        line, dots = line.where(line > 0), dots.where(dots > 0)
+    unit = unit_for(line, si)
+    ax.plot(across(steps[over]), unit(line), **look)
+    if dots.size <= _DOTS:
+        ax.plot(across(kept[over]), unit(dots), "o", **look)
+    if f"persson_{name}" in kept:
+        ax.plot(across(kept[over]), unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
+    style.value_axis(ax, *(one.get_ydata() for one in ax.lines))
     if ax.get_yscale() == "linear":
         ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
     ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label))

@@ -22,7 +22,7 @@ from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.rows import frames_at, representative_frames, rows_of
-from roughvisc.topography.grid import cell_edges, cell_side, nominal_area
+from roughvisc.topography.grid import cell_edges, cell_side
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import FIELDS, VARIABLES, axis_of
 
@@ -44,14 +44,9 @@ _SHOWN, _SPIKE = 99.8, 1.2
 _ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
 
 
-def block_side(field: xr.DataArray | xr.Dataset) -> int:
-    """Return the side of the block of cells in one drawn cell."""
-    return max(1, -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS))
-
-
 def drawn(field: xr.DataArray) -> xr.DataArray:
     """Return the map to draw: for a large one, blocks of cells with their largest pressure and smallest gap."""
-    every = block_side(field)
+    every = -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS)
     if every == 1:
         return field.load()
     blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
@@ -167,14 +162,11 @@ def draw_outline(ax: Axes, dataset: xr.Dataset, frame: int) -> list[Artist]:
 
 
 def frame_title(dataset: xr.Dataset, frame: int) -> str:
-    """Return the time or speed of a row, with its friction coefficient or nominal pressure."""
+    """Return the time of a row, or its speed with the direction and the friction coefficient."""
     at, text = dataset.isel({axis_of(dataset.variables): frame}), style.row_text(rows_of(dataset), frame)
     if axis_of(dataset.variables) == "speed":
         arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
         return f"{arrow} {text}\nµ = {float(at['friction_coefficient']):.2g}"
-    if "force" in dataset and dataset.attrs.get("boundary") in ("periodic", "mirror"):
-        pressure = float(at["force"]) / nominal_area(dataset)
-        return f"{text}\nnominal {unit_for([pressure], 'Pa').text(pressure)}"
     return text
 
 
@@ -225,23 +217,18 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     width, height = map_size(dataset, width, 2.5 * width)
     if width > 3 * height:  # strips are stacked
         columns, (width, height) = 1, map_size(dataset, 4.5, 4.0)
-    blank = -len(frames) % columns  # every field begins a row
     titles = [frame_title(dataset, frame) for frame in frames]
-    count, lines = (len(frames) + blank) * len(stored) - blank, 1 + max(title.count("\n") for title in titles)
-    look = {"shared": "xy", "left": 0.65, "between": max(0.3, 1.5 - width), "lines": lines}  # room for the titles
+    each = -(-len(frames) // columns) * columns  # every field begins a row
+    count, lines = each * (len(stored) - 1) + len(frames), 2 if "\n" in titles[0] else 1
+    look: dict[str, Any] = {"shared": "xy", "left": 0.65, "between": max(0.3, 1.5 - width), "lines": lines}
     figure, panels = style.new_panels(count, columns, width, height, **look)
     named: dict[str, Artist] = {}
-    shown: list[Axes] = []
     for number, name in enumerate(stored):
-        first = number * (len(frames) + blank)
-        row = panels[first : first + len(frames)]
-        for unused in panels[first + len(frames) : first + len(frames) + blank]:
-            unused.remove()
-        named |= draw_field(row, dataset, name, frames)
-        shown += row
+        named |= draw_field(panels[number * each :][: len(frames)], dataset, name, frames)
+    for unused in (ax for ax in panels if not ax.images):
+        unused.remove()
+    shown = [ax for ax in panels if ax.images]
     style.letter_panels(shown, titles * len(stored))
-    if (every := block_side(dataset)) > 1:
-        style.note_below(figure, f"One cell drawn for {every} × {every}, with its largest pressure and smallest gap.")
     style.legend_above(figure, named)
     return figure
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -143,25 +142,29 @@ def save_figures_of_files(
     folder : Path, optional
         Folder for the figures. Default: the folder of each result.
     every : bool
-        True: all figures, and once a surface that several results share. False: the default figures.
+        True: all figures, and the surface of the first case, or of all cases if it is varied. False: the default
+        figures.
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
     """
     from roughvisc.study.storage.netcdf import open_result  # slow to import
 
     cases: dict[str, Any] = {}
-    if len(paths) > 1:
-        for path in paths:
-            with suppress(InputError, ValueError), open_result(path) as dataset:
-                cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
-    stems, surfaces, jobs = file_stems(cases), set(), []
     for path in paths:
-        case = cases.get(path.stem, {})
-        surface = json.dumps(case["surface"]) if "surface" in case else path
-        names = DEFAULT if not every else set(FIGURES) - ({"surface"} if surface in surfaces else set())
-        surfaces.add(surface)
-        jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), case_words(case), names))
+        with open_result(path) as dataset:
+            cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
+    stems, jobs, is_one = file_stems(cases), [], len(paths) == 1
+    for path in paths:
+        case, stem = cases[path.stem], path.stem if is_one else stems[path.stem]
+        names = set(FIGURES if every else DEFAULT)
+        names -= set() if not jobs or varies_surface(case) else {"surface"}
+        jobs.append((path, folder or path.parent, stem, "" if is_one else case_words(case), names))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
+
+
+def varies_surface(case: Mapping[str, Any]) -> bool:
+    """Return whether the sweep of a case varies its surface."""
+    return any(key.startswith("surface.") for key in case.get("varied", {}))
 
 
 def _save_file(job: tuple[Path, Path, str, str, Collection[str]]) -> list[Path]:
@@ -177,11 +180,7 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: 
     from roughvisc.progress import reporting  # slow to import
 
     processes = min(processes, len(jobs))
-    # a process that is forked while threads run may hang; a fork server starts before any work
-    method = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-    context = multiprocessing.get_context(method)
-    if method == "forkserver":
-        context.set_forkserver_preload([__name__])
+    context = multiprocessing.get_context("spawn")  # a process that is forked while threads run may hang
     with (
         reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report,
         ProcessPoolExecutor(max(processes, 1), mp_context=context) as pool,

@@ -122,14 +122,14 @@ def align(axes: Sequence[Axes], distance: float = 0.45) -> None:
         ax.yaxis.set_label_coords(-distance / (ax.get_position().width * ax.figure.get_figwidth()), 0.5)
 
 
-def grow(figure: Figure, *, top: float = 0.0, bottom: float = 0.0, right: float = 0.0) -> None:
+def grow(figure: Figure, *, top: float = 0.0, right: float = 0.0) -> None:
     """Add room [inch] at the edges of a figure, whose panels keep their sizes."""
     width, height = figure.get_size_inches()
     for ax in figure.axes:
         x, y, side, up = ax.get_position(original=True).bounds
-        y, up = (y * height + bottom) / (height + top + bottom), up * height / (height + top + bottom)
-        ax.set_position((x * width / (width + right), y, side * width / (width + right), up))
-    figure.set_size_inches(width + right, height + top + bottom)
+        wide, high = width / (width + right), height / (height + top)
+        ax.set_position((x * wide, y * high, side * wide, up * high))
+    figure.set_size_inches(width + right, height + top)
 
 
 def colour_bar(mappable: ScalarMappable, axes: Sequence[Axes], label: str, **options: Any) -> None:
@@ -160,14 +160,6 @@ def legend_above(figure: Figure, named: Mapping[str, Artist], title: str = "") -
     look: dict[str, Any] = {"ncols": columns, "handlelength": 1.5, "columnspacing": 1.2, "title": title or None}
     place = {"loc": "lower center", "bbox_to_anchor": (width / 2, height), "bbox_transform": figure.dpi_scale_trans}
     figure.legend(list(named.values()), list(named), borderaxespad=0.2, **place, **look)
-
-
-def note_below(figure: Figure, note: str) -> None:
-    """Write a note below all panels, in lines no longer than the figure is wide; before any legend."""
-    if note:
-        lines = textwrap.wrap(note, int(figure.get_figwidth() / LETTER))
-        grow(figure, bottom=0.05 + _LINE * len(lines))
-        figure.text(0.5, 0.05 / figure.get_figheight(), "\n".join(lines), ha="center", va="bottom", fontsize=8)
 
 
 def verbatim(text: str) -> str:

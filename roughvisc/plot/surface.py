@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
-from roughvisc.plot.maps import block_side, draw_map, drawn, plane_unit
+from roughvisc.plot.maps import draw_map, drawn, plane_unit
 from roughvisc.topography.bandwidth import off_plane
 from roughvisc.topography.grid import cell_edges, checked, spacing
 from roughvisc.topography.missing_points import fill
@@ -34,7 +34,7 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
         Heights, peaks up; missing points are grey. The colour scale covers at most five robust standard deviations, so
-        that a spike does not flatten the rest. [m]
+        that a spike does not flatten the rest; an arrow at the colour bar marks heights beyond it. [m]
 
     Returns
     -------
@@ -56,7 +56,9 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     on_map, profile, heights, spectrum = axes
     limits = (float(unit(low)), float(unit(high)) if high > low else float(unit(low)) + 1.0)
     image = draw_map(on_map, drawn(height), unit, "cividis", vmin=limits[0], vmax=limits[1])
-    style.colour_bar(image, [on_map], unit.label("Height"))
+    beyond = bool((height < low).any()), bool((height > high).any())
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(beyond, "neither")
+    style.colour_bar(image, [on_map], unit.label("Height"), extend=extend)
     line = height.isel(y=height.sizes["y"] // 2)
     profile.plot(plane(line["x"]), unit(line), color=style.BLUE, lw=0.9)
     on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
@@ -68,14 +70,6 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     _draw_heights(heights, levelled.values[np.isfinite(levelled.values)])
     _draw_spectrum(spectrum, levelled)
     style.letter_panels(axes)
-    missing, beyond = float(height.isnull().mean()), float(((height < low) | (height > high)).mean())
-    every = block_side(height)
-    notes = [
-        f"{100 * missing:.2g} % of the points are missing." if missing else "",
-        f"{100 * beyond:.2g} % of the heights lie beyond the colour scale." if beyond else "",
-        f"One cell drawn for {every} × {every}." if every > 1 else "",
-    ]
-    style.note_below(figure, " ".join(filter(None, notes)))
     return figure
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -20,7 +21,8 @@ from roughvisc.errors import InputError
 from roughvisc.labels import cost_of, warnings_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep
+from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
+from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit.audit import audit
@@ -33,9 +35,8 @@ from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of, variables_in_table
 
-#: Largest numbers of cases with figures and audit, of cases for which every figure is drawn, and of cases with their
-#: studies. The shown cases are evenly spread.
-_PICTURED, _DRAWN, _STATED = 6, 3, 60
+#: Largest numbers of cases with figures, audit and study, which are evenly spread, and of cases with every figure.
+_SHOWN, _DRAWN = 6, 3
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
 #: Attributes that state how a result was computed and where its surface came from.
@@ -62,7 +63,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     Returns
     -------
     pathlib.Path
-        The self-contained file. Its table has all cases. Figures show up to 6 cases, evenly spread.
+        The self-contained file. Its table has all cases. Figures, audit and study show up to 6 cases, evenly spread.
 
     Raises
     ------
@@ -88,15 +89,9 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
     else:
         out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
-    pictured, stated = _evenly(len(sources), _PICTURED), _evenly(len(sources), _STATED)
+    shown = set(np.linspace(0, len(sources) - 1, min(len(sources), _SHOWN)).astype(int).tolist())
     drawn = set(FIGURES if len(sources) <= _DRAWN else DEFAULT) - {"surface"}
-    surfaces: dict[str, int] = {}
-    for number in pictured:
-        surfaces.setdefault(_surface_of(sources[number]), number)
-    jobs = [
-        (one, i, (drawn if i in pictured else set()) | ({"surface"} if i in surfaces.values() else set()), i in stated)
-        for i, one in enumerate(sources)
-    ]
+    jobs = [(one, i, drawn if i in shown else set()) for i, one in enumerate(sources)]
     page["cases"] = in_parallel(_case, jobs, processes, "report")
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
@@ -110,11 +105,6 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     with atomic_write(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Path(out)
-
-
-def _evenly(count: int, most: int) -> set[int]:
-    """Return the numbers of at most `most` cases, evenly spread."""
-    return set(np.linspace(0, count - 1, min(count, most)).astype(int).tolist())
 
 
 def _failures(folder: Path) -> list[dict[str, str]]:
@@ -138,21 +128,12 @@ def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     return {"caption": caption, "src": src, "wide": figure.get_figwidth() > _WIDE}
 
 
-def _surface_of(source: Path | xr.Dataset) -> str:
-    """Return a text that is equal for two results of the same surface."""
-    if isinstance(source, Path):
-        with open_result(source) as dataset:
-            return _surface_of(dataset)
-    case = json.loads(source.attrs.get("case", "{}"))
-    return json.dumps(case.get("surface", {})) + str(source.attrs.get("surface_sha256", ""))
-
-
-def _case(job: tuple[Path | xr.Dataset, int, set[str], bool]) -> dict[str, Any]:
+def _case(job: tuple[Path | xr.Dataset, int, set[str]]) -> dict[str, Any]:
     """Return one case of the page: its row in the table, figures, assumptions, surface and study."""
-    source, number, names, is_stated = job
+    source, number, names = job
     if isinstance(source, Path):
         with open_result(source) as dataset:
-            return _case((dataset, number, names, is_stated))
+            return _case((dataset, number, names))
     expect_result(source, "x", "y")
     case = json.loads(source.attrs.get("case", "{}"))
     title = str(case.get("title") or source.attrs.get("title") or f"case {number}")
@@ -164,34 +145,29 @@ def _case(job: tuple[Path | xr.Dataset, int, set[str], bool]) -> dict[str, Any]:
         "varied": varied_texts(case),
         "cells": _cells(source),
     }
-    if is_stated:
-        attributes = {**(source["height"].attrs if "height" in source else {}), **source.attrs}
-        found["stated"] = {
-            "settings": [[name.replace("_", " "), str(attributes[name])] for name in _SETTINGS if name in attributes],
-            "warnings": list(warnings_of(source.attrs).values()),
-            "history": history,
-            "text": study_text(case) if case else "",
-        }
-    for name, caption, figure in figures_of(source, names):
-        picture = _picture(caption, figure)
-        if name != "surface":
-            found.setdefault("figures", []).append(picture)
-            continue
+    if not names:
+        return found
+    attributes = {**(source["height"].attrs if "height" in source else {}), **source.attrs}
+    found["stated"] = {
+        "settings": [[name.replace("_", " "), str(attributes[name])] for name in _SETTINGS if name in attributes],
+        "warnings": list(warnings_of(source.attrs).values()),
+        "history": history,
+        "text": study_text(case) if case else "",
+    }
+    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(source, names)]
+    if "height" in source and (number == 0 or varies_surface(case)):
         parameters = levelled_parameters(source["height"].load())
         found["surface"] = {
             "name": str(source["height"].attrs.get("source_file") or title),
-            "picture": picture,
+            "picture": _picture(FIGURES["surface"][2], surface(source)),
             "steps": [line for line in history if line and ": run of " not in line],
             "parameters": [
                 (name.replace("_", " "), parameters[name].attrs["long_name"], _text(parameters[name]))
                 for name in _PARAMETERS
             ],
         }
-    if "figures" in found:
-        try:
-            found["audit"] = list(audit(source))
-        except InputError:  # a Dataset that lacks the variables of an audit
-            found["audit"] = []
+    with suppress(InputError):  # a Dataset that lacks the variables of an audit
+        found["audit"] = list(audit(source))
     return found
 
 
@@ -222,6 +198,8 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     seconds = cost_of(dataset)[0]
     if np.isfinite(seconds):
         cells["Wall time"] = unit_for([seconds], "s").text(seconds)
+    if warnings := warnings_of(dataset.attrs):
+        cells["Warnings"] = ", ".join(warnings)
     return cells
 
 

@@ -54,9 +54,8 @@ def test_present__keeps_the_extremes_of_every_block(coarse):
         np.testing.assert_allclose(drawn["displacement"][i, j], block["displacement"].mean(), rtol=1e-12)
 
 
-def test_maps__show_a_lone_spot_and_say_so(coarse):
+def test_maps__show_a_lone_spot(coarse):
     figure = rv.plot.maps(result(), times=[0.1, 0.2])
     images = [image for ax in figure.axes for image in ax.images][:2]
     assert [float(image.get_array().max()) for image in images] == pytest.approx([2.0, 9.0])
     assert (images[0].get_array() > 0).sum() == 1
-    assert "4 × 4" in figure.texts[0].get_text()

@@ -123,19 +123,19 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
     assert drawn(several((1.0, 1.0))) == ["sweep-friction.png", "sweep-area.png"]
 
 
-#: A stroke, a stop and a stroke back, in micrometres; what is pressed on before is not drawn.
+#: Loading, a stroke, a stop and a stroke back, in micrometres.
 DISTANCE = [0, 0, 10, 20, 30, 30, 30, 40, 50]
 FRICTION = [np.nan, 0.0, 0.2, 0.3, 0.3, 0.1, 0.05, -0.02, 0.28]
 
 
-def test_history__over_the_distance_begins_with_the_first_slide():
+def test_history__over_the_distance():
     series = {"friction_coefficient": np.array(FRICTION), "sliding_distance": 1e-6 * np.array(DISTANCE)}
     series |= {"force": np.ones(9), "approach": np.ones(9)}
     coords = {"time": np.arange(9.0)}
     slid = label(xr.Dataset({name: ("time", values) for name, values in series.items()}, coords))
     (ax,) = rv.plot.history(slid, over="sliding_distance").axes
-    np.testing.assert_allclose(ax.lines[0].get_xdata(), DISTANCE[1:])
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), FRICTION[1:])
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), DISTANCE)
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), FRICTION)
     assert ax.get_xlabel() == "Sliding distance [µm]"
     with pytest.raises(rv.InputError, match="sliding_distance"):
         rv.plot.history(slid.drop_vars("sliding_distance"), over="sliding_distance")
