@@ -128,8 +128,8 @@ def test_refused_option__is_named(invoke, tmp_path, command, option):
 
 @pytest.mark.thorough
 def test_budget__names_what_open_sources_need(invoke, coarse_pictures):
-    status, out, _ = invoke("budget", write_study(), "--at", "0.2 s", "--modulus-error", "10%")
-    assert (status, "time_scale_error" in out, "modulus_error" in out) == (0, True, False)
+    status, out, _ = invoke("budget", write_study(), "--modulus-error", "10%")
+    assert (status, "--time-scale-error" in out, "--modulus-error" in out) == (0, True, False)
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
@@ -192,7 +192,7 @@ def test_streams__whose_encoding_lacks_letters_end_no_command(tmp_path, monkeypa
     """Units (µm), rules of tables and titles of studies."""
     monkeypatch.chdir(tmp_path)
     study = write_study(BALL, ("A ball", "Härte λ \U0001f600"))
-    results, budget = "results/ball", ("budget", study, "--at", "0.2 s", "-q")
+    results, budget = "results/ball", ("budget", study, "-q")
     commands = [("--help",), ("scan", scan_file), ("new", scan_file), ("plan", study), ("run", study, "--no-plots")]
     commands += [("audit", results), ("verify", results), ("report", results), ("clean", results), budget]
     for arguments in [*commands, ("plot", results), ("run", "λ.toml")]:

@@ -155,7 +155,7 @@ def test_sweep_and_table__have_a_row_for_each_load(kind, done, tmp_path):
     assert (results.contact_area[1, -1] > 1.5 * results.contact_area[0, -1]).all()
     table = rv.to_table(tmp_path / "out")
     assert isinstance(table, pd.DataFrame)
-    assert table[f"{kind.pressed} [kPa]"].tolist() == [10, 20]
+    assert table[f"{kind.pressed} [Pa]"].tolist() == [1e4, 2e4]
     assert table["status"].tolist() == ["converged"] * 2
     row = int(done.result[kind.curve].argmax(kind.axis)) if kind.axis == "speed" else -1
     unit = done.result[kind.axis].attrs["units"]

@@ -15,8 +15,8 @@ from roughvisc.cli.group import counted
 from roughvisc.cli.tables import readable, two_columns
 from roughvisc.experiment.resources import amount
 
-#: Costs of each case of a sweep.
-_COSTS = ("steps", "convolutions", "wall_time", "memory", "disk")
+#: Columns of the table of the cases of a sweep.
+_COLUMNS = ("contact_fraction", "steps", "convolutions", "wall_time", "memory", "disk")
 #: Largest number of cases that a plan lists one by one.
 _LISTED = 20
 
@@ -29,29 +29,31 @@ def plan_tables(costs: xr.Dataset) -> Group:
     costs : xarray.Dataset
         Result of :func:`roughvisc.plan`.
     """
-    total, attrs, own = costs.sizes["case"], costs.attrs, int(costs["marched"].sum())
+    for name in (*_COLUMNS, "nominal_pressure"):
+        costs[name].values = [float(f"{value:.2g}") for value in costs[name].values]
+    total, attrs, first = costs.sizes["case"], costs.attrs, costs.isel(case=0)
+    seconds = float(f"{attrs['wall_time']:.2g}")
     threads = f"{counted(attrs['threads'], 'thread')} on large grids"
-    each = " per case" if total > 1 else ""
-    steps = "Speeds" if all(str(model).endswith("steady sliding") for model in costs["model"].values) else "Steps"
-    whole = [
+    grids = [f"{x} x {y} cells" for x, y in zip(costs.cells_x.values, costs.cells_y.values, strict=True)]
+    rows = [
         ("Cases", f"{total}, {attrs['processes']} in parallel, each with {threads}" if total > 1 else f"1, {threads}"),
         ("Model", _distinct(costs["model"].values)),
         ("Program", _distinct(costs["note"].values)),
-        (
-            "Grid",
-            _distinct(f"{x} x {y} cells" for x, y in zip(costs.cells_x.values, costs.cells_y.values, strict=True)),
-        ),
-        ("Largest nominal pressure", _span(costs["nominal_pressure"], "Pa")),
-        ("Contact", _span(100 * costs["contact_fraction"], "", " % of the area")),
-        (f"{steps}{each}", _span(costs["steps"], "")),
-        (f"Convolutions{each}", _span(costs["convolutions"], "")),
-        (f"Wall time{each}", _span(costs["wall_time"], "s")),
-        ("Wall time, all cases", f"about {readable(attrs['wall_time'], 's')}" if total > 1 else ""),
+        ("Grid", _distinct(grids)),
+    ]
+    if total == 1:
+        rows += [
+            ("Largest nominal pressure", f"about {_text(first['nominal_pressure'])}"),
+            ("Contact", f"about {100 * float(first['contact_fraction']):.2g} % of the area"),
+            ("Steps or speeds", f"about {_text(first['steps'])}"),
+            ("Convolutions", f"about {_text(first['convolutions'])}"),
+        ]
+    rows += [
+        ("Wall time", f"about {readable(seconds, 's')}"),
         ("Memory", f"{amount(attrs['memory'])} of {amount(attrs['free_memory'])} free"),
         ("Disk", f"{amount(attrs['disk'])} of {amount(attrs['free_disk'])} free"),
-        ("Estimated from", f"coarse runs of {own} of {total} cases" if total > 1 else "a coarse run"),
     ]
-    parts: list[Any] = [two_columns([row for row in whole if row[1]], attrs.get("title"))]
+    parts: list[Any] = [two_columns([row for row in rows if row[1]], attrs.get("title"))]
     for text in dict.fromkeys(costs["warning"].values):
         if text:
             warned = int((costs["warning"] == text).sum())
@@ -59,7 +61,7 @@ def plan_tables(costs: xr.Dataset) -> Group:
             parts.append(Text(f"Warning: {text}{several}", style="bold red"))
     if total > 1:
         parts += [Text(), _case_table(costs.isel(case=slice(_LISTED)), total)]
-    if own < total:
+    if not costs["marched"].all():
         parts.append(Text("~ Estimated from the coarse run of the most similar case.", style="italic"))
     return Group(*parts)
 
@@ -68,16 +70,6 @@ def _distinct(texts: Any) -> str:
     """Return the first three distinct texts, and the number of further texts."""
     found = [one for one in dict.fromkeys(str(text).rstrip(".") for text in texts) if one]
     return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
-
-
-def _span(values: xr.DataArray, unit: str, after: str = "") -> str:
-    """Return the range of the known values and, if some are unknown, their number; empty if none is known."""
-    known = values.values[np.isfinite(values.values)]
-    ends = [f"{float(f'{one:.2g}'):g}" if not unit else readable(float(one), unit) for one in known]
-    ends = list(dict.fromkeys(ends[i] for i in (known.argmin(), known.argmax()))) if known.size else []
-    if known.size < values.size:
-        after += f" in {known.size} of {values.size} cases"
-    return f"about {' to '.join(ends)}{after}" if ends else ""
 
 
 def _case_table(costs: xr.Dataset, total: int) -> Table:
@@ -93,13 +85,13 @@ def _case_table(costs: xr.Dataset, total: int) -> Table:
     varied = [str(name) for name in costs.coords if name != "case_key"]
     last = [key.rpartition(".")[2] for key in varied]
     table = Table(box=None, pad_edge=False)
-    for name, short in zip([*varied, *_COSTS], [*last, *_COSTS], strict=True):
+    for name, short in zip([*varied, *_COLUMNS], [*last, *_COLUMNS], strict=True):
         heading = short if last.count(short) <= 1 else name
         table.add_column(Text(heading.replace("_", " ")), justify="right", overflow="fold")
     for i in range(costs.sizes["case"]):
         row = costs.isel(case=i)
         mark = "" if row["marched"] else "~"
-        cells = ["cannot run"] if row["refusal"] != "" else [mark + _text(row[name]) for name in _COSTS]
+        cells = ["cannot run"] if row["refusal"] != "" else [mark + _text(row[name]) for name in _COLUMNS]
         table.add_row(*(Text(_text(row[key])) for key in varied), *cells)
     if total > _LISTED:
         table.add_row(f"and {total - _LISTED} more")
@@ -107,9 +99,11 @@ def _case_table(costs: xr.Dataset, total: int) -> Table:
 
 
 def _text(value: xr.DataArray) -> str:
-    """Return a value with a suitable unit."""
+    """Return a value with a suitable unit, or a text; empty if it is not known."""
     if value.dtype.kind not in "iuf":
         return str(value.values)
     if value.attrs.get("units") == "byte":
         return amount(float(value))
+    if np.isnan(value):
+        return ""
     return "half-space" if value == math.inf else readable(float(value), str(value.attrs.get("units", "")))

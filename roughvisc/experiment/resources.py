@@ -204,17 +204,16 @@ def require_loading(
     Raises
     ------
     TooLargeError
-        If it does not fit. The message gives the needed and the available memory, and cases that fit.
+        If it does not fit. The message gives the needed and the available memory, and a grid that fits.
     """
     if math.prod(shape) < WORTH_ASKING:
         return
     memory, rows = memory_of(body, program, settings).memory, least_rows(settings, program)
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
-    in_file = partial(march_bytes, settings, memory, rows=rows, part=part)
-    if settings.device == "gpu":  # kept fields are on the host
-        in_memory = False
-    require_memory(shape, partial(in_file, in_memory=in_memory), in_file, settings.device)
+    in_memory = in_memory and settings.device == "cpu"  # kept fields are on the host
+    needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
+    require_memory(shape, needed, settings.device)
 
 
 def require_surface(shape: Any) -> None:
@@ -222,30 +221,20 @@ def require_surface(shape: Any) -> None:
     require_memory(counts("shape", shape), lambda cells: 8.0 * _MADE * cells)
 
 
-def require_memory(
-    shape: tuple[int, int],
-    needed: Callable[[float], float],
-    in_file: Callable[[float], float] | None = None,
-    device: str = "cpu",
-) -> None:
+def require_memory(shape: tuple[int, int], needed: Callable[[float], float], device: str = "cpu") -> None:
     """Check that a case fits in the available memory of a device; see :func:`too_large` for the parameters.
 
     Raises
     ------
     TooLargeError
-        If it does not fit. The message gives the needed and the available memory, and cases that fit.
+        If it does not fit. The message gives the needed and the available memory, and a grid that fits.
     """
-    if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(device), in_file)):
+    if math.prod(shape) >= WORTH_ASKING and (why := too_large(shape, needed, memory_available(device))):
         raise TooLargeError(why)
 
 
-def too_large(
-    shape: tuple[int, int],
-    needed: Callable[[float], float],
-    there: Available,
-    in_file: Callable[[float], float] | None = None,
-) -> str:
-    """Return a message that a case does not fit in memory, with cases that would; empty if it fits.
+def too_large(shape: tuple[int, int], needed: Callable[[float], float], there: Available) -> str:
+    """Return a message that a case does not fit in memory, with a grid that would; empty if it fits.
 
     Parameters
     ----------
@@ -255,26 +244,19 @@ def too_large(
         Needed memory by the number of cells. [byte]
     there : Available
         Available memory.
-    in_file : callable, optional
-        Needed memory by the number of cells if the fields go to a file. [byte]
     """
-    cells, advice = math.prod(shape), []
-    if there.fits(needed(cells)):
+    size = needed(math.prod(shape))
+    if there.fits(size):
         return ""
+    fitting = "expected more memory, or a coarser grid"
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
         few = [math.ceil(count / stride) for count in shape]
-        size = needed(math.prod(few))
-        if there.fits(size):
-            wanted = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(size)}"
-            advice.append(f"{wanted} (resample = {few} under [surface], rv.resample in Python)")
+        if there.fits(needed(math.prod(few))):
+            less = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(needed(math.prod(few)))}"
+            fitting = f"what would fit: {less} (resample = {few} under [surface], rv.resample in Python)"
             break
-    if in_file is not None and there.fits(in_file(cells)):
-        advice.append("rv.run, which keeps the fields in a file")
-    fitting = f"what would fit: {'; or '.join(advice)}" if advice else "expected more memory, or a coarser grid"
-    return (
-        f"{shape[0]} x {shape[1]} cells need about {amount(needed(cells))} of memory, and "
-        f"{amount(there.size)} are {there.words}: {fitting}"
-    )
+    lacking = f"{shape[0]} x {shape[1]} cells need about {amount(size)} of memory, and {amount(there.size)}"
+    return f"{lacking} are {there.words}: {fitting}"
 
 
 def amount(size: float) -> str:

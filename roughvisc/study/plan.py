@@ -54,24 +54,10 @@ from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import unit_for
 from roughvisc.variables import STEPPED
 
-#: Variable of a plan -> unit and long name.
-COLUMNS = {
-    "model": ("", "boundary, memory of the material, and part of the surface that is solved on"),
-    "cells_x": ("1", "cells along x"),
-    "cells_y": ("1", "cells along y"),
-    "steps": ("1", "time steps, or speeds of a friction curve"),
-    "rows": ("1", "kept times or speeds"),
-    "contact_fraction": ("1", "largest contact fraction, if the case had a coarse run"),
-    "nominal_pressure": ("Pa", "largest force over nominal area, if it is prescribed or the case had a coarse run"),
-    "convolutions": ("1", "convolutions, one forward and one inverse transform each"),
-    "wall_time": ("s", "wall time in one process with one thread"),
-    "memory": ("byte", "memory of the process at its peak"),
-    "disk": ("byte", "size of the result"),
-    "marched": ("", "whether the numbers are from a coarse run of this case, and not of the most similar case"),
-    "note": ("", "how a measured history became segments, and times that are left out"),
-    "warning": ("", "expected full contact, or contact at the border, which ends a run; empty if none"),
-    "refusal": ("", "why it cannot run; empty if it can"),
-}
+#: Numbers of a plan -> unit; texts of a plan.
+UNITS = dict.fromkeys(("cells_x", "cells_y", "steps", "rows", "contact_fraction", "convolutions"), "1")
+UNITS |= {"nominal_pressure": "Pa", "wall_time": "s", "memory": "byte", "disk": "byte"}
+TEXTS = ("model", "note", "warning", "refusal")
 #: Longest side of the grid of a coarse run, of a loading and of a friction curve. [cells]
 _COARSE, _COARSE_CURVE = 128, 48
 #: Exponents with which steps, and convolutions of loadings and of friction curves, grow with the number of cells a
@@ -122,6 +108,14 @@ def plan(
     -------
     xarray.Dataset
         One row per case along ``case``, with varied parameters as coordinates.
+
+        ``model``: boundary, memory of the material, and the part of the surface that is solved on. ``steps``, or
+        speeds of a friction curve; ``rows``, the kept ones; ``convolutions``, of one forward and one inverse transform
+        each; ``wall_time`` in one process with one thread [s]; ``memory`` of the process at its peak and ``disk``, the
+        size of the result [byte]; the largest ``contact_fraction`` and ``nominal_pressure`` [Pa], if the case had a
+        coarse run. ``marched``: whether it had, or the numbers are from the most similar case. ``note``: how a measured
+        history became segments, and times that are left out. ``warning``: expected full contact, or contact at the
+        border, which ends a run. ``refusal``: why it cannot run.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
         thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, and
         ``refusal``, empty if all cases can run.
@@ -152,7 +146,7 @@ def plan(
     began, expected = time.thread_time(), 0.0
     for number in sorted(range(len(cases)), key=lambda one: f"{one:b}"[::-1]):  # spread over the sweep: 0, 4, 2, 1, 3
         case, is_own = cases[number], not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)
-        row = {name: np.nan if unit else "" for name, (unit, _) in COLUMNS.items()} | {"marched": is_own}
+        row = dict.fromkeys(UNITS, np.nan) | dict.fromkeys(TEXTS, "") | {"marched": is_own}
         # surfaces that differ only in their seed have equal costs
         surface = json.dumps({**stated[number]["surface"], "seed": None}, sort_keys=True)
         try:
@@ -173,16 +167,15 @@ def plan(
             }
             row |= _costs(case, own, runs[min(runs, key=differing.__getitem__)], seconds, there)
             if not is_own:
-                pressure = prescribed_pressure(case, nominal_area(height))
-                row |= {"contact_fraction": np.nan, "nominal_pressure": pressure}
+                row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
         except (InputError, ConvergenceError) as error:
             row["refusal"] = str(error)
         rows[number] = row
-    dataset = xr.Dataset({name: ("case", np.array([rows[i][name] for i in range(len(cases))])) for name in COLUMNS})
-    for name, (units, long_name) in COLUMNS.items():
-        dataset[name].attrs = {"long_name": long_name} | ({"units": units} if units else {})
+    columns = {name: ("case", [row[name] for row in rows]) for name in (*UNITS, *TEXTS, "marched")}
+    dataset = xr.Dataset(columns, {"case_key": ("case", [case.key for case in cases])})
+    for name, unit in UNITS.items():
+        dataset[name].attrs["units"] = unit
     labels = labels_of(parameters, stated[0], ("case",)).values()
-    dataset = dataset.assign_coords(case_key=("case", np.array([case.key for case in cases])))
     dataset = dataset.assign_coords(dict(zip(parameters, labels, strict=True)))
     return dataset.assign_attrs({"title": cases[0].title} | totals(dataset, folder, workers, there))
 
@@ -327,16 +320,15 @@ def solved(rows: Rows) -> xr.DataArray:
 def coarse_surface(rows: Rows) -> xr.DataArray:
     """Return the heights of the solved grid on few cells, with the waves that these cells resolve. [m]"""
     height = solved(rows)
-    shape = height.sizes["x"], height.sizes["y"]
-    factor = max(shape) / (_COARSE if isinstance(rows, LoadingRows) else _COARSE_CURVE)
+    factor = max(height.shape) / (_COARSE if isinstance(rows, LoadingRows) else _COARSE_CURVE)
     if factor <= 1:
         return height
-    sides = [count * side for count, side in zip(shape, spacing(height), strict=True)]
-    few = remade(rows.problem.height, coarser_shape(shape, factor, same_parity=True), (sides[0], sides[1]))
+    sides = height.sizes["x"] * spacing(height)[0], height.sizes["y"] * spacing(height)[1]
+    few = remade(rows.problem.height, coarser_shape(height.shape, factor, same_parity=True), sides)
     if few is not None:
         return few
     if np.isfinite(height.values).all():
-        return on_fewer_cells(height, coarser_shape(shape, factor, False), rows.problem.settings.boundary)
+        return on_fewer_cells(height, coarser_shape(height.shape, factor, False), rows.problem.settings.boundary)
     stride = math.ceil(factor)
     return height.isel(x=slice(stride // 2, None, stride), y=slice(stride // 2, None, stride))
 
@@ -344,7 +336,7 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
 def _part_done(program: Program, now: float) -> float:
     """Return the part of the steps before a time [s] over all steps of a program, without slides. [-]
 
-    The steps of a hold are shorter at its start, and a cycle has eight ramps per period.
+    The steps of a hold are shorter at its start, and a cycle has two ramps per period.
     """
     done = total = 0.0
     for began, segment in zip(program.corners, program.segments, strict=False):
@@ -352,7 +344,7 @@ def _part_done(program: Program, now: float) -> float:
             continue
         part, weight = min(max(now - began, 0.0) / segment.duration, 1.0), 1.0
         if segment.amplitude:
-            weight = 8 * segment.duration / segment.period
+            weight = 2 * segment.duration / segment.period
         elif segment.holds:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
         done, total = done + part * weight, total + weight
@@ -391,23 +383,6 @@ def timed_convolution(rows: Rows, touching: float) -> float:
 
 
 # ---------------------------------------------------------------------------------------------------------------- rows
-
-
-def prescribed_pressure(case: Case, area: float) -> float:
-    """Return the largest nominal pressure of a case; NaN if it follows from a prescribed approach. [Pa]
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    area : float
-        Nominal area. [m2]
-    """
-    if isinstance(curve := case.experiment, SteadySliding):
-        return curve.pressure if curve.load is None else curve.load / area
-    program = case.program.on_area(area)
-    moves = any(one.control == "approach" and not one.holds for one in program.segments)
-    return math.nan if moves else program.largest_load / area
 
 
 def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Available) -> dict[str, Any]:
@@ -451,10 +426,9 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     fraction, warning = float(run.contact[-1]) * part, ""
     if isinstance(own, LoadingRows) and own.reaches_border:
         warning = (
-            "Contact is expected to reach the border of the free-space domain of {} x {} cells, which ends a run: use "
-            "boundary = 'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = 'accept' to "
-            "treat the scan outline as a punch."
-        ).format(*own.scene.gap.shape)
+            "Contact is expected to reach the border of the free-space domain, which ends a run: use boundary = "
+            "'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = 'accept'."
+        )
     elif fraction >= _FULL:
         warning = f"Full contact is expected: {100 * fraction:.0f} % of the area."
     return {

@@ -159,32 +159,11 @@ def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
     assert list(planned.marched.values) == [True, False]
     assert float(planned.steps[0]) == float(planned.steps[1])
     assert list(np.isfinite(planned.contact_fraction.values)) == [True, False]
-    assert float(planned.nominal_pressure[1]) == pytest.approx(2 * float(planned.nominal_pressure[0]), rel=1e-3)
-    steps = f"{float(planned.steps[0]):.0f}"
+    steps = f"{float(f'{float(planned.steps[0]):.2g}'):g}"
     status, out, _ = invoke("plan", tmp_path / "study.toml")
     assert status == 0
-    assert re.findall(r"([12]0) mN +(~?\d+)", out) == [("10", steps), ("20", f"~{steps}")]
-    (contact,) = (line for line in out.splitlines() if line.startswith("Contact"))
-    assert "1 of 2 cases" in contact
+    assert re.findall(r"([12]0) mN +[\d.]* *~? +(~?\d+)", out) == [("10", steps), ("20", f"~{steps}")]
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"], "nothing is written"
-
-
-@pytest.mark.parametrize(
-    ("changes", "pressure"),
-    [
-        ({"program": [{"pressure": 3e4, "over": 0.1}, {"hold": 1.0, "control": "approach"}]}, 3e4),
-        ({"program": [RAMP, {"approach": 1e-6, "over": 0.1}]}, np.nan),
-        (CYCLE, 3e4),
-    ],
-    ids=["pressure", "approach", "cycle"],
-)
-def test_nominal_pressure__is_known_without_a_run_unless_the_approach_is_prescribed(study, changes, pressure):
-    area = 1e-6
-    assert plan_module.prescribed_pressure(study(ROUGH, changes), area) == pytest.approx(pressure, nan_ok=True)
-    curve = study(CURVE)
-    assert plan_module.prescribed_pressure(curve, area) == 2e4
-    by_load = vary(curve, {"friction.pressure": None, "friction.load": "5 mN"})
-    assert plan_module.prescribed_pressure(by_load, area) == pytest.approx(5e3)
 
 
 def test_full_contact__is_foreseen(study):
