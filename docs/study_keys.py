@@ -16,6 +16,7 @@ from roughvisc.mechanics.materials.creep import stiffened
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
+from roughvisc.study.machine_history import read_history
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
@@ -155,7 +156,7 @@ TABLES = {
     **{f"program: {kind}": ("program.0", {}) for kind in PROGRAMS},
     "program.cycle": ("program.0.cycle", _all(Program.cycle, "control")),
     "program.table": ("program.0.table", _all(Program.table, "control", "note")),
-    "program.table: a file": ("program.0.table", _all(rv.read_program, skipped=1)),
+    "program.table: a file": ("program.0.table", _all(read_history, skipped=1)),
     "friction": ("friction", _all(SteadySliding)),
     "friction.speeds": ("friction.speeds", {}),
     "solve": ("solve", _of(Settings, *_SETTINGS)),

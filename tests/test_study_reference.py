@@ -11,6 +11,7 @@ from roughvisc.arguments import arguments
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.settings import Settings
+from roughvisc.study.machine_history import read_history
 from roughvisc.study.study_file import COLUMNS, GEOMETRY, PROGRAMS, SEGMENTS, TABLES, TEMPERATURE
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.synthesis import RECIPES
@@ -62,7 +63,7 @@ EXPECTED = {
     **{(f"program: {kind}",): {kind, "control"} for kind in PROGRAMS},
     ("program.cycle",): keys_of(rv.Program.cycle) - {"control"},
     ("program.table",): keys_of(rv.Program.table) - {"control"},
-    ("program.table: a file",): {"file", *keys_of(rv.read_program, 1)},
+    ("program.table: a file",): {"file", *keys_of(read_history, 1)},
     ("friction",): keys_of(SteadySliding),
     ("solve", "keep"): keys_of(Settings) - {"missing"} | {"precision"},
     ("observe.leakage",): keys_of(rv.observables.leakage, 1),

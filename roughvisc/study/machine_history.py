@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,42 +20,15 @@ Array = NDArray[np.float64]
 _NOISE = 0.01
 
 
-class History(NamedTuple):
-    """Recorded history.
-
-    Attributes
-    ----------
-    control : {"load", "approach", "pressure"}
-        Prescribed quantity.
-    times, values : list of float
-        Times from zero [s], and values [N, m or Pa].
-    note : str
-        Numbers of rows and segments, and the noise that was set to zero.
-    """
-
-    control: Control
-    times: list[float]
-    values: list[float]
-    note: str
-
-
-def read_program(
-    path: str | Path,
-    *,
-    time: str = "time",
-    load: str | None = None,
-    approach: str | None = None,
-    pressure: str | None = None,
-    zero: float | str = 0.0,
-    factor: float = 1.0,
-    thin: float | str = "0.1 %",
-) -> Program:
+def read_program(path: str | Path, **columns: Any) -> Program:
     """Read a program from a table of a test machine: force, motion or nominal pressure against time.
 
     Parameters
     ----------
     path : path
         A text file; see Notes.
+    **columns
+        The arguments below.
     time : str
         Name of the time column. The time of the first row becomes zero.
     load, approach, pressure : str, optional
@@ -85,10 +58,8 @@ def read_program(
     names; lines above it are skipped. Upper and lower case do not matter. The unit is in the heading, as
     ``Force [mN]`` or ``Force (mN)``, or in the name given here. Two rows at the same time are a jump.
     """
-    found = read_history(
-        path, time=time, load=load, approach=approach, pressure=pressure, zero=zero, factor=factor, thin=thin
-    )
-    return Program.table(found.times, found.values, found.control, found.note)
+    control, times, values, note = read_history(path, **columns)
+    return Program.table(times, values, control, note)
 
 
 def read_history(
@@ -101,8 +72,8 @@ def read_history(
     zero: float | str = 0.0,
     factor: float = 1.0,
     thin: float | str = "0.1 %",
-) -> History:
-    """Read the rows of :func:`read_program`, which has the same arguments."""
+) -> tuple[Control, list[float], list[float], str]:
+    """Return the control, times from zero [s], values [N, m or Pa] and note of a table; see :func:`read_program`."""
     columns: dict[Control, str | None] = {"load": load, "approach": approach, "pressure": pressure}
     chosen = {control: name for control, name in columns.items() if name is not None} or {"load": "load"}
     if len(chosen) > 1:
@@ -141,7 +112,7 @@ def read_history(
     lead = f"{Path(path).name}: {len(times):,} rows became {len(kept) - (values[0] == 0):,} segments"
     if tolerance:
         lead += f", which pass every row within {tolerance:.3g} {unit}"
-    return History(control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *notes]) + ".")
+    return control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *notes]) + "."
 
 
 def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:

@@ -156,9 +156,8 @@ def with_rows(where: str, stated: Any, folder: Path | None) -> Any:
         expected = "the name of a column in its place, such as approach = 'Displacement'"
         raise InputError(key=f"{where}.control", found=stated["control"], expected=expected)
     path = existing_file(f"{where}.file", file, folder)
-    history = call(read_history, where, columns, path)
-    rows = {"times": history.times, "values": history.values, "note": history.note}
-    return {**stated, "table": rows, "control": history.control}
+    control, times, values, note = call(read_history, where, columns, path)
+    return {**stated, "table": {"times": times, "values": values, "note": note}, "control": control}
 
 
 def speeds_of(where: str, stated: Any) -> list[float]:

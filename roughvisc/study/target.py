@@ -19,7 +19,6 @@ import xarray as xr
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.settings import Settings
 from roughvisc.study import neighbours
 from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
@@ -150,8 +149,6 @@ def choose(
     height, smallest = case.height(), min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
-    if case.settings.tolerance < Settings.tolerance:  # the user has chosen a small tolerance
-        tolerance = min(tolerance, case.settings.tolerance)
     axis, places = case.experiment.axis, case.settings.times if isinstance(case.settings.times, tuple) else None
     if places is None and axis == "time":
         places = case.program.corners
@@ -205,7 +202,7 @@ def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
 def _refuse_missed(
     case: Case, targets: Mapping[str, float], budgets: Mapping[str, xr.Dataset], sources: Sequence[str], cells: str
 ) -> None:
-    """Refuse the first target that is below the error by some sources; name them, and what would reduce the largest."""
+    """Refuse the first target below the error by some sources; name the largest one, and what would reduce it."""
     for name, budget in budgets.items():
         wanted, error = math.log1p(targets[name]), error_of(budget, sources)
         if error <= _ROUNDING * wanted:
@@ -214,12 +211,13 @@ def _refuse_missed(
             raise InputError(key=name, found="zero, or less, which has no relative error", expected="another number")
         parts = {one: error_of(budget, [one]) for one in sources if one in budget["source"]}
         largest = max(parts, key=parts.__getitem__)
-        reached = f"its error on {cells} is {_percent(error, 3)}: more than the target of {_percent(wanted)}"
-        lines = [f"{reached}; {_REMEDIES[largest]} would reduce it"]
-        lines += [f"  {one}: {_percent(part)}" for one, part in parts.items() if part > 0.1 * wanted]
-        lines += [f"  open, and not counted: {budget.attrs['open']}"] if budget.attrs["open"] else []
         where = f"{case.origin}: " if case.origin else ""
-        raise InputError(f"{where}{name}: " + "\n".join(lines), key=name, found=targets[name])
+        raise InputError(
+            f"{where}{name}: its error on {cells} is {_percent(error, 3)}: more than the target of {_percent(wanted)}; "
+            f"the largest part is {largest}, {_percent(parts[largest])}: {_REMEDIES[largest]} would reduce it",
+            key=name,
+            found=targets[name],
+        )
 
 
 def _percent(half_width: float, digits: int = 2) -> str:

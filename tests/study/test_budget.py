@@ -233,7 +233,7 @@ def test_choice__is_a_case_like_any_other(tmp_path, monkeypatch):
 def test_floor__above_the_wanted_error_is_refused_before_fine_grids_are_solved(tmp_path):
     with refused("approach", 0.01) as error:
         got(case(BALL, tmp_path), tmp_path, {"approach": "1 %", "modulus_error": "10 %"})
-    assert "modulus: " in str(error.value)
+    assert "modulus, " in str(error.value)
     assert sorted(path.name for path in (tmp_path / "results").iterdir()) == ["budget"]
 
 
