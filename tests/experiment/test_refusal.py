@@ -15,7 +15,6 @@ from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
 from roughvisc.study.case import read_cases
-from roughvisc.study.execution import cluster as side_module
 
 PRESS = rv.Program().pressure(6e3, over=0.01)
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")
@@ -26,8 +25,7 @@ def limited(monkeypatch):
     """Sets how much memory there is."""
 
     def limit(size, words="free in this machine"):
-        for module in (resources, side_module):
-            monkeypatch.setattr(module, "memory_available", lambda device="cpu": Available(size, words))
+        monkeypatch.setattr(resources, "memory_available", lambda device="cpu": Available(size, words))
 
     return limit
 
@@ -64,11 +62,6 @@ def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):
     results = rv.sweep(cases, tmp_path / "out", workers=0, progress=False)
     assert results.sizes["case"] == 1
     assert not list((tmp_path / "out").glob("*.failed.json")), "it may fit elsewhere"
-    limited(1e12)
-    assert side_module.side_by_side(cases, 4) == 4
-    limited(500e6)
-    assert side_module.side_by_side([cases[0]] * 4, 4) == 1
-    assert side_module.threads_each(1) == cores()
 
 
 # ----------------------------------------------------------------------------------------------------------------

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import metadata
@@ -14,20 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.resources import (
-    PART,
-    PROCESS,
-    WORTH_ASKING,
-    cores,
-    curve_bytes,
-    least_rows,
-    march_bytes,
-    memory_available,
-)
-from roughvisc.experiment.rows import memory_of
-from roughvisc.study.case import Case
-from roughvisc.topography.grid import counts
+from roughvisc.experiment.resources import PART, PROCESS, cores
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -151,38 +136,6 @@ def processes_that_fit(largest: float, most: int, free: float) -> int:
     (3, 1)
     """
     return max(1, min(most, int(PART * free / max(largest, PROCESS))))
-
-
-def side_by_side(cases: Sequence[Case], most: int) -> int:
-    """Return the number of processes for some cases on this machine: `most`, or fewer if the memory is too small."""
-    cells, largest = dict[str, float](), PROCESS
-    for case in cases:
-        surface = json.dumps(case.surface, sort_keys=True)
-        if surface not in cells:
-            cells[surface] = _cells(case)
-        if cells[surface] < WORTH_ASKING:
-            continue
-        settings, experiment = case.settings, case.experiment
-        if isinstance(experiment, Loading):
-            program = experiment.program
-            memory = memory_of(case.body, program, settings).memory
-            size = march_bytes(settings, memory, cells[surface], rows=least_rows(settings, program))
-        else:
-            size = curve_bytes(settings, cells[surface])
-        largest = max(largest, PROCESS + size)
-    return processes_that_fit(largest, most, memory_available().size) if largest > PROCESS else most
-
-
-def _cells(case: Case) -> float:
-    """Return the number of cells of a surface; zero if the surface is small or cannot be read."""
-    resample = case.surface.get("resample") or None
-    stated = resample["shape"] if isinstance(resample, Mapping) else resample or case.surface.get("shape")
-    if stated is not None:
-        return math.prod(counts("shape", stated))
-    with suppress(OSError, ValueError):  # the run of the case reports the error
-        if Path(case.surface.get("file", "")).stat().st_size >= WORTH_ASKING:  # a file has at least a byte per cell
-            return case.height().size
-    return 0.0
 
 
 def threads_each(processes: int) -> int:

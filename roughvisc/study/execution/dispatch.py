@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import concurrent.futures
 import logging
+import math
 import secrets
 import signal
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
@@ -22,13 +23,12 @@ from distributed.core import Status
 
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import Case
-from roughvisc.study.execution.run import Outcome, attempt
+from roughvisc.study.execution.display import Display
+from roughvisc.study.execution.run import IN_USE, Outcome, attempt
 from roughvisc.study.storage.folder import lock_path
 
 if TYPE_CHECKING:
     from distributed import Future, Worker
-
-    from roughvisc.study.execution.sweep import Record
 
 log = logging.getLogger("roughvisc")
 
@@ -38,6 +38,11 @@ _REPORT_EVERY = 0.5
 _PATIENCE = 120.0
 #: Time without any worker after which the sweep displays a warning. [s]
 _ALONE_AFTER = 30.0
+_ALONE = (
+    "there has been no worker for a while (%d cases to go): start workers (dask worker), or check whether their "
+    "jobs are queued (squeue). The cases start as soon as one joins. Ctrl-C ends the sweep; the same command resumes it"
+)
+_LOST = "the scheduler was lost: finished results are kept; repeat the command to resume"
 #: States of a worker that closes, after a signal or at the end of its lifetime.
 _LEAVING = (Status.closing_gracefully, Status.closing, Status.closed)
 #: A worker computes one case at a time, with all its threads.
@@ -45,16 +50,24 @@ _one_at_a_time = threading.Lock()
 
 
 def distribute(
-    texts: Mapping[str, str], record: Record, client: Client, threads: int | None, *, own: bool = False
-) -> None:
-    """Compute cases on the workers of a client.
+    texts: Mapping[str, str],
+    folder: Path,
+    display: Display,
+    client: Client,
+    threads: int | None,
+    *,
+    own: bool = False,
+) -> Iterator[Outcome]:
+    """Compute cases on the workers of a client and yield their outcomes.
 
     Parameters
     ----------
     texts : dict
         Key -> case as JSON.
-    record : Record
-        Record of the sweep, whose folder contains the results.
+    folder : Path
+        Results folder, absolute.
+    display : Display
+        Display of the sweep.
     client : distributed.Client
         Client of the workers.
     threads : int or None
@@ -66,22 +79,20 @@ def distribute(
     ------
     RoughviscError
         If the scheduler was lost.
-    OSError
-        If the disk is full.
-    KeyboardInterrupt, SystemExit
+    KeyboardInterrupt, SystemExit, GeneratorExit
         If interrupted. Running cases write a checkpoint first, unless their workers were lost.
     """
     name = f"roughvisc-{secrets.token_hex(4)}"
-    stop_file = record.folder / f".{name}.stop"
+    stop_file = folder / f".{name}.part.stop"
+    settings = {"folder": str(folder), "stop_file": str(stop_file), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
     workers: dict[str, list[str]] = {key: [] for key in texts}  # in the order in which they began each case
     number, taken_over = count(), set[str]()
-    finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
+    finished = as_completed([], loop=client.loop)
 
     def submit(keys: Sequence[str]) -> None:
-        names, json = [f"{name}-{key}-{next(number)}" for key in keys], [texts[key] for key in keys]
-        settings = {"folder": str(record.folder), "name": name, "threads": threads, "own": own}
-        new = client.map(on_worker, json, keys, key=names, pure=False, **settings)
+        names = [f"{name}-{key}-{next(number)}" for key in keys]
+        new = client.map(on_worker, [texts[key] for key in keys], keys, key=names, pure=False, **settings)
         futures.update(zip(new, keys, strict=True))
         finished.update(new)
 
@@ -90,53 +101,45 @@ def distribute(
         if not end:
             if workers[key]:
                 log.info("%s: worker %s has gone, resumes on %s", key, workers[key][-1], worker)
-                record.display.say(f"worker {workers[key][-1]} has gone; the case resumes on {worker}", key)
+                display.say(f"worker {workers[key][-1]} has gone; the case resumes on {worker}", key)
             workers[key].append(worker)
-        record.display.reached(key, now, end)
+        display.reached(key, now, end)
 
     client.subscribe_topic(name, heard)
-    seen, said = time.monotonic(), False
+    alone_since = time.monotonic()
     try:
         submit(list(texts))
         while futures:
-            for future, found in finished.next_batch(block=False):
+            for future in finished.next_batch(block=False):
                 key = futures.pop(future)
-                outcome = _outcome(key, found)
-                if outcome.error == "BlockingIOError" and len(workers[key]) > 1 and key not in taken_over:
+                outcome = _outcome(key, future)
+                if outcome.error == IN_USE and len(workers[key]) > 1 and key not in taken_over:
                     taken_over.add(key)  # a lost worker of this sweep still holds the lock
-                    lock_path(record.folder, key).unlink(missing_ok=True)
+                    lock_path(folder, key).unlink(missing_ok=True)
                     submit([key])
                 elif outcome.kind != "interrupted":
-                    record.ended(outcome)
+                    yield outcome
                 elif client.status == "running":  # its worker closes, or another client has restarted the workers
                     submit([key])
                 else:
-                    raise ConnectionError
+                    raise RoughviscError(_LOST)
             time.sleep(0.1)
-            if not said and time.monotonic() - seen > _ALONE_AFTER:
-                seen = time.monotonic()
-                if said := not client.nthreads():
-                    remedy = (
-                        "they are started again; if they are lost repeatedly, use fewer of them (--workers)"
-                        if own
-                        else "start workers (dask worker), or check whether their jobs are queued (squeue); the cases "
-                        "start as soon as one joins"
-                    )
-                    record.warn(
-                        f"there has been no worker for a while ({len(futures)} cases to go): {remedy}. Ctrl-C ends "
-                        "the sweep; finished results are kept, and the same command resumes it"
-                    )
-    except (KeyboardInterrupt, SystemExit, OSError) as error:  # dask-jobqueue turns Ctrl-C into SystemExit
-        if isinstance(error, OSError) and client.status != "running":
-            lost = "the scheduler was lost: finished results are kept; repeat the command to resume"
-            raise RoughviscError(lost) from error
-        record.display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
+            if time.monotonic() - alone_since > _ALONE_AFTER:
+                alone_since = time.monotonic()
+                if not client.nthreads():
+                    alone_since = math.inf
+                    log.warning(_ALONE, len(futures))
+                    display.warn(_ALONE % len(futures))
+    except (KeyboardInterrupt, SystemExit, GeneratorExit):  # dask-jobqueue turns Ctrl-C into SystemExit
+        display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
         with suppress(OSError):  # a full disk, or a lost scheduler
             stop_file.touch()
             begun, until = [future for future, key in futures.items() if workers[key]], time.monotonic() + _PATIENCE
             while time.monotonic() < until and client.nthreads() and not all(future.done() for future in begun):
                 time.sleep(0.1)
         raise
+    except OSError as error:
+        raise RoughviscError(_LOST) from error
     finally:
         with suppress(OSError, RuntimeError, ValueError):  # the scheduler may be lost
             client.cancel(list(futures))
@@ -144,32 +147,35 @@ def distribute(
         stop_file.unlink(missing_ok=True)
 
 
-def _outcome(key: str, found: Any) -> Outcome:
-    """Return the outcome of a case from its future, which holds an outcome, an exception or ``sys.exc_info()``."""
-    if isinstance(found, Outcome):
-        return found
-    error = found[1] if isinstance(found, tuple) else found
-    if isinstance(error, CancelledError | concurrent.futures.CancelledError):
+def _outcome(key: str, future: Future[Outcome]) -> Outcome:
+    """Return the outcome of a case from its future."""
+    try:
+        return future.result()
+    except (CancelledError, concurrent.futures.CancelledError):
         return Outcome(key, "interrupted")
-    message = f"{type(error).__name__}: {error}"
-    if isinstance(error, KilledWorker):
+    except KilledWorker as error:
+        name, place = "KilledWorker", error.last_worker.address
         message = (
-            f"its worker was lost {error.allowed_failures + 1} times, the last at {error.last_worker.address}: killed, "
-            "out of memory (roughvisc plan says how much a case needs), or out of time; repeat the command to resume "
-            "from the last checkpoint"
+            f"its worker was lost {error.allowed_failures + 1} times, the last at {place}: killed, out of memory "
+            "(roughvisc plan says how much a case needs), or out of time; repeat the command to resume from the last "
+            "checkpoint"
         )
-    return Outcome(key, "hindered", message, type(error).__name__)
+    except Exception as error:  # noqa: BLE001  (such as a worker without roughvisc)
+        name, message = type(error).__name__, f"{type(error).__name__}: {error}"
+    return Outcome(key, "hindered", message, name)
 
 
-def on_worker(text: str, key: str, *, folder: str, name: str, threads: int | None, own: bool) -> Outcome:
+def on_worker(
+    text: str, key: str, *, folder: str, stop_file: str, name: str, threads: int | None, own: bool
+) -> Outcome:
     """Compute a case on a worker; the outcome of a stopped case is ``interrupted``, and it has a checkpoint.
 
     Parameters
     ----------
     text, key : str
         The case as JSON, and its key.
-    folder : str
-        Results folder, absolute.
+    folder, stop_file : str
+        Results folder, and the file that stops all cases, absolute.
     name : str
         Name of the sweep, the topic of its reports.
     threads : int or None
@@ -178,7 +184,7 @@ def on_worker(text: str, key: str, *, folder: str, name: str, threads: int | Non
         Whether the worker is a child process of the process of the sweep.
     """
     worker = get_worker()
-    task, stop_file, last = worker.get_current_task(), Path(folder, f".{name}.stop"), 0.0
+    task, last = worker.get_current_task(), 0.0
     worker.loop.add_callback(_take_signals, worker, own)
     if own and not log.handlers:
         log.addHandler(logging.NullHandler())  # the process of the sweep displays the warnings of the result
@@ -191,7 +197,7 @@ def on_worker(text: str, key: str, *, folder: str, name: str, threads: int | Non
 
     def stop() -> bool:
         state = worker.state.tasks.get(task)  # None or cancelled if the client has closed
-        return worker.status in _LEAVING or state is None or state.state == "cancelled" or stop_file.exists()
+        return worker.status in _LEAVING or state is None or state.state == "cancelled" or Path(stop_file).exists()
 
     with _one_at_a_time:
         if stop():

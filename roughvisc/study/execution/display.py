@@ -43,16 +43,13 @@ class Display:
         self._ended: dict[str, Outcome] = {}
         self._complaints, self._began = 0, time.monotonic()
 
-    def begin(self, cases: Sequence[Case], link: str = "") -> None:
-        """Show the cases, in the order of the study, and the address of Dask's dashboard."""
+    def begin(self, cases: Sequence[Case]) -> None:
+        """Show the cases, in the order of the study."""
         numbers = numbers_of(sweep_cases(cases))
-        for case in reversed(cases):
+        for case in cases:
             varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
-            shortened = varied if len(varied) <= 60 else f"{varied[:57]}..."
-            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({shortened})" if varied else "")
+            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:60]})" if varied else "")
             self._at[case.key] = case.experiment.progress
-        if link:
-            self._bars.say(f"Dashboard: {link}")
         self._bars.start()
         with self._lock:
             self._move()
@@ -76,8 +73,6 @@ class Display:
             self._complaints += 1
             if self._complaints <= _SHOWN:
                 self._bars.say(f"{self._names[outcome.key]}: {outcome.kind}: {outcome.message}")
-            elif self._complaints == _SHOWN + 1:
-                self._bars.say("further cases that end badly are counted here, and named in the log")
 
     def say(self, text: str, key: str = "") -> None:
         """Write a line; with `key` the name of this case comes first."""

@@ -30,6 +30,7 @@ from roughvisc.study.storage.folder import (
     lock_path,
     require_writable,
     result_path,
+    unusable,
 )
 from roughvisc.study.storage.index import Entry, read_entry
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
@@ -46,6 +47,8 @@ _IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scal
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
 #: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
+#: Errors of a case that another run computes, and of a full disk.
+IN_USE, FULL = errno.errorcode[errno.EWOULDBLOCK], ("ENOSPC", "EDQUOT")
 #: Errors that refuse the input of a case.
 REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 
@@ -165,17 +168,10 @@ def run_case(
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        every = {"seconds": checkpoint_seconds, "steps": checkpoint_steps}
         with (
             lock_case(lock_path(folder, case.key)),
-            closing(
-                CheckpointWriter(
-                    checkpoint_path(folder, case.key),
-                    case.key,
-                    seconds=checkpoint_seconds,
-                    steps=checkpoint_steps,
-                    stop=stop,
-                )
-            ) as keeper,
+            closing(CheckpointWriter(checkpoint_path(folder, case.key), case.key, stop=stop, **every)) as keeper,
         ):
             for torn in folder.glob(f".{case.key}.*.part.nc"):
                 torn.unlink()
@@ -248,14 +244,7 @@ def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
             log.warning("%s: is damaged: %s; it is renamed to %s and computed again", path, error.found, aside.name)
         return False
     if found != case.key:
-        expected = f"the result of case {case.key}, which its name says"
-        raise InputError(
-            f"{path}: holds the result of case {found}: expected {expected}",
-            key=str(path),
-            found=found,
-            expected=expected,
-            transient=True,
-        )
+        raise unusable(path, f"holds the result of case {found}", f"the result of case {case.key}, as its name says")
     return True
 
 
@@ -272,7 +261,7 @@ class Outcome:
     message : str
         Message to the user; empty if the case is done.
     error : str
-        Class name of the exception.
+        Class name of the exception, or name of a system error, such as ENOSPC.
     trace : str
         Traceback of an unexpected exception.
     seconds : float
@@ -281,8 +270,6 @@ class Outcome:
         Contents of the result file without the fields.
     reused : bool
         Whether an earlier run computed it.
-    disk_full : bool
-        Whether the disk was full.
     """
 
     key: str
@@ -293,7 +280,6 @@ class Outcome:
     seconds: float = 0.0
     entry: Entry | None = None
     reused: bool = False
-    disk_full: bool = False
 
 
 def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
@@ -304,22 +290,19 @@ def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
 
 def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:
     """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
-    began = time.perf_counter()
-
-    def ended(kind: Kind, message: str, error: Exception, **more: Any) -> Outcome:
-        return Outcome(case.key, kind, message, type(error).__name__, seconds=time.perf_counter() - began, **more)
-
+    began, kind, trace = time.perf_counter(), "hindered", ""
     try:
-        path = run_case(case, folder, progress=progress, **settings)
-        return replace(outcome_of(read_entry(path)), seconds=time.perf_counter() - began)
-    except RoughviscError as error:
-        return ended("hindered" if error.transient else "failed", str(error), error)
+        found = outcome_of(read_entry(run_case(case, folder, progress=progress, **settings)))
+        return replace(found, seconds=time.perf_counter() - began)
     except MemoryError as error:
-        advice = "roughvisc plan says how much a case needs, and fewer --workers leave more to each"
-        return ended("hindered", f"not enough memory; the last checkpoint is kept: {advice}", error)
+        name, advice = type(error).__name__, "roughvisc plan says how much a case needs, and fewer --workers leave more"
+        message = f"not enough memory; the last checkpoint is kept: {advice}"
     except OSError as error:  # for example a full disk, or another run of the case
-        place = f"{error.filename}: " if error.filename else ""
-        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        return ended("hindered", f"{place}{error.strerror or error}", error, disk_full=full)
+        name, place = errno.errorcode.get(error.errno or 0, "OSError"), f"{error.filename}: " if error.filename else ""
+        message = f"{place}{error.strerror or error}"
+    except RoughviscError as error:
+        name, message, kind = type(error).__name__, str(error), "hindered" if error.transient else "failed"
     except Exception as error:  # noqa: BLE001  (an unexpected error of one case must not stop the others)
-        return ended("failed", f"{type(error).__name__}: {error}", error, trace=traceback.format_exc())
+        name, message, kind, trace = type(error).__name__, str(error), "failed", traceback.format_exc()
+        message = f"{name}: {message}"
+    return Outcome(case.key, kind, message, name, trace, time.perf_counter() - began)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import errno
-import importlib.util
 import json
 import logging
-import time
-from collections.abc import Iterable, Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import closing, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,15 +15,9 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.labels import warnings_of
 from roughvisc.study.case import Case, program, read_cases
-from roughvisc.study.execution.cluster import (
-    default_client,
-    local_client,
-    require_same_version,
-    side_by_side,
-    threads_each,
-)
+from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each
 from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.run import REFUSED, Outcome, attempt, outcome_of, result_folder
+from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import (
     is_writable,
     log_file,
@@ -43,9 +35,6 @@ if TYPE_CHECKING:
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
-
-#: Time after which a running sweep writes its index and its table again. [s]
-_SAVE_EVERY = 60.0
 
 
 def sweep(
@@ -162,141 +151,99 @@ def run_cases(
     if writable:
         folder.mkdir(parents=True, exist_ok=True)
         clean_folder(folder)
+        write_sweep(folder, sweep_cases(cases))
     with log_file(folder) if writable else nullcontext():
-        index = index_of(folder) if folder.exists() else {}
-        outcomes: dict[str, Outcome] = {}
+        index, outcomes = index_of(folder), dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
             elif (failed := recorded_failure(folder, key)).get("source") == program() and not retry_failed:
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
+        log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         if todo:
             require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
-        if client is None and workers is None:
-            workers = side_by_side(list(todo.values()), min(cores(), len(todo))) if len(todo) > 1 else 0
-        log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        record = Record(folder, cases, outcomes, display)
+        display.begin(cases)
+        for outcome in outcomes.values():
+            display.ended(outcome)
         if not writable:
-            record.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
+            display.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
+        warned = set[str]()
         try:
-            _compute(todo, record, client, min(workers or 0, len(todo)), threads)
-            record.warn_of_cases(todo)
+            with closing(_computed(todo, folder, display, client, workers, threads)) as found:
+                for outcome in found:
+                    outcomes[outcome.key] = outcome
+                    _record(outcome, distinct[outcome.key], folder, alone=len(distinct) == 1)
+                    display.ended(outcome)
+                    for subject, text in warnings_of(outcome.entry.attributes).items() if outcome.entry else ():
+                        if subject not in ("accuracy", "speeds", *warned):  # the message states unsolved speeds
+                            warned.add(subject)
+                            display.say(f"{text} (The log names all cases with a warning.)", outcome.key)
+                    if outcome.error in FULL:  # further cases would also fail
+                        done = sum(one.entry is not None for one in outcomes.values())
+                        text = f"{outcome.message} ({done} of {len(distinct)} cases are finished)"
+                        raise OSError(errno.ENOSPC, text)
         except (KeyboardInterrupt, SystemExit, OSError) as error:
             reason = str(error) or type(error).__name__
             log.warning("interrupted after %d of %d cases: %s", len(outcomes), len(distinct), reason)
             raise
         finally:
-            record.save()
+            if writable:
+                index = index_of(folder, [outcome.entry for outcome in outcomes.values() if outcome.entry])
+                for key in [key for key, one in outcomes.items() if one.entry is None and key in index]:
+                    outcomes[key] = outcome_of(index[key], reused=True)  # another run has finished it
+                write_table(folder)
             display.close()
     return {key: outcomes[key] for key in distinct}
 
 
-def _compute(todo: dict[str, Case], record: Record, client: Client | None, processes: int, threads: int | None) -> None:
-    """Compute cases on the workers of a client, in some processes of a local cluster, or in this process."""
-    if todo and (client is not None or processes):
-        from roughvisc.study.execution.dispatch import distribute  # slow to import
-
-        texts = {key: case.to_json() for key, case in todo.items()}
-        if client is not None:
-            require_same_version(client)
-            record.begin(client.dashboard_link)
-            distribute(texts, record, client, threads)
-        else:
-            with local_client(processes) as own:
-                record.begin(own.dashboard_link if importlib.util.find_spec("bokeh") else "")
-                distribute(texts, record, own, threads or threads_each(processes), own=True)
+def _computed(
+    todo: dict[str, Case],
+    folder: Path,
+    display: Display,
+    client: Client | None,
+    workers: int | None,
+    threads: int | None,
+) -> Iterator[Outcome]:
+    """Compute cases on the workers of a client, in processes of a local cluster, or in this process."""
+    processes = min(cores() if workers is None else workers, len(todo))
+    if not todo or (client is None and (not processes or (workers is None and processes == 1))):
+        for key, case in todo.items():
+            display.reached(key, 0.0, 0.0)
+            yield attempt(case, folder, progress=partial(display.reached, key), threads=threads or cores())
         return
-    record.begin()
-    for key, case in todo.items():
-        progress = partial(record.display.reached, key)
-        record.ended(attempt(case, record.folder, progress=progress, threads=threads or cores()))
+    from roughvisc.study.execution.dispatch import distribute  # slow to import
+
+    texts = {key: case.to_json() for key, case in todo.items()}
+    if client is not None:
+        require_same_version(client)
+        log.info("dashboard: %s", client.dashboard_link)
+        yield from distribute(texts, folder, display, client, threads)
+        return
+    while texts:
+        large = {}
+        with local_client(processes) as own:
+            for outcome in distribute(texts, folder, display, own, threads or threads_each(processes), own=True):
+                if outcome.error == "TooLargeError" and workers is None and processes > 1:
+                    large[outcome.key] = texts[outcome.key]
+                else:
+                    yield outcome
+        texts, processes = large, max(1, min(processes // 2, len(large)))
+        if large:
+            display.say(f"{len(large)} cases need more memory: they are computed in fewer processes ({processes})")
 
 
-class Record:
-    """Record of a running sweep: outcomes of its cases, log, table and index.
-
-    Parameters
-    ----------
-    folder : Path
-        Results folder.
-    cases : sequence of Case
-        Cases in the order of the study.
-    outcomes : dict
-        Key -> outcome of each finished case; the record adds further outcomes.
-    display : Display
-        Display of the sweep.
-    """
-
-    def __init__(self, folder: Path, cases: Sequence[Case], outcomes: dict[str, Outcome], display: Display) -> None:
-        self.folder, self.display = folder, display
-        self._stated, self._outcomes = cases, outcomes
-        self._cases = {case.key: case for case in cases}
-        self._listed = sweep_cases(cases)
-        self._saved = time.monotonic()
-        write_sweep(folder, self._listed)
-
-    def begin(self, link: str = "") -> None:
-        """Display the cases, and the address of Dask's dashboard."""
-        if link:
-            log.info("dashboard: %s", link)
-        self.display.begin(self._stated, link)
-        for outcome in self._outcomes.values():
-            self.display.ended(outcome)
-
-    def ended(self, outcome: Outcome) -> None:
-        """Record the end of a case.
-
-        Raises
-        ------
-        OSError
-            If the disk was full, because further cases would also fail.
-        """
-        self._outcomes[outcome.key] = outcome
-        case, level = self._cases[outcome.key], logging.INFO if outcome.kind == "done" else logging.WARNING
-        told = (outcome.key, outcome.kind, outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
-        log.log(level, "%s %s %.3g s %s %s", *told)
-        if outcome.trace:
-            log.error("%s", outcome.trace)
-        if outcome.kind == "failed" and len(self._cases) > 1:
-            record_failure(self.folder, case, outcome.message, outcome.error, outcome.trace)
-        self.display.ended(outcome)
-        if time.monotonic() - self._saved > _SAVE_EVERY:
-            self.save()
-        if outcome.disk_full:
-            finished = sum(one.entry is not None for one in self._outcomes.values())
-            raise OSError(errno.ENOSPC, f"{outcome.message} ({finished} of {len(self._cases)} cases are finished)")
-
-    def warn(self, text: str) -> None:
-        """Display and log an urgent message."""
-        log.warning("%s", text)
-        self.display.warn(text)
-
-    def warn_of_cases(self, keys: Iterable[str]) -> None:
-        """Display one warning of each subject in the results of some cases, and the number of cases that have it."""
-        found: dict[str, dict[str, str]] = {}
-        for key in keys:
-            entry = self._outcomes[key].entry
-            for subject, text in warnings_of(entry.attributes).items() if entry else ():
-                if subject not in ("accuracy", "speeds"):  # the messages of the cases state unsolved speeds
-                    found.setdefault(subject, {})[key] = text
-        for texts in found.values():
-            key, text = next(iter(texts.items()))
-            if len(texts) > 1:
-                text += f" ({len(texts)} of {len(self._cases)} cases have a warning of this kind.)"
-            log.warning("%s: %s", key, text)
-            self.display.say(text, key)
-
-    def save(self) -> None:
-        """Write the index and the table of the folder, and take over results that another run has finished."""
-        self._saved = time.monotonic()
-        if not is_writable(self.folder):
-            return
-        index = index_of(self.folder, [outcome.entry for outcome in self._outcomes.values() if outcome.entry])
-        for key, outcome in self._outcomes.items():
-            if key in index:
-                with suppress(OSError):  # the case failed before
-                    record_path(self.folder, key).unlink(missing_ok=True)
-                if outcome.entry is None:
-                    self._outcomes[key] = outcome_of(index[key], reused=True)
-        write_table(self.folder)
+def _record(outcome: Outcome, case: Case, folder: Path, *, alone: bool) -> None:
+    """Log the end of a case, and write or remove the record of its failure."""
+    level = logging.INFO if outcome.kind == "done" else logging.WARNING
+    told = (outcome.key, outcome.kind, outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
+    log.log(level, "%s %s %.3g s %s %s", *told)
+    if outcome.trace:
+        log.error("%s", outcome.trace)
+    for text in warnings_of(outcome.entry.attributes).values() if outcome.entry else ():
+        log.info("%s: %s", outcome.key, text)
+    if outcome.entry:
+        with suppress(OSError):  # the case failed before
+            record_path(folder, outcome.key).unlink(missing_ok=True)
+    elif outcome.kind == "failed" and not alone:
+        record_failure(folder, case, outcome.message, outcome.error, outcome.trace)

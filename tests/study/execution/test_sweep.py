@@ -14,8 +14,9 @@ import pytest
 import xarray as xr
 from support import BALL, LONG, assert_same, numbers, refused
 
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.errors import InputError, RoughviscError, TooLargeError
 from roughvisc.study.execution import run as run_module
+from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
@@ -98,8 +99,7 @@ def test_run__shows_each_warning_once_and_names_its_case(study, tmp_path, worker
     command = [*RUN, "ball.toml", "--workers", str(workers)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "slope" in line)
-    assert line.startswith("case 1 (program.0.load = 20 mN): ")
-    assert "2 of 3 cases" in line
+    assert line.startswith(("case 1 (program.0.load = 20 mN): ", "case 2 (program.0.load = 30 mN): "))
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
         return bring(case, folder, **settings)
 
     if workers:  # the processes of a local cluster are forked from one that has not seen this
-        monkeypatch.setattr("roughvisc.study.execution.sweep.local_client", in_this_process)
+        monkeypatch.setattr(sweep_module, "local_client", in_this_process)
     monkeypatch.setattr(run_module, "run_case", full)
     with pytest.raises(OSError, match=r"x\.nc: No space left .*make room \(1 of 4 cases are finished\)$") as caught:
         run_cases(cases, tmp_path / "out", display=Display(False), workers=workers)
@@ -195,6 +195,29 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
     assert "No space left" in (tmp_path / "out" / "sweep.log").read_text()
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
+
+
+def test_sweep__computes_cases_of_much_memory_in_fewer_processes(study, tmp_path, monkeypatch):
+    """A case fits if one process has all the memory, and not if four share it."""
+    cases, bring, processes = study(), run_module.run_case, []
+
+    def cluster(count):
+        processes.append(count)
+        return in_this_process(count)
+
+    def large(case, folder, **settings):
+        if case.varied["program.0.load"] == 5e-3 and processes[-1] > 1:
+            raise TooLargeError("it needs more")
+        return bring(case, folder, **settings)
+
+    monkeypatch.setattr(sweep_module, "cores", lambda: 4)
+    monkeypatch.setattr(sweep_module, "local_client", cluster)
+    monkeypatch.setattr(run_module, "run_case", large)
+    outcomes = run_cases(cases, tmp_path / "out", display=Display(False))
+    assert [outcome.kind for outcome in outcomes.values()] == ["done"] * 4
+    assert processes == [4, 2, 1]
+    outcomes = run_cases(cases, tmp_path / "two", display=Display(False), workers=2)  # as the user wishes
+    assert [outcome.kind for outcome in outcomes.values()] == ["done", "done", "hindered", "hindered"]
 
 
 def alive(group):

@@ -186,7 +186,7 @@ def whole(tmp_path_factory):
 def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name, cuts):
     case, expected, steps = whole(CASES[name])
     assert steps > 7
-    for cut in {"few": (1, steps // 2, steps - 1, steps), "more": (2, steps // 3)}[cuts]:
+    for cut in {"few": (1, steps // 2, steps - 1, steps), "more": {2, steps // 3}}[cuts]:
         folder = tmp_path / str(cut)
         unfinished = stopped(case, folder, cut)
         assert names(folder) == [unfinished.name], "no result yet, nor a lock"
@@ -388,7 +388,7 @@ def test_changed_study__does_not_use_what_is_not_its_own(whole, tmp_path, caplog
     assert "belongs to another case or revision and is not used" in caplog.text
     assert names(tmp_path) == sorted([unfinished.name, f"{other.key}.nc"])
     (tmp_path / f"{other.key}.nc").rename(tmp_path / f"{case.key}.nc")
-    with refused(found=other.key):  # it is whole, and not damaged
+    with refused(str(tmp_path / f"{case.key}.nc")):  # it is whole, and not damaged
         run_case(case, tmp_path)
 
 
