@@ -30,8 +30,6 @@ from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.neighbours import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
-from roughvisc.mechanics.layer import LayeredBody
-from roughvisc.mechanics.layer_memory import check_convergence
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
@@ -170,8 +168,6 @@ class LoadingRows(Rows):
             time_step=None if settings.time_step == "auto" else settings.time_step,
             present=None if present is None else xp.asarray(present),
         )
-        if isinstance(body, LayeredBody):
-            check_convergence(body, self.scene)
 
     def __iter__(self) -> Iterator[Row]:
         """Compute the steps to the end of the program.

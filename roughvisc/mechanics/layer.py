@@ -276,15 +276,6 @@ class LayerKernel(Kernel):
         weights = np.linalg.lstsq(rows, wanted, rcond=1e-13)[0]
         return short * love_kernel(shape, spacing) + image_influence(shape, spacing, depths, weights)
 
-    def contrast(self, longest: float, shortest: float) -> float:
-        """Return the ratio of the effective compliances of the longest and the shortest wave.
-
-        Waves are given by their wave numbers [1/m]. The ratio is large for a stiff layer on a soft base, and zero if
-        short waves displace nothing.
-        """
-        long, short = self._along(np.log(np.clip([longest, shortest], self.q[0], self.q[-1])))
-        return float(long / short) if short > 0 else 0.0
-
     @cached_property
     def _along(self) -> Any:
         from scipy.interpolate import CubicSpline  # slow to import

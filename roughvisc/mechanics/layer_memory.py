@@ -17,19 +17,11 @@ from typing import Any, cast
 
 import numpy as np
 
-from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.layer import LayeredBody, LayerSeries
+from roughvisc.mechanics.layer import LayerSeries
 from roughvisc.mechanics.memory import History, Memory, Prediction
-from roughvisc.mechanics.stepping import Scene
 
 Array = Any  # an array of NumPy or CuPy
-#: Compliance of the longest wave of a grid over the compliance of the shortest wave, from which the contact may not
-#: converge.
-_STIFF_LAYERS = 100.0
-#: Parts of the largest load and approach at which the contact is tried.
-_TRIED = (1.0, 0.1, 0.01)
 
 
 class LayerMemory(Memory):
@@ -93,47 +85,3 @@ class LayerMemory(Memory):
         turn = self.grid.turn(cells, axis)
         earlier = None if history.earlier is None else history.earlier * turn
         return History(history.fields * turn, history.modes * turn, earlier, history.step)
-
-
-def check_convergence(body: LayeredBody, scene: Scene) -> None:
-    """Check, before a run, that the contact of stiff layers on a soft base converges.
-
-    The elastic contact is tried at the largest load and approach, with the first and with the last compliance.
-
-    Parameters
-    ----------
-    body : LayeredBody
-        The body.
-    scene : Scene
-        Cells, memory of the body, and program; its nominal pressures are converted to loads.
-
-    Raises
-    ------
-    InputError
-        If a contact does not converge.
-    """
-    program, memory = scene.program, scene.memory
-    parts = _TRIED if program.duration > 0 else _TRIED[:1]  # a jump passes through no smaller loads
-    kernels: list[tuple[Any, float]] = [(body.kernel, float(memory.series.contact_compliance(program.duration)))]
-    if isinstance(memory, LayerMemory):
-        kernels = [(memory.waves.kernel(), 1.0), (memory.waves.kernel(memory.waves.crept(program.duration)), 1.0)]
-    for kernel, compliance in kernels:
-        contrast = kernel.contrast(*scene.grid.wave_numbers)
-        if contrast < _STIFF_LAYERS:
-            continue
-        grid = scene.grid.answering(scene.grid.symbol_of(kernel), kernel)
-        unit, tolerance, present = compliance / grid.cell_area, 0.2 * scene.tolerance, scene.present
-        for control in ("load", "approach"):
-            values = [(s.end or 0.0) + abs(s.amplitude) for s in program.segments if s.control == control]
-            for value in [part * max(values, default=0.0) for part in parts if max(values, default=0.0) > 0]:
-                load, approach = (value * unit, None) if control == "load" else (None, value)
-                try:
-                    solve_contact(grid, scene.gap, load=load, approach=approach, tolerance=tolerance, present=present)
-                except ConvergenceError as error:
-                    raise InputError(
-                        f"material is {body!r}, whose longest waves on these cells are {contrast:.3g} times as "
-                        f"compliant as the shortest, and {error}: expected layers whose moduli differ less, fewer "
-                        "cells, a smaller load or a looser tolerance",
-                        key="material",
-                        found=body,
-                    ) from error

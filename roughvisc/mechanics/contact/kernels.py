@@ -279,14 +279,14 @@ def conjugate(
 
 
 def cut_step(
-    held: Array, direction: Array, residual: Array, length: float, under_load: bool
+    held: Array, direction: Array, residual: Array, length: float, load: float | None
 ) -> tuple[Array, Array, float]:
     """Return the pressure after a step, cut at zero, the change of the pressure, and the slope of the energy."""
     trial, change = cupy.empty(held.size), cupy.empty(held.size)
     (carried,) = _cut(held.size, held, direction, length, trial)
-    if under_load and carried == 0:
+    if load is not None and carried == 0:
         return trial, trial - held, 0.0
-    (slope,) = _change(held.size, held, residual, carried if under_load else 1.0, trial, change)
+    (slope,) = _change(held.size, held, residual, 1.0 if load is None else carried / load, trial, change)
     return trial, change, slope
 
 

@@ -133,14 +133,14 @@ def conjugate(
 
 
 def cut_step(
-    held: Array, direction: Array, residual: Array, length: float, under_load: bool
+    held: Array, direction: Array, residual: Array, length: float, load: float | None
 ) -> tuple[Array, Array, float]:
     """Return the pressure after a step, cut at zero, the change of the pressure, and the slope of the energy.
 
-    Under a load, the new pressure is scaled to a sum of one; the slope is zero if no cell carries pressure.
+    If a load is given, the new pressure is scaled to this sum; the slope is zero if no cell carries pressure.
     """
     trial = namespace(held).maximum(held - length * direction, 0)
-    carried = float(trial.sum()) if under_load else 1.0
+    carried = 1.0 if load is None else float(trial.sum()) / load
     if carried == 0:
         return trial, trial - held, 0.0
     trial /= carried

@@ -242,16 +242,17 @@ def solve_contact(
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
         requested_size, requested_duality = caution * requested_size, max(duality, 1e-300)
 
-        # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15).
+        # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15). The load is the sum of
+        # the present pressure, because a step longer than the trial would magnify its rounding error.
         slope = 0.0
         while stalled < PATIENCE and length >= SHORTEST_STEP:
-            trial, change, slope = passes.cut_step(held, direction, residual, length, under_load)
+            trial, change, slope = passes.cut_step(held, direction, residual, length, total if under_load else None)
             if slope < 0:
                 break
             length, previous = length / 4, None
         if not slope < 0:
             moved = held - residual / grid.stiffest
-            trial = onto_simplex(moved, 1.0) if under_load else xp.maximum(moved, 0)
+            trial = onto_simplex(moved, total) if under_load else xp.maximum(moved, 0)
             change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
             slope = inner(change, residual)
             if not slope < 0:  # the minimum, to rounding

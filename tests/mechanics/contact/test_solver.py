@@ -12,6 +12,7 @@ import roughvisc as rv
 from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.contact.passes import cut_step
 from roughvisc.mechanics.grid import Grid
 
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic"])
@@ -217,6 +218,16 @@ def test_projected_gradient__converges_alone(monkeypatch):
     monkeypatch.setattr(Grid, "inverse", lambda self, field: np.roll(-field, 3))
     state = solve_contact(operator, gap, load=40.0, tolerance=1e-5, max_iterations=20_000)
     assert state.approach == pytest.approx(expected.approach, rel=1e-5)
+
+
+def test_steps_beyond_their_trial__keep_the_load():
+    """Otherwise the rounding error of the load grows with each of them, and the contact of a stiff film fails."""
+    random, held = np.random.default_rng(0), np.full(50, 0.02)
+    for _ in range(30):
+        direction = random.normal(size=held.size)
+        _, change, _ = cut_step(held, direction, direction, 1e-6, load=float(held.sum()))
+        held += 20 * change
+    assert held.sum() == pytest.approx(1, rel=1e-13)
 
 
 def test_unsolved_contact__raises():
