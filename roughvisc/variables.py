@@ -218,7 +218,6 @@ VARIABLES: dict[str, Variable] = {
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
     "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
-    "cluster_area": Variable((ROW, "cluster"), "m^2", "area of a contact cluster", "its cells, counted; largest first"),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
     "pressure_density": Variable(
@@ -249,16 +248,6 @@ VARIABLES: dict[str, Variable] = {
     "flux_x": Variable(_FRAME, "m^2/s", "flux along x", f"volume flux {_FLUX}"),
     "flux_y": Variable(_FRAME, "m^2/s", "flux along y", f"volume flux {_FLUX}"),
     # observables: contact spots
-    "incremental_stiffness": Variable(
-        _SERIES, "N/m", "incremental stiffness", "against a fast increment, the contact frozen"
-    ),
-    "incremental_stiffness_error": Variable(
-        _SERIES, "N/m", "stated error of the incremental stiffness", _GRID_AND_SOLVER
-    ),
-    "frozen_stiffness": Variable(
-        _SERIES, "m", "frozen stiffness", "over the contact modulus: of a disc, twice its radius"
-    ),
-    "frozen_stiffness_error": Variable(_SERIES, "m", "stated error of the frozen stiffness", _GRID_AND_SOLVER),
     "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS, in_table="last"),
     "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _GRID_AND_SOLVER),
     "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS, in_table="last"),

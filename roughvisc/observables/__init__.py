@@ -15,22 +15,20 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.observables.conductance import conductance, incremental_stiffness
-from roughvisc.observables.contact import cluster_areas, clusters, contact, distribution
+from roughvisc.observables.conductance import conductance
+from roughvisc.observables.contact import clusters, contact, distribution
 from roughvisc.observables.histories import cycle_work, history
 from roughvisc.observables.leakage import leakage
 from roughvisc.observables.theory import area_by_theory, persson
 
 __all__ = [
     "area_by_theory",
-    "cluster_areas",
     "clusters",
     "conductance",
     "contact",
     "cycle_work",
     "distribution",
     "history",
-    "incremental_stiffness",
     "leakage",
     "persson",
 ]

@@ -16,7 +16,7 @@ from roughvisc.labels import label
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import in_si
-from roughvisc.variables import VARIABLES, axis_of
+from roughvisc.variables import VARIABLES
 
 
 def contact(dataset: xr.Dataset) -> xr.DataArray:
@@ -79,37 +79,6 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
         "cluster_area_largest": largest * cell,
     }
     return label(xr.Dataset(found))
-
-
-def cluster_areas(dataset: xr.Dataset) -> xr.Dataset:
-    """Return the area of every contact cluster; computed immediately, with one frame in memory at a time.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        One case's result with ``pressure`` or ``gap``.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``cluster_area`` with dimensions ``(time, cluster)`` or ``(speed, cluster)``, largest first, missing beyond the
-        number of clusters. [m2]
-
-    Raises
-    ------
-    InputError
-        If the result contains neither ``pressure`` nor ``gap``, or several cases.
-    """
-    touching = contact(dataset)
-    rows = axis_of(touching.dims)
-    if touching.dims != (rows, "x", "y"):
-        raise InputError(f"the result has dimensions {touching.dims}: choose one case first")
-    periodic = dataset.attrs.get("boundary") == "periodic"
-    sizes = [cluster_sizes(frame.values, periodic) for frame in touching]
-    areas = np.full((len(sizes), max(map(len, sizes), default=0)), np.nan)
-    for row, found in zip(areas, sizes, strict=True):
-        row[: len(found)] = found * math.prod(spacing(dataset, "clusters"))
-    return label(xr.Dataset({"cluster_area": ((rows, "cluster"), areas)}, coords={rows: dataset[rows]}))
 
 
 def label_clusters(mask: np.ndarray, periodic: bool = False) -> tuple[np.ndarray, int]:

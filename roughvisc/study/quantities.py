@@ -78,7 +78,7 @@ class Observable:
 
 
 def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    found = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0), "kind": "thermal"}))
+    found = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0)}))
     if "thermal_conductance" not in found:
         expected = "a study that observes a thermal conductance, not an electrical one"
         raise InputError(key="quantity", found="thermal_conductance", expected=expected)

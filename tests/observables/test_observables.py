@@ -65,10 +65,10 @@ def test_clusters__at_the_corners_of_a_periodic_map_are_one():
 
 def test_clusters__of_a_periodic_map_are_independent_of_its_origin():
     mask = np.random.default_rng(3).random((13, 18)) < 0.45
-    areas = observables.cluster_areas(from_maps(mask, boundary="periodic"))
+    found = observables.clusters(from_maps(mask, boundary="periodic"))
     for shift in ((5, 0), (0, 7), (6, 11)):
         rolled = from_maps(np.roll(mask, shift, (0, 1)), boundary="periodic")
-        xr.testing.assert_equal(observables.cluster_areas(rolled), areas)
+        xr.testing.assert_equal(observables.clusters(rolled), found)
 
 
 def test_clusters__number_and_areas():
@@ -80,9 +80,6 @@ def test_clusters__number_and_areas():
     np.testing.assert_allclose(found["cluster_area_mean"], [12e-12, 48e-12, np.nan])
     np.testing.assert_allclose(found["cluster_area_largest"], [18e-12, 48e-12, np.nan])
     assert found["cluster_area_mean"].attrs["units"] == "m^2"
-    areas = observables.cluster_areas(ds)["cluster_area"]
-    assert areas.dims == ("time", "cluster")
-    np.testing.assert_allclose(areas, [[18e-12, 6e-12], [48e-12, np.nan], [np.nan, np.nan]])
     around = observables.clusters(ds.assign_attrs(boundary="periodic"))
     assert around["cluster_count"].values.tolist() == [1, 1, 0]
 
@@ -153,7 +150,6 @@ def test_observables__merge_with_their_result(kind):
     found = [
         rv.observables.clusters(ds),
         rv.observables.cycle_work(ds),
-        rv.observables.cluster_areas(ds),
         rv.observables.distribution(ds),
         rv.observables.distribution(ds, "gap"),
     ]
@@ -174,8 +170,6 @@ def test_clusters__pass_a_leading_dimension_through():
     found = observables.clusters(ds.assign_coords(case=["ring", "board"]))
     assert found["cluster_count"].dims == ("case", "time")
     assert found["cluster_count"].values.ravel().tolist() == [1, 13]
-    with pytest.raises(InputError, match="choose one case"):
-        observables.cluster_areas(ds)
 
 
 def test_contact_area__is_the_count_less_a_part_of_each_face_at_the_edge():

@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact import ContactState, solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary, Grid
@@ -56,17 +55,14 @@ class FrozenContact:
     Attributes
     ----------
     stiffness : float
-        Force over approach, over the contact modulus; for a disc twice the radius. Infinite in full contact if a
-        uniform pressure does not displace the surface. [m]
+        Force over approach, over the contact modulus; for a disc twice the radius. Infinite in full contact
+        unless space is free. [m]
     error : float
         Error of the stiffness due to grid and solver. [m]
-    iterations : int
-        Iterations of the contact solver.
     """
 
     stiffness: float
     error: float
-    iterations: int = 0
 
 
 def frozen_contact(
@@ -75,7 +71,6 @@ def frozen_contact(
     boundary: Boundary = "free",
     *,
     present: Mask | None = None,
-    kernel: Kernel = HALF_SPACE,
     tolerance: float = 1e-6,
 ) -> FrozenContact:
     """Return the stiffness of a contact at constant area.
@@ -92,8 +87,6 @@ def frozen_contact(
     present : ndarray of bool, shape (nx, ny), optional
         Cells with material; None: all. The outline of a spot is known exactly next to absent cells and at the border of
         free space.
-    kernel : Kernel
-        Kernel of the body.
     tolerance : float
         Approximate relative error of the stiffness due to the solver.
 
@@ -110,8 +103,8 @@ def frozen_contact(
         [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
-    body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary, kernel=kernel)
-    if contact.all() and not body.definite:
+    body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary)
+    if contact.all() and boundary != "free":
         return FrozenContact(math.inf, 0.0)
     punch = _punch(body, contact, tolerance)
     stiffness, off = _variational(punch, body.cell_area)
@@ -120,7 +113,7 @@ def frozen_contact(
         2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis))
     )  # their faces have equal errors
     error = off + _SHARED * opens + _SCATTER * math.sqrt(images) * scatter
-    found = FrozenContact(stiffness, error, punch.iterations)
+    found = FrozenContact(stiffness, error)
     if ends == 0:
         return found
     oblique = min(_staircase(rimmed) / _STEPS, 1.0)
@@ -137,11 +130,7 @@ def _extrapolated(
     stiffness, off = _variational(punch, finer.cell_area)
     difference = share * max(stiffness - coarse.stiffness, 0.0)
     part = _OBLIQUE + (_ALONG - _OBLIQUE) * (1 - oblique) ** 2
-    return FrozenContact(
-        coarse.stiffness + part * difference,
-        coarse.error + part * off + _OFF * difference,
-        coarse.iterations + punch.iterations,
-    )
+    return FrozenContact(coarse.stiffness + part * difference, coarse.error + part * off + _OFF * difference)
 
 
 def _punch(body: Grid, contact: Mask, tolerance: float) -> ContactState:

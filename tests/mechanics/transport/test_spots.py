@@ -4,13 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from references import PunchOnSheet
 from support import rough_gap
 
-from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.transport.spots import frozen_contact
 
 #: Stiffness of a square of unit side over the contact modulus: pi times the capacity of a square plate, 0.36678742 of
@@ -117,21 +114,10 @@ def test_stiffness__is_the_slope_of_force_over_approach(boundary, make):
     assert frozen_contact(contact, UNIT, boundary, tolerance=1e-10).stiffness == pytest.approx(slope, rel=1e-8)
 
 
-def test_sheet__is_stiffer():
-    radius, thickness = 14.2, 20.0
-    spots = disc(radius)
-    exact = PunchOnSheet(math.sqrt(spots.sum() / math.pi), Sheet(thickness, 0.3)).scaled_stiffness
-    assert exact > 1.5 * 2 * radius
-    assert within(outlined(spots, kernel=Sheet(thickness, 0.3)), exact) < 1e-3
-
-
 def test_nothing_and_all():
     none, full = np.zeros((5, 4), dtype=bool), np.ones((5, 4), dtype=bool)
     assert frozen_contact(none, UNIT).stiffness == 0
     assert frozen_contact(full, UNIT, "periodic").stiffness == math.inf
-    sheet = frozen_contact(full, UNIT, "periodic", kernel=Sheet(2.0, 0.0, "slipping"))
-    assert sheet.stiffness == pytest.approx(20 / 2.0), "uniform compression: E*/h times the area"
-    assert HALF_SPACE.transfer(0.0, 0.0) == 0
 
 
 def test_edges__are_told_apart():
