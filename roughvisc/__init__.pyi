@@ -34,13 +34,13 @@ from roughvisc.observables.deformed import deformed as deformed
 from roughvisc.reports.report import report as report
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit.audit import audit as audit
-from roughvisc.study.budget import budget as budget
 from roughvisc.study.case import Case as Case
 from roughvisc.study.case import read_cases as read_cases
 from roughvisc.study.case import read_study as read_study
 from roughvisc.study.case import vary as vary
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.machine_history import read_program as read_program
+from roughvisc.study.neighbours import budget as budget
 from roughvisc.study.observed import observe as observe
 from roughvisc.study.plan import plan as plan
 from roughvisc.study.realisations import over_realisations as over_realisations

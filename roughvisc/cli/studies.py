@@ -266,8 +266,8 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
       roughvisc budget focus_variation-study.toml --modulus-error 10% --cutoff "1 um"
       roughvisc budget focus_variation-study.toml --quantity mean_gap --population ensemble
     """
-    from roughvisc.study.budget import FOLDER
     from roughvisc.study.execution.run import result_folder
+    from roughvisc.study.neighbours import FOLDER
 
     names = list(known.pop("quantity")) or ["contact_area"]
     is_result = study.suffix == ".nc"

@@ -20,7 +20,6 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.study import neighbours
-from roughvisc.study.budget import FOLDER
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
@@ -104,7 +103,7 @@ def run(
     computing = {"progress": progress, "client": default_client(), "threads": threads}
     chosen, reasons, budgets = choose(case, want, folder, log.info, **computing)
     for name, one in budgets.items():
-        write_dataset(one, folder / FOLDER / f"budget-{name}.nc")
+        write_dataset(one, folder / neighbours.FOLDER / f"budget-{name}.nc")
     return run_stated(chosen, out, progress=False, threads=threads).assign_attrs(choice="\n".join(reasons))
 
 
@@ -162,10 +161,10 @@ def choose(
         base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
         chosen = neighbours.on_cells(base, height, 2.0**level)
         sources = neighbours.sources_of(base, height, want, 2.0**level, 2.0**coarsest)
-        [own] = neighbours.solve([chosen], folder / FOLDER, **computing).values()
+        [own] = neighbours.solve([chosen], folder / neighbours.FOLDER, **computing).values()
         own = own if places is None else neighbours.at_rows(own, axis, places)
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
-        found = neighbours.compared(chosen, sources, observed, folder / FOLDER, own, **computing)
+        found = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
         cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
         reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
         tell(f"{cells}: {'; '.join(reached)}")
@@ -182,7 +181,7 @@ def choose(
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
-            shutil.copyfile(result_path(folder / FOLDER, chosen.key), temporary)
+            shutil.copyfile(result_path(folder / neighbours.FOLDER, chosen.key), temporary)
     reasons = [f"grid: {cells}", *reached, f"tolerance: {chosen.settings.tolerance:.2g}"]
     if unknown := found[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")
