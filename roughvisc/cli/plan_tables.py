@@ -91,7 +91,8 @@ def _case_table(costs: xr.Dataset, total: int) -> Table:
     for i in range(costs.sizes["case"]):
         row = costs.isel(case=i)
         mark = "" if row["marched"] else "~"
-        cells = ["cannot run"] if row["refusal"] != "" else [mark + _text(row[name]) for name in _COLUMNS]
+        known = [mark + text if (text := _text(row[name])) else "" for name in _COLUMNS]
+        cells = ["cannot run"] if row["refusal"] != "" else known
         table.add_row(*(Text(_text(row[key])) for key in varied), *cells)
     if total > _LISTED:
         table.add_row(f"and {total - _LISTED} more")
