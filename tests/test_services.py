@@ -10,7 +10,6 @@ from samples import Scaled
 from support import assert_same, at_rows, numbers
 
 import roughvisc as rv
-from roughvisc.labels import cost_of
 from roughvisc.study.case import read_cases, read_study, vary
 from roughvisc.study.execution.run import run_case
 
@@ -116,18 +115,6 @@ def test_run__gives_rows_over_the_axis(kind, done):
     assert ("friction_coefficient" in ds) == kind.moves
 
 
-def test_plan__foresees_rows_and_work(kind, done):
-    planned = rv.plan([done.case]).isel(case=0)
-    assert str(planned.refusal.values) == ""
-    assert int(planned.rows) == ROWS
-    work = cost_of(done.result)[1]
-    assert 0.4 * work < float(planned.convolutions) < 2.5 * work
-    largest = float(done.result.contact_fraction.max())
-    assert 0.7 * largest < float(planned.contact_fraction) < 2 * largest, "of a press, beneath which nothing moves"
-    assert float(planned.memory) > 1e8
-    assert float(planned.wall_time) > 0
-
-
 def test_resume__ends_with_the_same_bits(kind, done, tmp_path):
     asked, seen = [], []
 
@@ -172,14 +159,6 @@ def test_figures__are_drawn_of_rows_and_fields(kind, done, tmp_path, coarse_pict
     assert ("slide" in names or "friction" in names) == kind.moves
 
 
-def test_audit__has_a_verdict_on_each_assumption(kind, done):
-    found = rv.audit(done.result, work_of_adhesion="50 mJ/m^2", yield_strength="10 MPa", density="1100 kg/m^3")
-    verdicts = {one.name: one.verdict for one in found}
-    assert {"adhesion", "yielding", "inertia"} <= set(verdicts)
-    assert "not known" not in {verdicts["adhesion"], verdicts["yielding"], verdicts["inertia"]}
-    assert ("heating" in verdicts) == kind.moves
-
-
 def test_observables__follow_the_contact(kind, done):
     """It leaks less, conducts more, and its clusters add up."""
     order = np.argsort(done.result.contact_area.values)
@@ -212,17 +191,6 @@ def test_grid_error__is_stated_in_every_row(kind, done):
     one, other = (run.friction_coefficient if kind.axis == "speed" else run.approach for run in (few, fine))
     unit = one.values if kind.axis == "speed" else one.values.max()
     assert (abs(one.values - other.values) <= own * unit).all()
-
-
-@pytest.mark.thorough
-def test_trade__measures_each_setting(kind, done, tmp_path):
-    ds = rv.trade(done.case, [(0.1, 1), (1e-2, 1), (1e-2, 1.5)], out=tmp_path, progress=False)
-    assert np.isfinite(ds.error).all()
-    assert ("friction_coefficient" in ds.quantity) == kind.moves
-    wrong = ds.error.sel(quantity="approach").values
-    assert wrong[1] < wrong[0] or wrong[0] < 1e-4  # a slide's steps are its cells: a hundredth of the tolerance
-    assert wrong[1] < wrong[2]
-    assert rv.plot.trade(ds).axes
 
 
 def test_own_body__is_what_its_kernel_says(kind, done):

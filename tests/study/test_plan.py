@@ -92,34 +92,21 @@ def test_time__is_that_of_the_run_within_a_factor_of_two(study, tmp_path, name):
     assert 0.5 < planned / (time.process_time() - began) < 2
 
 
+THREE = {"model": "prony", "glassy": 3e-7, "compliances": [1e-7, 2e-7, 1e-7], "times": [0.01, 0.05, 1]}
+MEMORY = {
+    "zener": {},
+    "elastic": {"material": {"model": "elastic", "shear_modulus": 1e6}},
+    "three": {"material": THREE},
+    "free": {"surface.shape": [200, 190], "solve.boundary": "free", "solve.edge": "accept"},
+}
+
+
 @pytest.mark.parametrize(
-    "changes",
-    [
-        {"surface.shape": [240, 225]},
-        pytest.param(
-            {"surface.shape": [240, 225], "material": {"model": "elastic", "shear_modulus": 1e6}},
-            marks=pytest.mark.thorough,
-        ),
-        pytest.param(
-            {
-                "surface.shape": [240, 225],
-                "material": {
-                    "model": "prony",
-                    "glassy": 3e-7,
-                    "compliances": [1e-7, 2e-7, 1e-7],
-                    "times": [0.01, 0.05, 1],
-                },
-            },
-            marks=pytest.mark.thorough,
-        ),
-        pytest.param(
-            {"surface.shape": [200, 190], "solve.boundary": "free", "solve.edge": "accept"}, marks=pytest.mark.thorough
-        ),
-    ],
-    ids=["zener", "elastic", "three", "free"],
+    "name", [pytest.param(name, marks=[] if name == "zener" else pytest.mark.thorough) for name in MEMORY]
 )
-def test_memory__is_that_of_the_arrays_of_the_run(study, changes):
-    case = study(ROUGH, {"solve.tolerance": 2e-2, "keep.times": 3, "keep.fields": []} | changes)
+def test_memory__is_that_of_the_arrays_of_the_run(study, name):
+    few = {"surface.shape": [240, 225], "solve.tolerance": 2e-2, "keep.times": 3, "keep.fields": []}
+    case = study(ROUGH, few | MEMORY[name])
     planned = float(rv.plan([case]).memory[0]) - PROCESS
     rv.run(vary(case, FEW), progress=False)  # imports what it needs
     tracemalloc.start()
