@@ -54,22 +54,6 @@ class Limit:
         return (self.check.__doc__ or "").partition(".\n")[0].rstrip(".")
 
 
-#: Name -> limits, in the order of an audit. Unless a threshold has a physical meaning, an effect of some 10 % makes an
-#: assumption doubtful, and an effect of the size of the computed quantity breaks the assumption.
-LIMITS: dict[str, Limit] = {}
-
-
-def limits(name: str, doubtful: float, broken: float, source: str) -> Callable[[Callable[[Scene], Found]], Callable]:
-    """Enter the decorated check in the table of limits."""
-
-    def entered(check: Callable[[Scene], Found]) -> Callable[[Scene], Found]:
-        LIMITS[name] = Limit(check, doubtful, broken, source)
-        return check
-
-    return entered
-
-
-@limits("adhesion", 0.005, 0.3, "contact area 10 % larger; twice as large: Johnson, Kendall, Roberts (1971)")
 def adhesion(scene: Scene) -> Found:
     """Pull-off force of the spots over the largest load."""
     force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
@@ -84,7 +68,6 @@ def adhesion(scene: Scene) -> Found:
     return pull / force, f"{held} pulled off (Tabor parameter {as_text(tabor, '1')})."
 
 
-@limits("stickiness", 0.1, 1, "contact area 10 % larger; sticks without a load: Persson, Tosatti (2001)")
 def stickiness(scene: Scene) -> Found:
     """Work of adhesion over the elastic energy of full contact."""
     if scene.boundary == "free" and scene.is_smooth:
@@ -96,7 +79,6 @@ def stickiness(scene: Scene) -> Found:
     return w / energy, f"Full contact stores {as_text(energy, 'J/m^2')} of elastic energy."
 
 
-@limits("yielding", 1.6, 3, "first yield under a sphere; full plasticity: Johnson (1985), sections 6.1 and 6.3")
 def yielding(scene: Scene) -> Found:
     """Largest pressure over the yield strength in tension."""
     peak = float(scene.pressure.max())
@@ -106,7 +88,6 @@ def yielding(scene: Scene) -> Found:
     return peak / strength, f"The largest pressure is {as_text(peak, 'Pa')}."
 
 
-@limits("thickness", 0.1, 0.5, "10 % off; twice the true approach: Johnson (1985), section 5.8")
 def thickness(scene: Scene) -> Found:
     """Relative error of the approach of a half-space, at the same load."""
     modelled, stated = scene.facts.get("thickness", math.inf), scene.given.get("thickness")
@@ -131,21 +112,18 @@ def thickness(scene: Scene) -> Found:
     return excess, f"{base} the approach would be {percent(excess)} smaller at the same load."
 
 
-@limits("slope", 0.3, 1, "true area 4.5 % larger than projected; 50 % larger: Johnson (1985), section 4.1")
 def slope(scene: Scene) -> Found:
     """Rms slope of the loaded surface."""
     more = percent(scene.loaded_slope**2 / 2)
     return scene.loaded_slope, f"The loaded surface has {more} more area than its projection."
 
 
-@limits("strain", 1, 5, "largest strains exceed the linear range; the representative strain does: Tabor (1951)")
 def strain(scene: Scene) -> Found:
     """Rms slope of the loaded surface over the largest strain at which the material is linear."""
     largest, [linear] = scene.loaded_slope, scene.need("linear_strain")
     return largest / linear, f"Strains are at most about {percent(largest)}, and on average {percent(0.2 * largest)}."
 
 
-@limits("inertia", 0.1, 1, "10 % off the quasi-static value; 100 % off: Lysmer, Richart (1966); Cole, Huth (1958)")
 def inertia(scene: Scene) -> Found:
     """Lag of waves over the time scale of the program, or relative increase of the displacement in a slide."""
     width, scale, (speed, _) = scene.half_width, float(scene.facts["time_scale"]), scene.slide
@@ -161,7 +139,6 @@ def inertia(scene: Scene) -> Found:
     return lag / scale, f"Waves lag by {as_text(lag, 's')} over {as_text(2 * width, 'm')}; {program}."
 
 
-@limits("heating", 1, 10, "retardation times a fifth shorter; six times shorter: Williams, Landel, Ferry (1955)")
 def heating(scene: Scene) -> Found:
     """Mean temperature rise of the spots in a slide [K] if all heat flows into the body."""
     (speed, power), rubbed = scene.slide, scene.fullest
@@ -178,7 +155,6 @@ def heating(scene: Scene) -> Found:
     return rise, f"{heats} by {as_text(rise, 'K')} above the surface around."
 
 
-@limits("resolution", 0.1, 0.5, "10 % of the area; half of it, and as much again for the next octave: Persson (2001)")
 def resolution(scene: Scene) -> Found:
     """Part of the rms slope from the last octave of wavelengths, about the part of the area that it removes."""
     if scene.is_complete:
@@ -192,7 +168,6 @@ def resolution(scene: Scene) -> Found:
     return last, f"{adds} area; the next octave may do so again."
 
 
-@limits("border", 2, 10, "a step is visible; on 100 rows the seam has as much mean square slope as all other rows")
 def border(scene: Scene) -> Found:
     """Difference between opposite borders over that between neighbouring rows."""
     if scene.boundary == "free":
@@ -221,3 +196,21 @@ def as_text(value: float, unit: str, digits: int = 2) -> str:
 def percent(share: float) -> str:
     """Return a fraction as text with two digits, as 100 % and not 1e+02 %; a very small fraction as a bound."""
     return "less than 0.1 %" if 0 < share < 1e-3 else f"{float(f'{100 * share:.2g}'):g} %"
+
+
+#: Limits of each check, in the order of an audit. Unless a threshold has a physical meaning, an effect of some 10 %
+#: makes an assumption doubtful, and an effect of the size of the computed quantity breaks the assumption.
+_TABLE = (
+    Limit(adhesion, 0.005, 0.3, "contact area 10 % larger; twice as large: Johnson, Kendall, Roberts (1971)"),
+    Limit(stickiness, 0.1, 1, "contact area 10 % larger; sticks without a load: Persson, Tosatti (2001)"),
+    Limit(yielding, 1.6, 3, "first yield under a sphere; full plasticity: Johnson (1985), sections 6.1 and 6.3"),
+    Limit(thickness, 0.1, 0.5, "10 % off; twice the true approach: Johnson (1985), section 5.8"),
+    Limit(slope, 0.3, 1, "true area 4.5 % larger than projected; 50 % larger: Johnson (1985), section 4.1"),
+    Limit(strain, 1, 5, "largest strains exceed the linear range; the representative strain does: Tabor (1951)"),
+    Limit(inertia, 0.1, 1, "10 % off the quasi-static value; 100 % off: Lysmer, Richart (1966); Cole, Huth (1958)"),
+    Limit(heating, 1, 10, "retardation times a fifth shorter; six times shorter: Williams, Landel, Ferry (1955)"),
+    Limit(resolution, 0.1, 0.5, "10 % of the area; half of it, and as much again for the next octave: Persson (2001)"),
+    Limit(border, 2, 10, "a step is visible; on 100 rows the seam has as much mean square slope as all other rows"),
+)
+#: Name of an assumption -> its limits.
+LIMITS = {one.check.__name__: one for one in _TABLE}
