@@ -130,6 +130,8 @@ def test_refused_option__is_named(invoke, tmp_path, command, option):
 def test_budget__names_what_open_sources_need(invoke, coarse_pictures):
     status, out, _ = invoke("budget", write_study(), "--modulus-error", "10%")
     assert (status, "--time-scale-error" in out, "--modulus-error" in out) == (0, True, False)
+    status, out, _ = invoke("run", write_study(), "--for", "50 % approach", "--no-plots")
+    assert (status, "time_scale_error" in out, "--time-scale-error" in out) == (0, True, False), "no option of run"
 
 
 def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):

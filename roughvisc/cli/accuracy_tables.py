@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import click
 import numpy as np
 import xarray as xr
 from rich.console import Group
@@ -73,8 +74,13 @@ def budget_table(dataset: xr.Dataset) -> Group:
 
 
 def _by_option(sentence: str) -> str:
-    """Return a sentence with a missing input named as the option of its command."""
-    return re.sub(r"\w+(?= is not given)", lambda name: "--" + name[0].replace("_", "-"), sentence)
+    """Return a sentence with a missing input named as the option of the command, if it has one."""
+    known = {one.name for one in click.get_current_context().command.params}
+    return re.sub(
+        r"\w+(?= is not given)",
+        lambda found: f"--{found[0].replace('_', '-')}" if found[0] in known else found[0],
+        sentence,
+    )
 
 
 def _error(source: xr.Dataset) -> str:
