@@ -4,31 +4,12 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import refused
+from support import STUDY, refused
 
 import roughvisc as rv
 
 BALL, RUBBER = rv.sphere(1e-2, 2e-3, (17, 15)), rv.zener(1e6, 1e6, 1e6)
 PROGRAM = rv.Program().load(0.01, over=0.5).hold(2.0)
-STUDY = """
-[surface]
-generate = "sphere"
-radius = "10 mm"
-size = "2 mm"
-shape = [17, 15]
-[material]
-model = "zener"
-shear_modulus = "1 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "1 MPa s"
-[[program]]
-load = "10 mN"
-over = 0.5
-[[program]]
-hold = 2.0
-[keep]
-times = 5
-"""
 
 
 @pytest.fixture(scope="module")

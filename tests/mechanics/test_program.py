@@ -20,19 +20,14 @@ def test_chain__adds_segments_in_order():
     assert program.largest_load == 2.0
 
 
-def test_hold__keeps_the_control_it_follows():
-    assert rv.Program().approach(1e-6, over=1.0).hold(2.0).segments[1].control == "approach"
-
-
 def test_slide__keeps_what_is_controlled_and_takes_its_time():
     program = PRESSED.hold(1.0, control="approach").slide("2 mm", speed="1 mm/s").slide(1e-3, over=4.0, direction="-y")
-    assert [(s.control, s.duration, s.end) for s in program.segments[2:]] == [("approach", 2.0, None)] * 1 + [
-        ("approach", 4.0, None)
+    assert [(s.control, s.duration, s.end) for s in program.segments[1:]] == [
+        ("approach", 1.0, None),
+        ("approach", 2.0, None),
+        ("approach", 4.0, None),
     ]
-    assert program.slides
-    assert not PRESSED.slides
-    assert str(program.segments[2]) == "slide 2 mm along x over 2 s at 1 mm/s"
-    assert [segment.holds for segment in program.segments] == [False, True, False, False]
+    assert program.segments[3].slide == Slide(1e-3, "-y")
     assert rv.Program().pressure(1e3, over=0).slide(1e-3, speed=1.0).on_area(2.0).segments[1].slide == Slide(1e-3)
 
 
@@ -50,39 +45,21 @@ def test_cycle__is_a_sine_about_its_mean():
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: rv.Program.table([0, 1], [0, -1.0]), r"load reaches -1\.0 N: expected no negative load"),
-        (
-            lambda: rv.Program.table([0], [-1.0], "pressure"),
-            r"pressure reaches -1\.0 Pa: expected no negative",
-        ),
-        (lambda: rv.Program().load(1.0, over=-1), "over: found -1"),
-        (lambda: rv.Program().load(math.nan, over=1), "load: found nan"),
-        (lambda: rv.Program().pressure("1 kPa", over=0).largest_load, "nominal pressure: expected loads"),
-        (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), r"load reaches -1\.0 N"),
-        (lambda: rv.Program().slide(-1e-3, speed=1.0), "slide: found -0.001"),
-        (lambda: rv.Program().slide(1e-3, speed=1.0, direction="z"), "direction: found 'z'"),
-        (lambda: rv.Program().slide(1e-300, speed=1e300), "over: found 0"),
-        (lambda: rv.Program.cycle(1.0, 0.5, 1e305, 1e6), "cycles: found inf"),
-    ],
-)
-def test_bad_programs__are_named(make, message):
-    with pytest.raises(rv.InputError, match=message):
-        make()
-
-
-@pytest.mark.parametrize(
     ("make", "key", "found"),
     [
+        (lambda: rv.Program.table([0, 1], [0, -1.0]), None, -1.0),
+        (lambda: rv.Program.table([0], [-1.0], "pressure"), None, -1.0),
+        (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), None, -1.0),
+        (lambda: rv.Program.cycle(1.0, 0.5, 1e305, 1e6), "cycles", math.inf),
+        (lambda: PRESSED.load(1.0, over=-1), "over", -1),
+        (lambda: PRESSED.load(math.nan, over=1), "load", math.nan),
         (lambda: PRESSED.hold(1.0, control="force"), "control", "force"),
         (lambda: rv.Program.table([0, 2, 1], [0, 1, 2]), "times.2", 1),
         (lambda: rv.Program.table([1, 2], [0, 1]), "times.0", 1),
         (lambda: rv.Program.table([0], [0, 1]), "values", 2),
         (lambda: PRESSED.slide(0.0, speed=1.0), "slide", 0.0),
-        (lambda: PRESSED.slide("1 N", speed=1.0), "slide", "1 N"),
         (lambda: PRESSED.slide(1e-3, speed="2 m"), "speed", "2 m"),
-        (lambda: PRESSED.slide(1e-3, over=-1), "over", -1),
+        (lambda: PRESSED.slide(1e-300, speed=1e300), "over", 0.0),
         (lambda: PRESSED.slide(1e-3), "speed", None),
         (lambda: PRESSED.slide(1e-3, speed=1, over=1), "speed", 1),
         (lambda: PRESSED.slide(1e-3, speed=1, direction="z"), "direction", "z"),
