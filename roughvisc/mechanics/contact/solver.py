@@ -110,7 +110,7 @@ def solve_contact(
     start_displacement: Array | None = None,
     overwrite: bool = False,
     present: Array | None = None,
-    max_iterations: int = 1000,
+    max_iterations: int = 10_000,
 ) -> ContactState:
     """Return the contact state under a given load or approach.
 
