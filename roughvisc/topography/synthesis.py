@@ -76,7 +76,7 @@ def self_affine(
     shortcut: Quantity | None = None,
     anisotropy: float = 1.0,
     amplitudes: Literal["fixed", "gaussian"] = "fixed",
-    seed: int,
+    seed: int | np.random.Generator,
 ) -> xr.DataArray:
     r"""Generate periodic self-affine roughness by Fourier synthesis with random phases.
 
@@ -110,8 +110,8 @@ def self_affine(
         slope are then the same for every seed, and quantities that depend on them scatter too little: the mean gap 3 to
         10 times less than over samples of a random surface. "gaussian": amplitudes are random too, as in samples of a
         random surface. Use it if the scatter over realisations matters.
-    seed : int
-        Source of random phases and amplitudes.
+    seed : int or numpy.random.Generator
+        Source of random phases and amplitudes. With a generator the recipe cannot be repeated.
 
     Returns
     -------
@@ -155,8 +155,9 @@ def self_affine(
     if rolloff is not None and rolloff < shortcut:
         raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
-    if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
-        raise InputError(key="seed", found=seed, expected="a whole number >= 0")
+    is_number = isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0
+    if not (is_number or isinstance(seed, np.random.Generator)):
+        raise InputError(key="seed", found=seed, expected="a whole number >= 0, or a numpy.random.Generator")
     entropy = np.random.default_rng(seed).integers(1 << 32, size=4).tolist()
     q_x, q_y, weight = wavevectors(shape, cell_of(size, shape))
     q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
@@ -171,7 +172,8 @@ def self_affine(
     heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
     heights *= target / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
-    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": int(seed)}
+    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes}
+    parameters |= {"seed": int(seed) if is_number else None}
     attrs = recipe_of("self_affine", parameters, size, shape) | {"period": list(size)}
     return labelled(heights, cell_of(size, shape), attrs)
 
