@@ -24,7 +24,6 @@ def leakage(
     viscosity: Quantity = 1e-3,
     pressure_drop: Quantity = 1e5,
     along: Literal["x", "y"] = "x",
-    sides: Literal["closed", "periodic"] | None = None,
     flow: bool = False,
 ) -> xr.Dataset:
     r"""Compute the leak rate of a fluid through the gap, from one side of the map to the opposite one.
@@ -41,10 +40,8 @@ def leakage(
         Pressure difference between the two sides, over the whole length of the map (one period if it is periodic): a
         number [Pa], or a text such as ``"1 bar"``.
     along : {"x", "y"}
-        Direction of the flow.
-    sides : {"closed", "periodic"}, optional
-        Whether the other two sides are walls or joined. They may be joined only if the attribute ``boundary`` of the
-        result is ``"periodic"``, which is also the default then.
+        Direction of the flow. The other two sides are joined if the attribute ``boundary`` of the result is
+        ``"periodic"``; otherwise they are walls.
     flow : bool
         Whether to return the flow field, too.
 
@@ -75,13 +72,9 @@ def leakage(
     --------
     >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
     """
-    boundary = dataset.attrs.get("boundary", "free")
     one_of("along", along, ("x", "y"))
-    if sides not in (None, "closed", "periodic") or (sides == "periodic" and boundary != "periodic"):
-        expected = f"'closed', or 'periodic' if the boundary is, which is {boundary!r}"
-        raise InputError(key="sides", found=sides, expected=expected)
-    wrap = boundary == "periodic" and sides != "closed"
     need(dataset, "gap")
+    wrap = dataset.attrs.get("boundary") == "periodic"
     gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
     across = "y" if along == "x" else "x"
     sides_of_cell = cells[along], cells[across]
@@ -113,7 +106,7 @@ def leakage(
         variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
     for name in ("transmissivity", "hydraulic_aperture", "leak_rate", "leak_rate_error"):
-        described[name].attrs |= {"along": along, "sides": "periodic" if wrap else "closed"}
+        described[name].attrs["along"] = along
         if name.startswith("leak"):
             described[name].attrs |= {"viscosity": viscosity, "pressure_drop": pressure_drop}
     return described

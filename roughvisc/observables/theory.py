@@ -13,7 +13,7 @@ from scipy.special import erf
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
-from roughvisc.labels import label, steps_of
+from roughvisc.labels import label
 from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
@@ -91,7 +91,7 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
         if body in dataset.attrs:
             raise InputError(f"the theories are for a half-space: found a result with the {body} {dataset.attrs[body]}")
     material = check_material(material)
-    area, times, force = nominal_area_of(dataset), steps["time"].values, steps["force"].values
+    area, times, force = nominal_area(dataset), steps["time"].values, steps["force"].values
     # int C(t - s) dp(s) for a pressure that is linear between the steps
     since = np.maximum(kept[:, None] - times[None], 0.0)
     integral = material.contact_integral(since)
@@ -106,16 +106,6 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
         "asperity_contact_area": ("time", area * asperity_fraction(strain)),
     }
     return label(xr.Dataset(found, coords={"time": dataset["time"]}))
-
-
-def nominal_area_of(dataset: xr.Dataset) -> float:
-    """Return the nominal area of a result: force over nominal pressure if known, else the area of the surface. [m2]"""
-    steps = steps_of(dataset)
-    known = dataset if steps is None else steps
-    if "nominal_pressure" in known and float(known["nominal_pressure"].max()) > 0:
-        at = known["nominal_pressure"].argmax(...)
-        return float(known["force"].isel(at) / known["nominal_pressure"].isel(at))
-    return nominal_area(dataset)
 
 
 def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:

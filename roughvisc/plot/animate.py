@@ -14,8 +14,7 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, draw_outline, frame_of, frame_title, map_size
-from roughvisc.plot.rows import rows_of
+from roughvisc.plot.maps import COLOUR_MAPS, colour_limits, draw_map, frame_of, frame_title, map_size, rows_of
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.units import unit_for
 from roughvisc.variables import FIELDS, VARIABLES
@@ -54,12 +53,8 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     expect_result(dataset, "x", "y", name)
     if frames < 1 or rate <= 0:
         raise InputError(f"frames is {frames!r} and rate is {rate!r}: expected positive numbers")
-    if path.suffix.lower() in (".gif", ".webp"):
-        writer: Any = PillowWriter(fps=rate)
-    elif path.suffix.lower() == ".mp4" and FFMpegWriter.isAvailable():
-        # even numbers of pixels and this pixel format play everywhere
-        writer = FFMpegWriter(fps=rate, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
-    else:
+    writer = {".gif": PillowWriter, ".webp": PillowWriter, ".mp4": FFMpegWriter}.get(path.suffix.lower())
+    if writer is None or not writer.isAvailable():
         raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or, if ffmpeg is installed, .mp4")
     dataset = dataset.sortby(str(rows_of(dataset).name))
     rows = rows_of(dataset).size
@@ -73,17 +68,13 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, frames:
     first = frame_of(dataset, name, chosen[0])
     image = draw_map(ax, first, unit, COLOUR_MAPS[name], vmax=float(unit(high)), **limits)
     style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
-    title, outline = ax.set_title("", loc="left"), []
+    title = ax.set_title("", loc="left")
 
     def draw(frame: int) -> list[Artist]:
         title.set_text(frame_title(dataset, frame))
         image.set_data(np.ma.masked_invalid(unit(frame_of(dataset, name, frame).transpose("y", "x"))))
-        while outline:
-            outline.pop().remove()
-        if name != "gap" and {"pressure", "gap"} & set(dataset):
-            outline.extend(draw_outline(ax, dataset, frame))
         return [title]
 
     with atomic_write(path) as temporary:
-        FuncAnimation(figure, draw, chosen, cache_frame_data=False).save(temporary, writer)
+        FuncAnimation(figure, draw, chosen, cache_frame_data=False).save(temporary, writer(fps=rate), dpi=100)
     return path

@@ -17,8 +17,9 @@ from matplotlib.ticker import MaxNLocator
 from roughvisc.errors import InputError
 from roughvisc.observables import history as steps_of
 from roughvisc.observables.frames import expect_result
-from roughvisc.observables.theory import asperity_fraction, nominal_area_of, persson_fraction
+from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
+from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import VARIABLES, axis_of
@@ -154,7 +155,7 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
         first = next(iter(results.values()))
         expect_result(first, "height")
         slope = rms_slope(first["height"], periodic=first.attrs.get("boundary") == "periodic")
-        nominal, forces = nominal_area_of(first), np.geomspace(1e-3 * loads.max(), loads.max(), 50)
+        nominal, forces = nominal_area(first), np.geomspace(1e-3 * loads.max(), loads.max(), 50)
         for (name, modulus), dash in zip(named.items(), ("--", ":", "-.") * len(named), strict=False):
             for label, theory, shade in (("low loads", asperity_fraction, "k"), ("Persson", persson_fraction, "0.55")):
                 area = nominal * theory(forces / (nominal * modulus * slope))
@@ -164,8 +165,7 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     if style.is_logarithmic(loads):
         style.log_axis(ax.xaxis, across(loads))
         style.log_axis(ax.yaxis, up(areas))
-    ax.set_xlabel(across.label(VARIABLES["force"].label))
-    ax.set_ylabel(up.label(VARIABLES["contact_area"].label))
+    style.label_panels([ax], across.label(VARIABLES["force"].label), up.label(VARIABLES["contact_area"].label))
     if len(ax.lines) > 1:
         style.legend_above(figure, style.named_in(ax))
     return figure
@@ -213,8 +213,7 @@ def friction(dataset: xr.Dataset) -> Figure:
             named["Persson (2001): waves stressed as in full contact"] = Line2D([], [], color="0.3", ls=":")
         ax.set_xscale("log")
         ax.set_ylim(bottom=0)
-        ax.set_xlabel(across.label(VARIABLES["speed"].label))
-        ax.set_ylabel(VARIABLES[name].label)
+        style.label_panels([ax], across.label(VARIABLES["speed"].label), VARIABLES[name].label)
         ax.grid()
     style.letter_panels(axes)
     style.legend_above(figure, {"computed": Line2D([], [], color="0.3", marker="o", ms=3)} | named if named else {})

@@ -18,13 +18,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from roughvisc.arguments import one_of
+from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage, study_observables
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.rows import frames_at, representative_frames, rows_of
 from roughvisc.topography.grid import cell_edges, cell_side
-from roughvisc.units import Unit, unit_for
-from roughvisc.variables import FIELDS, VARIABLES, axis_of
+from roughvisc.units import Unit, in_si, unit_for
+from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
 #: Perceptually even colour maps without the colour of contact. Pressure and flux darken as they rise.
 COLOUR_MAPS = {"pressure": "viridis_r", "gap": "cividis", "displacement": "viridis", "flux": "cividis_r"}
@@ -40,8 +40,54 @@ _OF_BLOCK = {"pressure": "max", "gap": "min", "flux": "max", "contact": "max"}
 MOST_CELLS = 1024
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN, _SPIKE = 99.8, 1.2
+#: Largest number of times or speeds in one figure.
+_MOST_FRAMES = 24
 #: Direction of the motion -> arrow on a map.
 _ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
+
+
+def rows_of(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the coordinate of the rows of a result: its times or speeds."""
+    return dataset[axis_of(dataset.variables)]
+
+
+def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
+    """Return the numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
+    rows = rows_of(dataset)
+    name = str(rows.name)
+    wanted = np.atleast_1d(np.asarray(in_si(places, VARIABLES[name].units, f"{name}s"), dtype=float)).ravel()
+    if not 0 < wanted.size <= _MOST_FRAMES:
+        raise InputError(key=f"{name}s", found=f"{wanted.size} {name}s", expected=f"1 to {_MOST_FRAMES}")
+    from_end = (wanted < 0) & (wanted == np.floor(wanted)) & (-wanted <= rows.size)
+    if not (from_end | (wanted >= 0)).all() or not np.isfinite(wanted).all():
+        expected = f"{name}s [{VARIABLES[name].units}], or -1 to -{rows.size} to count from the end"
+        raise InputError(key=name, found=wanted.tolist(), expected=expected)
+    nearest = np.abs(rows.values - wanted[:, None]).argmin(axis=1)
+    return np.where(from_end, rows.size + wanted, nearest).astype(int).tolist()
+
+
+def largest_contact(dataset: xr.Dataset) -> int:
+    """Return the number of the last row with the largest contact area, or of the last row if areas are not known."""
+    if "contact_area" not in dataset:
+        return rows_of(dataset).size - 1
+    area = np.nan_to_num(dataset["contact_area"].values)
+    return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
+
+
+def representative_frames(dataset: xr.Dataset) -> list[int]:
+    """Return up to four rows: the largest contact and others in contact; for friction, the ends and the maximum."""
+    rows, key = rows_of(dataset), AXES[axis_of(dataset.variables)].telling
+    if key in dataset:
+        chosen = {int(rows.values.argmin()), int(np.nanargmax(dataset[key].values)), int(rows.values.argmax())}
+        return sorted(chosen, key=lambda row: float(rows[row]))
+    frames = np.arange(rows.size)
+    if "contact_area" in dataset and (area := np.nan_to_num(dataset["contact_area"].values)).max() > 0:
+        frames = frames[area > 1e-3 * area.max()]
+    spread = frames[np.linspace(0, frames.size - 1, min(frames.size, 4)).round().astype(int)]
+    largest = largest_contact(dataset)
+    if largest not in spread and spread.size == 4:
+        spread[1 if largest < spread[2] else 2] = largest
+    return sorted({int(frame) for frame in spread})
 
 
 def drawn(field: xr.DataArray) -> xr.DataArray:
@@ -236,7 +282,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
 def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
     stated = dataset if "leak_rate" in dataset else study_observables(dataset)
-    names = ("along", "sides", "viscosity", "pressure_drop")
+    names = ("along", "viscosity", "pressure_drop")
     options = {name: stated["leak_rate"].attrs[name] for name in names} if "leak_rate" in stated else {}
     gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)
     found = leakage(gap, flow=True, **options)

@@ -6,6 +6,7 @@ import json
 import multiprocessing
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,29 +29,13 @@ _Result = TypeVar("_Result")
 
 #: Name -> function of a result, variables that it needs, and a caption.
 FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {
-    "friction": (
-        friction,
-        ("speed", "friction_coefficient", "contact_fraction"),
-        "Friction coefficient and contact fraction against speed.",
-    ),
+    "friction": (friction, ("speed", "friction_coefficient"), "Friction coefficient and contact fraction."),
     "history": (history, ("time", "force", "approach"), "Histories; dots mark the kept times."),
     "maps": (maps, ("x", "y", "pressure"), "Pressure and gap between the bodies."),
-    "leakage": (
-        lambda dataset: maps(dataset, fields="flux"),
-        ("leak_rate", "gap", "x", "y"),
-        "Flux of the leaking fluid, integrated over the gap.",
-    ),
-    "section": (
-        section,
-        ("x", "y", "height", "pressure", "gap"),
-        "Section through the contact at its largest area: pressure, profile and deformed surface.",
-    ),
-    "slide": (
-        lambda dataset: history(dataset, over="sliding_distance"),
-        ("time", "sliding_distance", "friction_coefficient"),
-        "Friction coefficient and contact area over the distance slid.",
-    ),
-    "surface": (surface, ("height",), "Surface after conditioning: heights, profile, distribution and spectrum."),
+    "leakage": (partial(maps, fields="flux"), ("leak_rate", "gap", "x"), "Flux of the fluid, integrated over the gap."),
+    "section": (section, ("height", "pressure", "gap"), "Section through the contact at its largest area."),
+    "slide": (partial(history, over="sliding_distance"), ("time", "sliding_distance"), "Friction over the distance."),
+    "surface": (surface, ("height",), "Surface after conditioning."),
 }
 #: Resolution of pictures. [1/inch]
 DPI = 150

@@ -11,8 +11,7 @@ from roughvisc.observables import contact
 from roughvisc.observables.deformed import deformed
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
-from roughvisc.plot.maps import plane_unit
-from roughvisc.plot.rows import frames_at, largest_contact, rows_of
+from roughvisc.plot.maps import frames_at, largest_contact, plane_unit, rows_of
 from roughvisc.topography.grid import cell_edges
 from roughvisc.units import Quantity, quantities, unit_for
 from roughvisc.variables import VARIABLES

@@ -25,6 +25,7 @@ from roughvisc.variables import AXES, VARIABLES
 STYLE = {
     "font.size": 9,
     "axes.titlesize": 9,
+    "axes.titley": 1.0,  # a fixed place saves the measurement of all labels
     "axes.linewidth": 0.7,
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,

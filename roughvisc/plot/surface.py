@@ -88,8 +88,6 @@ def _draw_heights(ax: Axes, known: np.ndarray) -> None:
         ax.plot(z, normal, color=style.VERMILION, lw=1, label=f"normal, Sq = {deviation:.3g} {unit.symbol}")
         ax.set_ylim(0, 1.35 * ax.get_ylim()[1])
         ax.legend(loc="upper left", handlelength=1.4)
-    else:
-        ax.text(0.5, 0.5, "flat: one height", transform=ax.transAxes, ha="center", va="center", color="0.4")
     ax.set_xlabel(unit.label("Height, levelled"))
     ax.set_ylabel(f"Density [1/{unit.symbol}]")
 
@@ -109,7 +107,5 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
         style.log_axis(ax.yaxis, density[telling] / scale**4)
         ax.set_title("missing points filled" if gaps else "", loc="right")
         ax.grid()
-    else:
-        ax.text(0.5, 0.5, "too small or too flat", transform=ax.transAxes, ha="center", va="center", color="0.4")
     ax.set_xlabel(f"Wavevector [rad/{symbol}]")
     ax.set_ylabel(f"Power spectral density\n[{symbol}⁴]")

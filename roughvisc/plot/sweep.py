@@ -31,6 +31,8 @@ from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_o
 _MOST_PANELS, _MOST_NAMED = 12, 8
 #: Viridis without its light end, which is hard to see on a white page.
 _SHADES = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.88, 256)))
+#: Entries of the legend for realisations.
+_BAND = Patch(color="0.3", alpha=0.22, lw=0)
 _ITSELF_LINE = {"ls": (0, (4, 1.5)), "lw": 1.1}
 
 
@@ -66,9 +68,14 @@ class Key:
         """The levels as texts without unit."""
         return [f"{level:.4g}" if self.is_numeric else level for level in self.levels]
 
+    @property
+    def norm(self) -> Normalize:
+        """Scale of the colours of numbers: logarithmic if they span decades."""
+        return (LogNorm if style.is_logarithmic(self.levels) else Normalize)(self.levels[0], self.levels[-1])
+
     def colour(self, level: Any) -> Any:
         """Return the colour of a level."""
-        return _SHADES(_norm(self.levels)(level)) if self.is_numeric else style.CYCLE[self.levels.index(level) % 8]
+        return _SHADES(self.norm(level)) if self.is_numeric else style.CYCLE[self.levels.index(level) % 8]
 
 
 def swept_keys(results: xr.Dataset) -> tuple[xr.Dataset, list[Key]]:
@@ -76,27 +83,27 @@ def swept_keys(results: xr.Dataset) -> tuple[xr.Dataset, list[Key]]:
 
     Keys with most numbers come first. A key that depends on another key is left out.
     """
-    varied: dict[str, list[Any]] = {}
-    for name, one in results.coords.items():
-        values = one.values.tolist()
-        if one.dims == ("case",) and name not in ("case", "case_key", ROWS) and len(set(values)) > 1:
-            pairs = (len(set(zip(values, other, strict=True))) for other in varied.values())
-            sizes = (len(set(other)) for other in varied.values())
-            if not any(both == len(set(values)) == size for both, size in zip(pairs, sizes, strict=True)):
-                varied[str(name)] = values
+    names = [name for name, one in results.coords.items() if one.dims == ("case",)]
+    cases = pd.DataFrame({name: results[name].values for name in names if name not in ("case", "case_key", ROWS)})
+    counts, varied = cases.nunique(dropna=False), []
+    for name in cases:
+        pairs = {other: len(cases[[name, other]].drop_duplicates()) for other in varied}
+        if counts[name] > 1 and not any(counts[name] == counts[other] == both for other, both in pairs.items()):
+            varied.append(name)
     dotted = {name: str(results[name].attrs.get("long_name", name)) for name in varied}
-    names, keys = names_of(list(dotted.values())), []
-    for name, values in varied.items():
-        key, units = dotted[name], str(results[name].attrs.get("units", ""))
-        if results[name].dtype.kind in "iuf" and np.isfinite(values).all() and not key.endswith("seed"):
-            middle = [np.sqrt(min(values) * max(values))] if style.is_logarithmic(values) else values
-            unit = unit_for(middle, units)
-            shown = unit(values).tolist()
-            keys.append(Key(name, names[key], unit.symbol, sorted(set(shown))))
+    words, keys = names_of(list(dotted.values())), []
+    for name, key in dotted.items():
+        values, symbol = cases[name], ""
+        if values.dtype.kind in "iuf" and np.isfinite(values).all() and not key.endswith("seed"):
+            middle = [np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values
+            unit = unit_for(middle, str(results[name].attrs.get("units", "")))
+            shown, symbol = unit(values).tolist(), unit.symbol
+            levels = sorted(set(shown))
         else:
             texts = (textwrap.shorten(value_text(key, value) or "none", 40, placeholder="…") for value in values)
             shown = [style.verbatim(text) for text in texts]
-            keys.append(Key(name, names[key], "", list(dict.fromkeys(shown))))
+            levels = list(dict.fromkeys(shown))
+        keys.append(Key(str(name), words[key], symbol, levels))
         results = results.assign_coords({name: ("case", shown)})
     return results, sorted(keys, key=lambda key: (not key.is_numeric, -len(key.levels)))
 
@@ -147,11 +154,10 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         return _draw(table, results[quantity], keys, over=results[along])
     chosen = [key for key in keys if key.column in (along, dotted.get(along))]
     if not chosen:
-        expected = ", ".join([*(name for name, one in dotted.items() if one in {key.column for key in keys}), *curves])
-        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=expected)
-    table = _at_times(results, quantity, times)
+        known = ", ".join([*(key.column for key in keys), *curves])
+        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=known)
+    table, others = _at_times(results, quantity, times), [key for key in keys if key is not chosen[0]]
     at = Key("at", "", "", table["at"].unique().tolist())
-    others = [key for key in keys if key is not chosen[0]]
     return _draw(table, results[quantity], [*chosen, *others[:1], at, *others[1:]])
 
 
@@ -185,14 +191,13 @@ def _at_times(results: xr.Dataset, quantity: str, times: Any = None) -> pd.DataF
         table = values.isel({row: number}).to_dataframe().reset_index()
         near = table[axis].dropna().unique()
         text = AXES[axis].place(near[0], 3)
-        text = text if near.size == 1 else "at the end" if place == -1 else text.replace("=", "≈")
-        parts.append(table.assign(at=text))
+        parts.append(table.assign(at=text if near.size == 1 else "at the end" if place == -1 else f"near {text}"))
     return _known(pd.concat(parts), quantity)
 
 
 def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr.DataArray | None = None) -> Figure:
     """Draw a table of cases: the first key, or `over`, across; the next key as colours; the others as panels."""
-    name, units = style.described(quantity)
+    label, units = style.described(quantity)
     values = table[str(quantity.name)].to_numpy()
     unit = unit_for([np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values, units)
     table = table.assign(shown=unit(values))
@@ -210,18 +215,15 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr
     panels = list(table.groupby(list(groups.values()))) if rest else [((), table)]
     titles = []
     for found, _ in panels:
-        parts = (f"{key.name.lower()} {key.texts[i]} {key.symbol}".strip() for key, i in zip(rest, found, strict=True))
-        title = textwrap.fill(", ".join(parts), 26)
-        titles.append(title if title.startswith("t ") else title[:1].upper() + title[1:])
+        parts = (f"{key.name} {key.texts[i]} {key.symbol}".strip() for key, i in zip(rest, found, strict=True))
+        titles.append(textwrap.fill(", ".join(parts), 26))
     columns = 1 if not rest else len(rest[-1].levels) if len(rest[-1].levels) <= 4 else 3
     width, height = (3.4, 2.0) if columns == 1 else (2.1, 1.7)
     is_text = across is not None and not across.is_numeric
     is_turned = is_text and style.LETTER * len(" ".join(across.texts)) > width
     bottom = 0.45 + style.LETTER * max(map(len, across.texts)) if is_turned else 0.5
-    lines = 1 + max(title.count("\n") for title in titles)
-    figure, axes = style.new_panels(
-        len(panels), columns, width, height, shared="xy", bottom=bottom, lines=lines if any(titles) else 0
-    )
+    look: dict[str, Any] = {"shared": "xy", "bottom": bottom, "lines": max(len(one.split("\n")) for one in titles)}
+    figure, axes = style.new_panels(len(panels), columns, width, height, **look)
     for ax, (_, panel) in zip(axes, panels, strict=True):
         for _, line in panel.groupby(families) if families else [((), panel)]:
             colour = second.colour(line[second.column].iloc[0]) if second else style.BLUE
@@ -235,23 +237,27 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr
             ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
     elif style.is_logarithmic(across.levels):
         style.log_axis(axes[0].xaxis, across.levels)
-    style.label_panels(axes, axes[0].get_xlabel() if over is not None else across.label, unit.label(name))
+    style.label_panels(axes, axes[0].get_xlabel() if over is not None else across.label, unit.label(label))
     style.letter_panels(axes, titles)
-    _name_lines(figure, axes, table, second)
+    named: dict[str, Artist] = {}
+    if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
+        style.colour_bar(ScalarMappable(second.norm, _SHADES), axes, second.label)
+    elif second and len(second.levels) <= 2 * _MOST_NAMED:
+        colours = (second.colour(level) for level in second.levels)
+        named = {text: Line2D([], [], color=one, marker="o") for text, one in zip(second.texts, colours, strict=True)}
+    if REALISATION in table:
+        has_scan = (table[REALISATION] == ITSELF).any()
+        count = table.loc[table[REALISATION] != ITSELF, REALISATION].nunique()
+        kind = "Gaussian surrogates" if has_scan else "realisations"
+        named |= {f"mean of {count} {kind}": Line2D([], [], color="0.3"), "95 % prediction interval": _BAND}
+        named |= {"measured scan": Line2D([], [], color="0.3", **_ITSELF_LINE)} if has_scan else {}
+    style.legend_above(figure, named, second.label if second else "")
     return figure
-
-
-def _norm(values: Any) -> Normalize:
-    """Return the colour scale of some values: logarithmic if they span decades."""
-    low, high = float(np.min(values)), float(np.max(values))
-    return LogNorm(low, high) if style.is_logarithmic(values) else Normalize(low, high if high > low else low + 1)
 
 
 def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> None:
     """Draw one line of a panel; of realisations the mean, the prediction interval, and the measured scan."""
-    look: dict[str, Any] = {"color": colour, "marker": "o" if len(line) <= 100 else ""}
-    if not joined:
-        look["ls"] = ""
+    look: dict[str, Any] = {"color": colour, "marker": "o" if len(line) <= 100 else "", "ls": "-" if joined else ""}
     if REALISATION not in line:
         ax.plot(line["across"], line["shown"], **look)
         return
@@ -265,30 +271,9 @@ def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> No
     else:
         ax.vlines(*ends, color=colour, alpha=0.35, lw=5)
     if itself is not None:
-        ax.plot(
-            itself.index, itself, marker="D", mfc="w", ms=4, color=colour, **(_ITSELF_LINE if joined else {"ls": ""})
-        )
+        dashed = _ITSELF_LINE if joined else {"ls": ""}
+        ax.plot(itself.index, itself, marker="D", mfc="w", ms=4, color=colour, **dashed)
     ax.plot(wide.index, found["mean"], **look)
-
-
-def _name_lines(figure: Figure, axes: list[Axes], table: pd.DataFrame, second: Key | None) -> None:
-    """Draw the legend or colour bar of the key that colours the lines, and entries for lines and bands."""
-    named: dict[str, Artist] = {}
-    if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
-        style.colour_bar(ScalarMappable(_norm(second.levels), _SHADES), axes, second.label)
-    elif second and len(second.levels) <= 2 * _MOST_NAMED:
-        colours = (second.colour(level) for level in second.levels)
-        named = {text: Line2D([], [], color=one, marker="o") for text, one in zip(second.texts, colours, strict=True)}
-    if REALISATION in table:
-        has_scan = (table[REALISATION] == ITSELF).any()
-        count = table.loc[table[REALISATION] != ITSELF, REALISATION].nunique()
-        named |= {
-            f"mean of {count} {'Gaussian surrogates' if has_scan else 'realisations'}": Line2D([], [], color="0.3")
-        }
-        named |= {"95 % prediction interval": Patch(color="0.3", alpha=0.22, lw=0)}
-        if has_scan:
-            named["measured scan"] = Line2D([], [], color="0.3", **_ITSELF_LINE)
-    style.legend_above(figure, named, second.label if second else "")
 
 
 def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
@@ -298,8 +283,8 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     """
     axis = axis_of(results.variables)
     if axis == "speed":
-        for file, name in (("friction", "friction_coefficient"), ("area", "contact_fraction")):
-            yield file, f"{VARIABLES[name].label} against speed, for each case.", sweep(results, name)
+        for name in ("friction_coefficient", "contact_fraction"):
+            yield name, f"{VARIABLES[name].label} against speed, for each case.", sweep(results, name)
         if "reduced_speed" in results and not np.allclose(results["reduced_speed"], results["speed"], equal_nan=True):
             caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
             yield "master", caption, sweep(results, along="reduced_speed")
@@ -309,16 +294,10 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
         if name not in results or not results[name].any():
             continue
         table = _at_times(results, name)
-        values = table[name].to_numpy()
-        stated = [values[:1], *(table[key.column] for key in keys if key.is_numeric)]
-        scale = 1e-6 * np.abs(values).max()
-        if keys and not any(np.allclose(values, one, rtol=0, atol=scale) for one in stated):
-            file = "area" if name == "contact_area" else name
-            yield file, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
+        stated = [table[name].iloc[0], *(table[key.column] for key in keys if key.is_numeric)]
+        small = 1e-6 * table[name].abs().max()
+        if keys and not any(np.allclose(table[name], one, rtol=0, atol=small) for one in stated):
+            yield name, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
         if name in ("contact_area", "leak_rate", *CONDUCTANCES):
             caption = f"{VARIABLES[name].label} over {axis}, for each case."
-            yield (
-                "histories" if name == "contact_area" else f"{name}-histories",
-                caption,
-                sweep(results, name, along=axis),
-            )
+            yield f"{name}-histories", caption, sweep(results, name, along=axis)

@@ -17,16 +17,14 @@ from roughvisc.variables import AXES, VARIABLES, axis_of
 
 #: Markers of the grids, from the finest on.
 _MARKERS = "o^vsDP"
-#: Width and height of the label of a point. [1/72 inch]
-_LABEL = 26, 9
 
 
 @style.apply
 def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
-    Each grid has a marker. Labels state the tolerances; a label without a free place is left out. Errors below the
-    uncertainty of the reference lie in a grey band, and are not part of the front.
+    Each grid has a marker. Labels state the tolerances of the front. Errors below the uncertainty of the reference lie
+    in a grey band, and are not part of the front.
 
     Parameters
     ----------
@@ -81,24 +79,12 @@ def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
         look = {"color": colour, "ms": 5, "mew": 0, "label": f"{grid[0]} × {grid[1]} cells", "zorder": 3}
         ax.plot(time[chosen], error[chosen], marker, **look)
     ax.margins(0.15)
-    low, high = ax.get_ylim()
-    if unsure > low:
-        ax.axhspan(low, unsure, color="0.93", zorder=0, label="uncertainty of the reference")
-        ax.set_ylim(low, high)
-    ax.figure.draw_without_rendering()
-    points = ax.transData.transform(np.c_[time, error]) * 72 / ax.figure.dpi
-    placed: list[np.ndarray] = []
-    for i in [*front, *np.setdiff1d(np.flatnonzero(known), front)]:
-        for side, below in ((1, 0), (-1, 0), (1, 1), (-1, 1)):
-            offset = np.array([5 * side, -9 if below else 3])
-            centre = points[i] + offset + (13 * side, 3)
-            is_clear = (np.abs(points[known] - centre) > (16, 6)).any(axis=1).all()
-            if is_clear and all((np.abs(other - centre) > _LABEL).any() for other in placed):
-                placed.append(centre)
-                text = format_tolerance(float(dataset["tolerance"][i]))
-                look = {"fontsize": 6.5, "color": "0.25", "ha": "left" if side > 0 else "right"}
-                ax.annotate(text, (time[i], error[i]), offset, textcoords="offset points", **look)
-                break
+    ax.set_ylim(ax.get_ylim())
+    if unsure > ax.get_ylim()[0]:
+        ax.axhspan(ax.get_ylim()[0], unsure, color="0.93", zorder=0, label="uncertainty of the reference")
+    for i in front:
+        text = format_tolerance(float(dataset["tolerance"][i]))
+        ax.annotate(text, (time[i], error[i]), (5, 3), textcoords="offset points", fontsize=6.5, color="0.25")
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
     ax.grid()
@@ -107,8 +93,6 @@ def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
 @style.apply
 def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     """Draw the sources of error of a result as bars, and the result over its rows with its 95 % interval.
-
-    Errors are in percent, or as factors on a logarithmic axis if they exceed a factor of 1.6.
 
     Parameters
     ----------
@@ -131,31 +115,24 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     if "quantity" in dataset.dims:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
     axis = axis_of(dataset.variables)
-    rows, names, quantity = dataset[axis], dataset["source"].values.tolist(), str(dataset["quantity"].values)
+    rows, quantity = dataset[axis], str(dataset["quantity"].values)
+    names = [*dataset["source"].values.tolist(), "all together"]
     at = dataset.isel({axis: row})
     half, towards = at["half_width"].values, at["direction"].values
-    with np.errstate(divide="ignore", invalid="ignore"):
-        whole = [np.log(float(at[end] / at["value"])) for end in ("lower", "upper")]
     low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
-    logs = np.nan_to_num([*np.c_[low, high], whole])
-    wide = bool(np.abs(logs).max() > 0.5)
-    ends, middle = (np.exp(logs), 1.0) if wide else (100 * np.expm1(logs), 0.0)
+    whole = [float(at[end] / at["value"].where(at["value"] != 0)) for end in ("lower", "upper")]
+    ends = 100 * (np.nan_to_num([*np.exp(np.c_[low, high]), whole], nan=1.0) - 1)
     count = min(rows.size, 2)
-    names = [*names, "all together"]
     left = 0.2 + style.LETTER * max(map(len, names))
     figure, axes = style.new_panels(count, count, 2.1, 2.1, left=left, between=0.75)
     ax, places = axes[0], np.arange(len(names))[::-1]
     colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
     ax.barh(places, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
-    for place, name in zip(places, names, strict=False):
+    for place, name in zip(places, names, strict=True):
         if name in dataset.attrs["open"].split("; "):
-            look = {"va": "center", "fontsize": 7.5, "color": "0.35", "textcoords": "offset points"}
-            ax.annotate("open", (middle, place), (5, 0), **look)
-    ax.axvline(middle, color="black", lw=0.7)
-    if wide:
-        style.log_axis(ax.xaxis, ends)
-    text = AXES[axis].place(float(rows[row]))
-    ax.set_xlabel(f"Factor of the value at {text} [-]" if wide else f"Error at {text} [%]")
+            ax.text(0.0, place, " open", va="center", fontsize=7.5, color="0.35")
+    ax.axvline(0.0, color="black", lw=0.7)
+    ax.set_xlabel(f"Error at {AXES[axis].place(float(rows[row]))} [%]")
     ax.set_yticks(places, names)
     ax.tick_params(axis="y", length=0)
     ax.use_sticky_edges = False  # else a bar ends at the frame
@@ -169,7 +146,5 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
         curve.plot(over, unit(dataset["value"]), "o-", color=style.BLUE)
         style.row_axis([curve], rows)
         curve.set_ylabel(unit.label(quantity.replace("_", " ").capitalize()))
-        if wide:
-            curve.set_yscale("log")
     style.letter_panels(axes)
     return figure

@@ -332,6 +332,3 @@ def check_observed(observe: Mapping[str, Any], settings: Settings) -> None:
         if not set(_NEEDS[name]) & set(settings.fields):
             expected = f"{' or '.join(map(repr, _NEEDS[name]))} in keep.fields"
             raise InputError(key=where, found=arguments, expected=expected)
-        if arguments.get("sides") == "periodic" and settings.boundary != "periodic":
-            expected = f"'closed', since the boundary is {settings.boundary!r}"
-            raise InputError(key=f"{where}.sides", found="periodic", expected=expected)

@@ -73,10 +73,6 @@ def test_sides__meet_where_the_border_is_periodic():
     free, periodic = result(gap), result(gap, boundary="periodic")
     assert leakage(free).leak_rate.item() == 0.0
     assert leakage(periodic).leak_rate.item() > 0
-    assert leakage(periodic, sides="closed").leak_rate.item() == 0.0
-    assert leakage(periodic).leak_rate.attrs["sides"] == "periodic"
-    with refused("sides", "periodic"):
-        leakage(free, sides="periodic")
 
 
 def test_frames__on_dask_are_tasks_of_their_own():
@@ -92,7 +88,7 @@ def test_frames__on_dask_are_tasks_of_their_own():
 
 @pytest.mark.parametrize(
     ("key", "found"),
-    [("viscosity", "1 bar"), ("viscosity", 0), ("pressure_drop", "much"), ("along", "z"), ("sides", "open")],
+    [("viscosity", "1 bar"), ("viscosity", 0), ("pressure_drop", "much"), ("along", "z")],
 )
 def test_leakage__refuses_wrong_settings(key, found):
     with refused(key, found):

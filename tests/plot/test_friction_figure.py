@@ -119,8 +119,8 @@ def test_sweep_figures__of_friction_have_a_master_curve_where_materials_are_shif
     def drawn(results):
         return [path.name for path in rv.plot.save_sweep_figures(results, tmp_path)]
 
-    assert drawn(several()) == ["sweep-friction.png", "sweep-area.png", "sweep-master.png"]
-    assert drawn(several((1.0, 1.0))) == ["sweep-friction.png", "sweep-area.png"]
+    assert drawn(several()) == ["sweep-friction_coefficient.png", "sweep-contact_fraction.png", "sweep-master.png"]
+    assert drawn(several((1.0, 1.0))) == ["sweep-friction_coefficient.png", "sweep-contact_fraction.png"]
 
 
 #: Loading, a stroke, a stop and a stroke back, in micrometres.

@@ -204,7 +204,7 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
     assert results.contact_area.dims == ("case", "row")
     (ax,) = plot.sweep(results, "approach", along="program.0.load").axes
     assert ax.get_xlabel() == "Load [mN]"
-    assert ax.get_title(loc="left") == "At the end"
+    assert ax.get_title(loc="left") == "at the end"
     held = results.sel(case=results.program_1_hold == 0.1).sortby("program_0_load")
     at_end = [float(one[int(rows) - 1]) for one, rows in zip(held.approach, held.rows, strict=True)]
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
@@ -212,9 +212,10 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
     assert [len(ax.lines) for ax in plot.sweep(results, "approach", along="time").axes] == [3, 3], (
         "a panel for each hold"
     )
-    assert [name for name, _, _ in sweep_figures(results)] == ["area", "histories", "approach"], "the force is known"
+    names = [name for name, _, _ in sweep_figures(results)]
+    assert names == ["contact_area", "contact_area-histories", "approach"], "the force is known"
     written = plot.save_sweep_figures(results, tmp_path / "figures")
-    assert [path.name for path in written] == ["sweep-area.png", "sweep-histories.png", "sweep-approach.png"]
+    assert [path.name for path in written] == [f"sweep-{name}.png" for name in names]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
     assert results_of_sweep(tmp_path) is None
     paths = sorted((tmp_path / "results").glob("*.nc"))

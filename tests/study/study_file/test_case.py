@@ -170,7 +170,7 @@ def test_observe__is_read_in_si_and_does_not_count_in_the_key(read_one):
     [
         {"resistivity": ["5 m K/W", 0.5]},
         {"resistivity": ["2 uohm cm", 0]},
-        {"resistivity": [1, 2], "kind": "electrical"},
+        {"resistivity": ["1 ohm m", 2]},
     ],
 )
 def test_conductance__is_accepted_with_numbers_or_units(read_one, stated):
@@ -189,7 +189,6 @@ def test_conductance__is_accepted_with_numbers_or_units(read_one, stated):
         (LEAKAGE, {"keep": {"fields": ["pressure"]}}, "observe.leakage"),
         ({"leak": {}}, {}, "observe.leak"),
         ({"leakage": 1}, {}, "observe.leakage"),
-        ({"leakage": {"sides": "periodic"}}, {"solve": {"boundary": "free"}}, "observe.leakage.sides"),
     ],
 )
 def test_observe__is_refused_at_the_key(read, observe, tables, key):
