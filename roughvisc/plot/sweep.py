@@ -222,7 +222,7 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr
     is_text = across is not None and not across.is_numeric
     is_turned = is_text and style.LETTER * len(" ".join(across.texts)) > width
     bottom = 0.45 + style.LETTER * max(map(len, across.texts)) if is_turned else 0.5
-    look: dict[str, Any] = {"shared": "xy", "bottom": bottom, "lines": max(len(one.split("\n")) for one in titles)}
+    look: dict[str, Any] = {"shared": "xy", "bottom": bottom, "lines": max(len(one.splitlines()) for one in titles)}
     figure, axes = style.new_panels(len(panels), columns, width, height, **look)
     for ax, (_, panel) in zip(axes, panels, strict=True):
         for _, line in panel.groupby(families) if families else [((), panel)]:
@@ -233,6 +233,7 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr
         style.row_axis(axes, places)
     elif is_text:
         axes[0].set_xticks(range(len(across.texts)), across.texts)
+        axes[0].set_xlim(-0.5, len(across.texts) - 0.5)
         for ax in axes:
             ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
     elif style.is_logarithmic(across.levels):
