@@ -16,6 +16,7 @@ import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.study.case import read_cases, vary
 from roughvisc.study.execution import run as run_module
+from roughvisc.study.first_study import RUBBER
 from roughvisc.study.storage.netcdf import write_result
 from roughvisc.topography.scans import raw_height
 
@@ -257,7 +258,7 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     assert "Scan: focus_variation.x3p\nStudy: focus_variation-study.toml\nNext: " in out
     (case,) = read_cases("focus_variation-study.toml")
     assert case.height().shape == (160, 256)
-    assert case.settings.boundary == "mirror"
+    assert (case.material, case.settings.boundary) == (RUBBER, "mirror")
     ds = rv.run(vary(case, {"surface.resample": [20, 32], "keep.times": 2}), progress=False)
     assert 0 < float(ds.contact_fraction[-1]) < 1
     assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"

@@ -44,12 +44,10 @@ def result_table(dataset: xr.Dataset) -> Group:
         (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, from {' to '.join(ends)}{along}"),
     ]
     for name in variables_in_table("last"):
-        if name not in row or name in (axis.name, "contact_fraction"):
+        if name not in row or name == axis.name:
             continue
         value, unit = float(row[name]), VARIABLES[name].units
         text = "infinite: full contact" if math.isinf(value) else readable(value, unit)
-        if name == "contact_area" and "contact_fraction" in row:
-            text += f", {100 * float(row['contact_fraction']):.3g} % of the surface"
         if f"{name}_error" in row and math.isfinite(value):
             text += f"; numerical error {readable(float(row[f'{name}_error']), unit)}"
         text += ", the largest" if name == axis.telling else ""
@@ -134,8 +132,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
     rows = [
         ("Format", str(height.attrs.get("format", "surface card"))),
         ("Instrument", str(height.attrs.get("instrument", ""))),
-        ("Channel", str(height.attrs.get("channel", "")) + (", one of:" if len(channels) > 1 else "")),
-        ("Other channels", "" if len(channels) > 1 else str(height.attrs.get("other_channels", ""))),
+        ("Channel", str(height.attrs.get("channel", ""))),
         *listed,
         ("Orientation", str(height.attrs.get("orientation", ""))),
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),

@@ -86,7 +86,6 @@ def surface_table(
     folder: str | os.PathLike[str],
     options: Mapping[str, Any],
     steps: Mapping[str, Any],
-    remarks: Mapping[str, str] | None = None,
 ) -> str:
     """Return the ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
 
@@ -100,16 +99,10 @@ def surface_table(
         Options of :func:`roughvisc.open_scan` that the file needs; None for unused options.
     steps : mapping
         Conditioning steps, as for :func:`~roughvisc.topography.conditioning.condition`. [m]
-    remarks : mapping, optional
-        Comment at the end of a line, by its key.
     """
-    remarks = remarks or {}
     near = Path(os.path.relpath(file, folder))
     entries = _entries(Path(file).resolve() if near.parts[0] == ".." else near, options, steps)
-    lines = {key: f"{key} = {value}" for key, value in entries.items()}
-    width = max((len(line) for key, line in lines.items() if key in remarks), default=0)
-    shown = [f"{line:<{width}}  # {remarks[key]}" if key in remarks else line for key, line in lines.items()]
-    return "\n".join(["[surface]", *shown]) + "\n"
+    return "\n".join(["[surface]", *(f"{key} = {value}" for key, value in entries.items())]) + "\n"
 
 
 def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:

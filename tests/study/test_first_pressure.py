@@ -23,7 +23,7 @@ def touching(surface, pressure, compliance):
 
 @pytest.mark.parametrize(("hurst", "most"), [(0.8, 256), (0.5, 64), (0.8, 64)])
 def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, most):
-    """A rubber of 3 and 1 MPa has the contact compliance 1 / 12 MPa at once and 1 / 3 MPa in the end."""
+    """A rubber of 3 and 1 MPa has the contact compliance 1 / 3 MPa in the end."""
     monkeypatch.setattr(first_module, "MOST_PRESSED", most)
     scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=1.7e-5, seed=3)
     found = inspect(scan)
@@ -34,13 +34,12 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     near = 0.02 if most > 128 else 0.1
     assert first.late == pytest.approx(0.05, rel=0.05), "the pressure has two digits"
     assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(first.late, rel=near)
-    assert touching(surface, first.pressure, 1 / 12e6) == pytest.approx(first.early, rel=2 * near)
 
 
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
     first = first_pressure(flat, inspect(flat))
-    assert (first.pressure, first.late, first.early) == (1e3, 1.0, 1.0)
+    assert (first.pressure, first.late) == (1e3, 1.0)
     heights = np.zeros((33, 33))
     heights[:, 11:22] = -1e-6  # the other two thirds touch under any pressure
     plateaus = rv.from_array(heights, (1e-6, 1e-6))
