@@ -246,4 +246,4 @@ def _record(outcome: Outcome, case: Case, folder: Path, *, alone: bool) -> None:
         with suppress(OSError):  # the case failed before
             record_path(folder, outcome.key).unlink(missing_ok=True)
     elif outcome.kind == "failed" and not alone:
-        record_failure(folder, case, outcome.message, outcome.error, outcome.trace)
+        record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)

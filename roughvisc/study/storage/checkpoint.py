@@ -12,7 +12,6 @@ import logging
 import shutil
 import time
 import zipfile
-import zlib
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
@@ -26,7 +25,7 @@ from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.case import NUMERICS_REVISION
-from roughvisc.study.storage.folder import atomic_write
+from roughvisc.study.storage.folder import DAMAGED, atomic_write
 from roughvisc.study.storage.netcdf import lazy
 from roughvisc.variables import RESULT_FORMAT
 
@@ -41,7 +40,7 @@ _SHARE = 0.05
 #: Member with the plain values of a file.
 _PLAIN = "plain"
 #: Errors that occur when a damaged file is read.
-_DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_DAMAGED = (*DAMAGED, RuntimeError, zipfile.BadZipFile)
 _KINDS = {kind.__name__: kind for kind in STATES}
 
 

@@ -16,7 +16,6 @@ import secrets
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -226,12 +225,8 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
     try:
         lock.acquire(timeout=patience)
     except Timeout as error:
-        raise BlockingIOError(
-            errno.EWOULDBLOCK,
-            "another run is at work on this case in this folder: expected one run at a time; wait for it, or use "
-            "another folder",
-            str(path),
-        ) from error
+        text = "another run is at work on this case in this folder: wait for it, or use another folder"
+        raise BlockingIOError(errno.EWOULDBLOCK, text, str(path)) from error
     try:
         yield
     finally:
@@ -245,30 +240,11 @@ def record_path(folder: Path, key: str) -> Path:
     return folder / f"{key}.failed.json"
 
 
-def record_failure(folder: Path, case: Case, message: str, error: str, trace: str) -> None:
-    """Write the record of a failed case, which is named by the key of the case.
-
-    Parameters
-    ----------
-    folder : Path
-        Results folder.
-    case : Case
-        The case.
-    message, error, trace : str
-        Message to the user, class name of the exception, and traceback of an unexpected exception.
-    """
-    record = {
-        "case_key": case.key,
-        "message": message,
-        "error": error,
-        "traceback": trace,
-        "time": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "source": program(),
-        "case": json.loads(case.to_json()),
-    }
+def record_failure(folder: Path, case: Case, **what: str) -> None:
+    """Write the record of a failed case: its message, error and traceback, the program, and the case."""
     path = record_path(folder, case.key)
     try:
-        write_text(path, json.dumps(record, indent=1))
+        write_text(path, json.dumps(what | {"source": program(), "case": json.loads(case.to_json())}, indent=1))
     except (OSError, InputError) as problem:
         log.warning("%s cannot be written: %s", path, problem)
 

@@ -218,11 +218,9 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
                 field = _field(folder, entries[:1] if of_all else entries, name)
                 variables[name] = field[0] if of_all else field
     else:
-        cells = dict.fromkeys(f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values())
-        warn_once(
-            f"{folder}: the results lie on {len(grids)} different grids ({', '.join(cells)}): their histories are "
-            "opened together, without fields; open each with open_result for its fields"
-        )
+        cells = {f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values()}
+        found = f"found {len(grids)} grids ({', '.join(sorted(cells))})"
+        warn_once(f"{folder}: {found}: opened without fields; open_result gives the fields of each result")
     others = [entry.attributes for entry in entries]
     alike = {name: one for name, one in first.attributes.items() if all(other.get(name) == one for other in others)}
     dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))

@@ -85,19 +85,3 @@ def test_axes__are_found_by_cf_xarray(folder):
     pytest.importorskip("cf_xarray")
     with xr.open_dataset(next(folder.glob("*.nc"))) as ds:
         assert dict(ds.cf.axes) == {"X": ["x"], "Y": ["y"], "T": ["time"]}
-
-
-def test_axes__leave_the_surface_flat_in_paraview(folder):
-    """By the reader of VTK, which is ParaView's."""
-    vtk = pytest.importorskip("vtk")
-    path = next(folder.glob("*.nc"))
-    reader = vtk.vtkNetCDFCFReader()
-    reader.SetFileName(str(path))
-    reader.UpdateMetaData()
-    reader.SetDimensions("(x, y)")
-    reader.Update()
-    image = reader.GetOutput()
-    with xr.open_dataset(path) as ds:
-        ends = [float(one) for axis in (ds.y, ds.x) for one in axis[[0, -1]]]
-        assert {image.GetPointData().GetArrayName(i) for i in range(3)} == {"pressure", "displacement", "height"}
-    assert image.GetBounds()[:4] == pytest.approx(ends, rel=1e-9)

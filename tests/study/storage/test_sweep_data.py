@@ -311,24 +311,6 @@ def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path)
     assert ds.height.dims == ("case", "x", "y")
 
 
-def test_open_results__padded_blocks_of_large_fields(tmp_path, monkeypatch):
-    monkeypatch.setattr("roughvisc.study.storage.sweep_data._BLOCK", 3 * 8 * 6 * 8)
-    synthetic(tmp_path, loads=1, seeds=1, times=4)
-    path = tmp_path / f"{0:016x}.nc"
-    with open_result(path) as ds:
-        short = ds.load()
-    short.attrs["case_key"] = "f" * 16
-    synthetic(tmp_path, loads=1, seeds=1, times=7)
-    write_result(short, tmp_path / f"{'f' * 16}.nc")
-    ds = rv.open_results(tmp_path)
-    assert ds.pressure.chunks[1] == (3, 3, 1)
-    assert ds.rows.values.tolist() == [7, 4]
-    np.testing.assert_array_equal(ds.pressure[1, :4], short.pressure)
-    assert ds.pressure[1, 4:].isnull().all()
-    with open_result(path) as long:
-        np.testing.assert_array_equal(ds.pressure[0], long.pressure)
-
-
 def test_open_results__nothing_there(tmp_path):
     with pytest.raises(InputError, match="holds no results"):
         rv.open_results(tmp_path)

@@ -5,10 +5,7 @@ import time
 
 import pytest
 from sample_results import hertz_creep
-from support import BALL
 
-from roughvisc.study.case import read_cases
-from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.storage.folder import lock_case
 from roughvisc.study.storage.index import clean_folder
 from roughvisc.study.storage.netcdf import write_result
@@ -63,14 +60,3 @@ def test_tidy__leaves_a_case_alone_that_is_being_computed(folder):
         assert {path.name for path in folder.glob(f".{KEYS[0]}.*")} == before
     clean_folder(folder)
     assert not list(folder.glob(f".{KEYS[0]}.*"))
-
-
-def test_sweep__tidies_up_after_cases_that_it_need_not_compute(tmp_path):
-    path = tmp_path / "ball.toml"
-    path.write_text(BALL.replace("[24, 21]", "[12, 9]") + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n')
-    cases = read_cases(path)
-    sweep(cases, tmp_path / "out", workers=0, progress=False)
-    before = sorted(p.name for p in (tmp_path / "out").iterdir())
-    leave(tmp_path / "out", cases[0].key)
-    sweep(cases, tmp_path / "out", workers=0, progress=False)
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == before
