@@ -45,7 +45,7 @@ def sweep_cases(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
 
 
 def write_sweep(folder: Path, cases: Mapping[str, Any]) -> None:
-    """Write the cases of a sweep to its folder; if writing fails, the folder has no list of cases."""
+    """Write the cases of a sweep to its folder; if writing fails, the list of an earlier sweep stays."""
     write_json(folder / SWEEP, cases)
 
 
