@@ -111,20 +111,11 @@ def rough_gap(shape, seed=0, slope=1.0):
     return height.max() - height
 
 
-UNIT_RADIUS = 1.0
-MATERIALS = {
-    "maxwell": rv.maxwell(1.0, 1.0),
-    "zener": rv.zener(1.0, 1.0, 1.0),
-    "zener_soft": rv.zener(1.0, 0.01, 0.01),
-    "two_branches": rv.Prony(1.0, 0.0, (1.0, 2.0), (0.3, 3.0)),
-}
-
-
 def scene(material, program, *, shape=(31, 28), size=1.6, **settings):
-    """A sphere on an odd, unequal grid, its apex on a cell centre."""
+    """A sphere of unit radius, its apex on a cell centre."""
     spacing = (size / shape[0], size / shape[1])
     x, y = ((np.arange(n) - n // 2) * d for n, d in zip(shape, spacing, strict=True))
-    gap = (x[:, None] ** 2 + y[None, :] ** 2) / (2 * UNIT_RADIUS)
+    gap = (x[:, None] ** 2 + y[None, :] ** 2) / 2
     boundary = settings.pop("boundary", "free")
     memory = Memory(material, program.duration, settings.pop("keeps_pressure", False))
     return Scene(Grid(shape, spacing, boundary), gap, memory, program, settings.pop("times", None), **settings)
@@ -135,7 +126,6 @@ def displaced(scene, step):
     return scene.memory.displacement(step.point.history)[0]
 
 
-STEP_LOAD = rv.Program().load(0.05, over=0).hold(2.0)
 STUDY = """
 title = "A ball"                            # a comment
 [surface]
@@ -213,23 +203,8 @@ def measured(case, *settings, **options):
     return rv.trade(case, settings, **{"progress": False, **options})
 
 
-def labels(figure):
-    """Labels of all axes, whatever lines they are broken into."""
-    return [text.replace("\n", " ") for ax in figure.axes for text in (ax.get_xlabel(), ax.get_ylabel()) if text]
-
-
 def lines(ax):
     return {line.get_label(): line for line in ax.lines}
-
-
-def told(figure):
-    """What a figure says beside its axes' labels and ticks: titles, legends, notes."""
-    found = [figure._suptitle, figure._supxlabel]
-    for ax in figure.axes:
-        found += [ax.title, ax._left_title, ax._right_title, *ax.texts]
-        found += ax.get_legend().get_texts() if ax.get_legend() else []
-    found += [text for legend in figure.legends for text in legend.get_texts()]
-    return [text.get_text() for text in found if text is not None and text.get_gid() != "exaggeration"]
 
 
 def relative_errors(found, exact):
