@@ -28,14 +28,10 @@ class NoData:
     Any access to it raises :class:`DataNeeded`.
     """
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: Any) -> Any:
         raise DataNeeded(name)
 
-    def __getitem__(self, key: Any) -> Any:
-        raise DataNeeded(key)
-
-    def __contains__(self, key: Any) -> bool:
-        raise DataNeeded(key)
+    __getitem__ = __contains__ = __getattr__
 
 
 def call(function: Callable[..., Any], where: str, table: Mapping[str, Any], *first: Any) -> Any:

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
-from roughvisc.mechanics.grid import on_threads, threads_of, transform_library
+from roughvisc.mechanics.grid import on_threads, threads_of
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
 from roughvisc.variables import STEP, STEPPED, VARIABLES
@@ -31,8 +31,6 @@ Array = NDArray[Any]
 Progress = Callable[[float, float], None]
 #: Attributes of a surface that stay with its heights: the source, and how missing points were filled.
 _ORIGIN = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
-#: Separator of the transform libraries of a resumed solve.
-_THEN = "; then "
 
 
 @dataclass(frozen=True)
@@ -49,20 +47,12 @@ class Checkpoint:
         Number of recorded rows, including rows of steps that are not kept.
     wall_time : float
         Wall time spent so far. [s]
-    transforms : str
-        Transform libraries of the solve, in the order of their use.
     """
 
     state: Any = None
     done: float = 0.0
     rows: int = 0
     wall_time: float = 0.0
-    transforms: str = field(default_factory=transform_library)
-
-    def with_current_transforms(self) -> Checkpoint:
-        """Return the checkpoint of a solve that continues with the transforms of this process."""
-        before = self.transforms.split(_THEN)
-        return replace(self, transforms=_THEN.join(dict.fromkeys([*before, transform_library()])))
 
 
 class Recorder:
@@ -197,7 +187,7 @@ def solve_on_grid(
                 if report is not None:
                     report(row.done, rows.end)
                 if row.state is not None:
-                    recorder.update(Checkpoint(row.state, row.done, count, took, reached.transforms))
+                    recorder.update(Checkpoint(row.state, row.done, count, took))
             return dataset_of(experiment, rows, recorder)
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")

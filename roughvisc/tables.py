@@ -250,9 +250,7 @@ def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mappin
     write = sign.join(_example(one.name, one.unit) for one in wanted.values() if not one.optional)
     found = "holds no rows"
     if rows:
-        has_numbers = (sum(any(plain_number(cell, mark) for mark in ".,") for cell in cells) > 1 for _, cells in rows)
-        numbers = next((at for at, is_numeric in enumerate(has_numbers) if is_numeric), len(rows))
-        line, widest = max(rows[: max(numbers, 1)], key=lambda row: len(row[1]))
+        line, widest = max(rows[:_FIRST], key=lambda row: len(row[1]))  # the first of them
         found = f"found {sign.join(widest)[:200]!r} in line {line}"
     return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
 

@@ -94,8 +94,7 @@ def table(results: Path, out: Path | None) -> None:
 @quantity("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".')
 @quantity("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".')
 @quantity("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".')
-@click.option("--study", type=PATH, help="Study file whose [audit] table to use instead of the stored one.")
-def audit(result: Path, study: Path | None, **properties: Any) -> None:
+def audit(result: Path, **properties: Any) -> None:
     """Check the assumptions of the model for a result.
 
     Prints, for each assumption, a number, a verdict (holds, doubtful, broken, not known) and a reason. Properties
@@ -108,8 +107,7 @@ def audit(result: Path, study: Path | None, **properties: Any) -> None:
     from roughvisc.cli.accuracy_tables import audit_table
     from roughvisc.study.storage.folder import results_at
 
-    stated = {} if study is None else rv.read_cases(study)[0].audit_inputs
-    given = stated | {name: value for name, value in properties.items() if value is not None}
+    given = {name: value for name, value in properties.items() if value is not None}
     console = screen()
     for number, path in enumerate(results_at(result)):
         with rv.open_result(path) as dataset:

@@ -183,20 +183,18 @@ class Case:
         """
         from roughvisc.experiment.resources import require_surface  # slow to import
 
-        before, where = self._checksums, f"{self.origin}: " if self.origin else ""
+        before, source = self._checksums, str(self.origin or "case")
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
             height = surface_height(self.surface)
             is_changed = checksums_of(self.surface) != before
         except InputError as error:
-            raise error.prefixed(str(self.origin) if self.origin else "case") from error
+            raise error.prefixed(source) from error
         if is_changed:
-            changed = (
-                f"{where}surface: {self.surface.get('file', 'the second face')}: was changed after the study was read"
-            )
+            changed = f"{self.surface.get('file', 'the second face')}: was changed after the study was read"
             expected = "the heights that the case's key stands for; run the study again for the new ones"
-            raise RoughviscError(f"{changed}: expected {expected}", transient=True)
+            raise RoughviscError(f"{source}: surface: {changed}: expected {expected}", transient=True)
         return height
 
     def to_json(self) -> str:
@@ -312,7 +310,7 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     try:
         changed = _changed(case.tables, changes, case.origin)
     except InputError as error:
-        raise error.prefixed(str(case.origin) if case.origin else "case") from error
+        raise error.prefixed(str(case.origin or "case")) from error
     return replace(changed, varied={**case.varied, **changed.varied})
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from roughvisc.errors import ConvergenceError, InputError, RoughviscError
 from roughvisc.experiment.base import Problem
 from roughvisc.labels import unconverged, warnings_of
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, program, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -104,7 +105,7 @@ def compute(
     provenance = {
         "Conventions": "CF-1.11",
         "title": case.title + "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items()),
-        "source": f"{program_version()}; {keeper.latest.transforms}",
+        "source": f"{program_version()}; {transform_library()}",
         "history": "\n".join(filter(None, [dataset.attrs.pop("history", ""), ran])),
         "case": stated,
         "case_key": case.key,

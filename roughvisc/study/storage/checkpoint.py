@@ -123,7 +123,7 @@ class CheckpointWriter(Recorder):
                     if len(rows) != ends[-1]:
                         raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
                     parts = {name: _unflatten(value, arrays) for name, value in plain["reached"].items()}
-                    self.latest = Checkpoint(**parts).with_current_transforms()
+                    self.latest = Checkpoint(**parts)
                     count = self.latest.rows  # rows after the state are computed again
                     self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
                     log.info("%s: goes on from here", path)

@@ -403,7 +403,7 @@ def test_other_revision__begins_again(whole, tmp_path, monkeypatch, caplog):
     assert "belongs to another case or revision and is not used" in caplog.text
 
 
-def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, caplog):
+def test_other_transforms__go_on(whole, tmp_path, monkeypatch, caplog):
     """The tolerance is kept by either."""
     case, _, steps = whole(MODES)
     stopped(case, tmp_path, steps // 2)
@@ -416,7 +416,7 @@ def test_other_transforms__go_on_and_are_named(whole, tmp_path, monkeypatch, cap
     assert stop.asked == steps - steps // 2
     assert not caplog.records
     with open_result(path) as mixed:
-        assert mixed.attrs["source"].endswith(f"; {here}; then {there}")
+        assert mixed.attrs["source"].endswith(f"; {there}")
         force = mixed.pressure.sum(("x", "y")).values
     assert run_case(case, tmp_path, stop=stop) == path
     assert stop.asked == steps - steps // 2, "it is finished"
