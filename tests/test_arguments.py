@@ -6,7 +6,7 @@ import pytest
 from support import refused
 
 import roughvisc as rv
-from roughvisc.arguments import call, check, units_of
+from roughvisc.arguments import call, units_of
 from roughvisc.units import Quantity, quantities
 
 
@@ -42,15 +42,3 @@ def test_call__refuses_with_key_value_and_expectation(table, key, found):
         call(area, "disc", table)
     assert caught.value.expected
     assert str(caught.value).startswith(f"{key}: ")
-
-
-def test_check__needs_no_data_and_refuses_the_same():
-    check(rv.gaussian_filter, "filter", {"cutoff": "5 um"})
-    for cutoff in (-1.0, "5 N"):
-        with refused("filter.cutoff"):
-            check(rv.gaussian_filter, "filter", {"cutoff": cutoff})
-    with refused("resample.shape", 1):
-        check(rv.resample, "resample", {"shape": 1})
-    check(rv.observables.leakage, "leakage", {"viscosity": "1 mPa s"})
-    with refused("leakage.viscosity"):
-        check(rv.observables.leakage, "leakage", {"viscosity": 0})

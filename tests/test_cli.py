@@ -268,14 +268,6 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     assert (tmp_path / "focus_variation.x3p").read_bytes() == b"mine"
 
 
-def test_new__states_in_the_study_what_the_file_does_not(invoke, tmp_path):
-    np.save(tmp_path / "plain.npy", np.random.default_rng(0).normal(size=(20, 30)))
-    assert invoke("new", "plain.npy", "--unit", "um", "--spacing", "1um,2um", "-o", "a/plain.toml")[0] == 0
-    (case,) = read_cases("a/plain.toml")
-    height = raw_height("surface", case.surface)
-    assert (height.shape, float(height.x[0]), float(height.y[0])) == ((30, 20), 5e-7, 1e-6)
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -122,11 +122,6 @@ def test_number__outside_its_bounds_is_refused(value, bounds):
         number(value, "m", "radius", **bounds)
 
 
-def test_number__within_its_bounds():
-    for value, bounds in ((0, {"least": 0}), ("1 mm", {"above": 0, "most": 1e-3}), (2.0, {"below": 3})):
-        assert number(value, "m", **bounds) == number(value, "m")
-
-
 def test_number__of_another_quantity_suggests_its_key():
     with pytest.raises(InputError, match=r"load: .*pressure = '2 MPa'"):
         number("2 MPa", "N", "load", instead={"approach": "m", "pressure": "Pa"})

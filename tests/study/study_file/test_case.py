@@ -1,24 +1,17 @@
 """Study files: what they state, what is refused, and what a case is known by."""
 
 import json
-import math
 import pickle
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from strategies import examples
 from support import refused
 
 import roughvisc as rv
-from roughvisc.arguments import units_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import Program
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.si_tables import unit_of
-from roughvisc.topography.synthesis import RECIPES
 
 WAVES = {"generate": "wavy", "amplitude": "1 um", "wavelength": "0.5 mm", "size": "1 mm", "shape": 16}
 LEAKAGE = {"leakage": {"viscosity": "2 mPa s", "pressure_drop": "3 bar", "along": "y"}}
@@ -264,36 +257,8 @@ def test_key__knows_a_scan_by_its_content(read_one, tmp_path):
     assert case["a.sur"].surface_sha256 != case["c.sur"].surface_sha256
 
 
-PREFIXES = st.sampled_from([("um", 1e-6), ("nm", 1e-9), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("km", 1e3)])
-CASE = {
-    "surface": {"generate": "sphere", "radius": 0.01, "size": [1e-3, 1e-3], "shape": [32, 24]},
-    "material": {"model": "elastic", "shear_modulus": 1e6},
-    "program": [{"load": 1.0, "over": 0.0}],
-}
-
-
-@examples(60)
-@given(digits=st.integers(1, 10**12), unit=PREFIXES)
-def test_key__does_not_see_how_a_length_is_written(digits, unit):
-    name, factor = unit
-    base = Case.from_json(json.dumps(CASE))
-    # the decimal that the reader sees, exactly scaled: what a person would have written in metres
-    exponent = round(math.log10(factor))
-    texts = (f"{digits} {name}", float(f"{digits}e{exponent}"), f"{digits}e{exponent} m", f"{digits}e{exponent + 3} mm")
-    assert len({vary(base, {"surface.radius": text}).key for text in texts}) == 1
-
-
 # ----------------------------------------------------------------------------------------------------------------
 # units of keys
-
-
-@pytest.mark.parametrize(
-    ("table", "function"),
-    [*(("material", one) for one in MODELS.values()), *(("surface", one) for one in RECIPES.values())],
-)
-def test_unit_of__is_that_of_the_argument_of_every_model_and_recipe(table, function):
-    for name, unit in units_of(function).items():
-        assert unit_of(f"{table}.{name}") == ("" if unit == "1" else unit)
 
 
 def test_unit_of__other_keys_and_parts_of_values():
