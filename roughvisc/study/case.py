@@ -370,16 +370,16 @@ def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def _digest(stated: Any) -> str:
-    """Return the SHA-256 of nested values, with numbers rounded to 15 significant digits."""
-    text = json.dumps(_rounded(stated), sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    """Return the SHA-256 of nested values, with numbers rounded to 15 significant digits and without notes."""
 
+    def rounded(number: str) -> str:
+        return f"{float(number) + 0.0:.15g}"  # of -0.0 and 0.0 the same
 
-def _rounded(value: Any) -> Any:
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return f"{value + 0.0:.15g}"
-    if isinstance(value, Mapping):
-        return {key: _rounded(entry) for key, entry in value.items() if key != "note"}
-    if isinstance(value, list | tuple):
-        return [_rounded(entry) for entry in value]
-    return value
+    plain = json.loads(
+        json.dumps(stated),
+        parse_int=rounded,
+        parse_float=rounded,
+        parse_constant=rounded,
+        object_hook=lambda table: {key: value for key, value in table.items() if key != "note"},
+    )
+    return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

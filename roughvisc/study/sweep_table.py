@@ -145,24 +145,21 @@ def _realisations(
     for key, value in change.items():
         data = place(data, key, value) if key.partition(".")[0] == "surface" else data
     surface = a_table("surface", data.get("surface"))
-    second = a_table("surface.second", surface.get("second", {}))
+    faces = {_SEED: surface, _SECOND_SEED: a_table("surface.second", surface.get("second", {}))}
     if stated := [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface):
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
-    if "file" in surface or "file" in second:
+    if any("file" in face for face in faces.values()):
         surrogates = [{SURROGATE: number} for number in range(1, count + 1)]
         return [({**change, **one}, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
-    seeds: dict[str, int] = {}
-    for key, face in ((_SEED, surface), (_SECOND_SEED, second)):
-        if face.get("generate") == "self_affine":
-            if not isinstance(face.get("seed"), int):
-                raise InputError(key=where, found=face.get("seed"), expected=f"a whole number as {key}")
-            if "amplitudes" not in face:
-                kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
-                raise InputError(key=where, found=count, expected=f"{key.removesuffix('seed')}amplitudes, {kinds}")
-            seeds[key] = face["seed"]
+    seeds = {key: face.get("seed") for key, face in faces.items() if face.get("generate") == "self_affine"}
     if not seeds:
         made = f"generate = {surface.get('generate')!r}"
         raise InputError(key=where, found=made, expected="a scan, or generate = 'self_affine'")
+    for key, seed in seeds.items():
+        if not isinstance(seed, int) or "amplitudes" not in faces[key]:
+            kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
+            expected = f"a whole number as {key}, and {key.removesuffix('seed')}amplitudes: {kinds}"
+            raise InputError(key=where, found=count, expected=expected)
     return [
         ({**change, **{key: seed + number - 1 for key, seed in seeds.items()}}, {REALISATION: number})
         for number in range(1, count + 1)
