@@ -7,7 +7,6 @@ from support import refused
 import roughvisc as rv
 from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.study.case import Case, vary
-from roughvisc.study.si_tables import unit_of
 
 HEADING = "time [s], compliance [1/Pa]\n"
 #: Coating on rubber.
@@ -99,13 +98,6 @@ def test_on__makes_a_layer_and_nests(read_one):
     assert vary(layer, {"material.on.shear_modulus": "4 MPa"}).key != layer.key
 
 
-def test_on__is_swept(read):
-    sweep = {"material.on.shear_modulus": ["1 MPa", "2 MPa"], "material.thickness": ["10 um", float("inf")]}
-    bases = [one.body.materials[1] for one in read(material=COAT | {"on": ZENER}, sweep=sweep)[::2]]
-    assert [float(base.creep_compliance(0.0)) for base in bases] == pytest.approx([1e-6, 5e-7])
-    assert (unit_of("material.on.shear_modulus"), unit_of("material.on.on.thickness")) == ("Pa", "m")
-
-
 def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(read_one):
     # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
     case, warm = read_one(), read_one(material=ZENER | WLF)
@@ -126,16 +118,6 @@ def test_temperature__both_bodies_of_a_pair_or_one(read_one):
     one = read_one(material={"model": "pair", "a": STIFF, "b": SOFT | WLF})
     assert both.material == one.material != two.material
     assert both.material.fluidity == pytest.approx(two.material.fluidity * 10**0.8)
-
-
-def test_temperature__sweeps_and_its_axis_has_a_unit(read, read_one):
-    sweep = {"material.temperature": ["0 degC", "20 degC", "40 degC"]}
-    law = {"reference_temperature": "20 degC", "activation_energy": "80 kJ/mol"}
-    cold, room, hot = read(material=ZENER | law, sweep=sweep)
-    assert [one.varied["material.temperature"] for one in (cold, room, hot)] == [273.15, 293.15, 313.15]
-    assert cold.material.times > room.material.times > hot.material.times
-    assert room.material == read_one().material
-    assert unit_of("material.temperature") == "K"
 
 
 @pytest.mark.parametrize(
