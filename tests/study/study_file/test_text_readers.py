@@ -1,4 +1,4 @@
-"""Every reader of text on the same numbers: encodings, separators, decimal marks. Right, or refused by name."""
+"""Scans in text on the same numbers: encodings, separators, decimal marks. Right, or refused by name."""
 
 import codecs
 
@@ -7,10 +7,8 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.tables import Wanted, read_table
 
 #: Numbers that show a lost mark, sign or row; as they are written with a decimal point.
-TIMES, VALUES = ("0", "0.5", "2.25", "10.125"), ("0", "1.5", "1200.75", "3.0625")
 HEIGHTS = [[f"{-0.25 + 1.5 * i + 0.125 * j * j:.3f}" for i in range(5)] for j in range(4)]  # line j, column i
 ENCODINGS = {
     "UTF-8": str.encode,
@@ -22,7 +20,6 @@ ENCODINGS = {
     "empty last line": lambda text: f"{text}\n\n".encode(),
     "no last line break": lambda text: text.rstrip("\n").encode(),
 }
-TIME, LOAD = {"time": Wanted("time", "s")}, {"load": Wanted("load", "N")}
 #: separator, decimal mark
 STYLES = [(",", "."), (";", "."), ("\t", "."), (" ", "."), (";", ","), ("\t", ","), (" ", ","), ('","', ",")]
 
@@ -33,23 +30,13 @@ def written(rows, separator, mark):
     return "".join(f"{quote}{separator.join(row).replace('.', mark)}{quote}\n" for row in rows)
 
 
-def table(*heading):
-    return lambda _: [heading, *zip(TIMES, VALUES, strict=True)]
-
-
 def points(_):
     return [(f"{0.5 * i:.2f}", f"{1.5 * j:.2f}", z) for j, line in enumerate(HEIGHTS) for i, z in enumerate(line)]
-
-
-def of_program(path):
-    program = rv.read_program(path, time="t", load="F", thin=0)
-    return np.array([segment.end for segment in program.segments])
 
 
 SCAN = 1e-6 * np.array(HEIGHTS, float).T  # [m]
 #: name -> suffix, rows, what reads them, and the numbers that come out
 READERS = {
-    "history of a machine": ("txt", table("t[s]", "F[N]"), of_program, np.array(VALUES[1:], float)),
     **{
         f"matrix in {suffix}": (
             suffix,
@@ -83,12 +70,3 @@ def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_pa
         path.write_bytes(text.encode("utf-16-le"))  # without its mark
         with pytest.raises(InputError, match=r"numbers\.\w+: .*zero bytes"):
             read(path)
-
-
-@pytest.mark.parametrize("rows", ['0;0;a\n1;2;"b\n2;3;c\n3;4;d\n', '0;0;\n1;"2\n2;3;"\n3;4;\n'])
-def test_quotation_mark_that_is_not_closed__loses_no_rows(rows, tmp_path):
-    path = tmp_path / "table.csv"
-    path.write_text(f"time [s];load [N];note\n{rows}")
-    for read in (lambda: read_table(path, TIME | LOAD), lambda: rv.read_program(path)):
-        with pytest.raises(InputError, match=r"table\.csv, line 3: "):
-            read()
