@@ -106,7 +106,7 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over
     style.value_axis(ax, *(one.get_ydata() for one in ax.lines))
     if ax.get_yscale() == "linear":
         ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
-    ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label))
+    ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label).rstrip())
 
 
 @style.apply
