@@ -25,12 +25,12 @@ _OWN: dict[str, tuple[tuple[str, ...], str]] = {
     "tmd": (("tmd",), "makers.read_truemap"),
     "sur": (("sur",), "makers.read_digital_surf"),
     "csv": (("csv",), "text.read_text_file"),
+    "txt": (("txt", "asc"), "text.read_text_file"),
     "xyz": (("xyz",), "text.read_text_file"),
     **dict.fromkeys(("asc", "zygo", "keyence", "wyko", "esri"), ((), "text.read_text_file")),
 }
-_TEXT = ("xyz", "asc")
 #: Formats to try, in this order, for suffixes that several formats share.
-_SHARED = {"txt": _TEXT, "asc": _TEXT, "dat": ("metropro", *_TEXT), "di": ("di",), "tif": ("ps",)}
+_SHARED = {"dat": ("metropro", "txt"), "di": ("di",), "tif": ("ps",)}
 #: Formats that users added in this process.
 _ADDED: dict[str, tuple[tuple[str, ...], Callable[[Path], ScanFile]]] = {}
 
@@ -156,12 +156,9 @@ def _formats_of(path: Path) -> tuple[str, ...]:
         return ("di",)
     found = tuple(name for name, theirs in suffixes().items() if suffix in theirs)
     if not found:
-        known = sorted({one for theirs in suffixes().values() for one in theirs})
-        raise InputError(
-            f'the suffix {path.suffix!r} is not known: expected format, or "auto" to detect it; known suffixes are '
-            f"{', '.join(known)}",
-            key="format",
-        )
+        known = ", ".join(sorted({one for theirs in suffixes().values() for one in theirs}))
+        expected = f'expected format, or "auto" to detect it; known suffixes are {known}'
+        raise InputError(f"the suffix {path.suffix!r} is not known: {expected}", key="format")
     return found
 
 

@@ -71,8 +71,8 @@ def read_text_file(path: Path, format: str) -> ScanFile:
     path : Path
         The file.
     format : str
-        ``"xyz"`` for points x, y, z, one on each line, in any order; ``"asc"`` for a matrix; ``"csv"`` for either;
-        otherwise the format of a maker.
+        ``"xyz"`` for points x, y, z, one on each line, in any order; ``"asc"`` for a matrix; ``"csv"`` or ``"txt"`` for
+        either; otherwise the format of a maker.
     """
     text = read_text(path)
     begins = text.lstrip('\ufeff"# ').lower()
@@ -80,7 +80,7 @@ def read_text_file(path: Path, format: str) -> ScanFile:
         if begins.startswith(words):
             return read(text)
     is_keyence = "XY Calibration" in text[:4000] and "Horizontal" in text[:4000]
-    if format not in ("xyz", "asc", "csv", "keyence") or (format == "keyence" and not is_keyence):
+    if format not in ("xyz", "asc", "csv", "txt", "keyence") or (format == "keyence" and not is_keyence):
         raise InputError(f"its first line differs: expected a text in the format {format}")
     table = _table(text)
     if is_keyence:
@@ -89,7 +89,7 @@ def read_text_file(path: Path, format: str) -> ScanFile:
     found = None if format == "asc" else _points(table)
     if found is None and format == "xyz":
         raise ValueError("expected three numbers on each line")
-    return found or _matrices(path, format, "\n".join(table.lines) + "\n")
+    return found or _matrices(path, "csv" if format == "csv" else "asc", "\n".join(table.lines) + "\n")
 
 
 def _table(text: str) -> _Table:
