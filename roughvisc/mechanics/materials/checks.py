@@ -58,11 +58,10 @@ def checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = 
             raise InputError(f"table row {row}: {name} is {array[row]:g}: expected a finite number, not negative")
     steps = np.diff(arrays[0]) <= 0
     for row in np.flatnonzero(steps)[:1] + 1 if ascending else ():
+        begins_again = np.count_nonzero(steps) < steps.size / 2 and not steps[row : row + 1].all()
+        expected = f"expected ascending {names[0]}"
+        if begins_again:
+            expected = "several temperatures? expected the rows of one temperature, or a master curve"
         again = f"{names[0]} {arrays[0][row]:g} after {arrays[0][row - 1]:g}"
-        if np.count_nonzero(steps) < steps.size / 2 and row + 1 < arrays[0].size and not steps[row]:
-            raise InputError(
-                f"table row {row}: {again}: several temperatures? expected the rows of one temperature, or a master "
-                "curve with all times multiplied by shift factors"
-            )
-        raise InputError(f"table row {row}: {again}: expected ascending {names[0]}")
+        raise InputError(f"table row {row}: {again}: {expected}")
     return arrays

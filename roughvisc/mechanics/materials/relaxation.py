@@ -78,10 +78,10 @@ def from_relaxation(
         key = "equilibrium" if instantaneous is None else "instantaneous"
         raise InputError(key=key, found=instantaneous, expected="either equilibrium or instantaneous")
     given, terms, unit = ("moduli", moduli, "Pa") if instantaneous is None else ("ratios", ratios, "1")
-    if len(terms) != len(times):
-        raise InputError(key=given, found=len(terms), expected=f"as many as times, {len(times)}")
     if len(moduli) and len(ratios):
         raise InputError(key="ratios", found=ratios, expected="moduli with equilibrium, or ratios with instantaneous")
+    if len(terms) != len(times):
+        raise InputError(key=given, found=len(terms), expected=f"as many as times, {len(times)}")
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
         number(term, unit, f"{given}[{i}]", least=0)
         number(time, "s", f"times[{i}]", above=0)

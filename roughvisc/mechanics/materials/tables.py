@@ -8,7 +8,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -113,17 +112,9 @@ def creep_table(
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
     largest = float(np.abs(misfit).max())
-    return Prony(
-        glassy,
-        float(weights[0] / rows[-1]),
-        tuple(weights[1:].tolist()),
-        tuple(tau.tolist()),
-        poisson,
-        note,
-        longest=float(t[-1]),
-        warning=_gap("creep", rows),
-        misfit=largest if largest > noise else 0.0,
-    )
+    fluidity, terms = float(weights[0] / rows[-1]), (tuple(weights[1:].tolist()), tuple(tau.tolist()))
+    about = {"warning": _gap("creep", rows), "misfit": largest if largest > noise else 0.0}
+    return Prony(glassy, fluidity, *terms, poisson, note, longest=float(t[-1]), **about)
 
 
 @quantities(times="s", moduli="Pa")
@@ -219,8 +210,8 @@ def dynamic_table(
     """
     one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
     given = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    factors = np.ones(given.size) if shift_factors is None else np.asarray(shift_factors, dtype=float)
-    factors = np.full(given.size, float(factors)) if factors.ndim == 0 else factors
+    factors = np.asarray(1.0 if shift_factors is None else shift_factors, dtype=float)
+    factors = np.full(given.size, factors) if factors.ndim == 0 else factors
     names = ("frequency", "storage modulus", "loss modulus", "shift factor")
     given, elastic, viscous, factors = checked_rows(names, given, storage, loss, factors, ascending=False)
     omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
@@ -276,13 +267,14 @@ def _fitted(
     sparse = target.size - 1 < _FEW * np.log10(at[-1] / at[0])
     for per_decade in (_SMOOTH,) if sparse else _OFFERED:
         times = lattice(float(at[0]) / most[0], float(at[-1]) * _SLOWER, per_decade)
-        rows, wanted = columns(times) / scale[:, None], target / scale
+        terms = columns(times)
+        rows, wanted = terms / scale[:, None], target / scale
         if sparse:
             sizes = np.interp(np.log(times), np.log(at), course)
             smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
             rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
         weights = nonnegative(rows, wanted, np.ones(len(rows)))
-        misfit = (columns(times) @ weights - target) / scale
+        misfit = (terms @ weights - target) / scale
         used = np.flatnonzero(weights[1:])
         fits.append((_rms(misfit), np.append(weights[0], weights[1:][used]), times[used], misfit))
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
@@ -302,10 +294,8 @@ def _rms(misfit: Array) -> float:
 
 
 def _note(terms: int, rows: int, misfit: Array, span: str) -> str:
-    largest = np.abs(misfit).max()
-    return (
-        f"{terms} terms fitted to {rows} rows, largest misfit {largest:.2g}, rms {_rms(misfit):.2g} (relative), {span}"
-    )
+    misfits = f"largest misfit {np.abs(misfit).max():.2g}, rms {_rms(misfit):.2g} (relative)"
+    return f"{terms} terms fitted to {rows} rows, {misfits}, {span}"
 
 
 def _gap(kind: str, times: Array) -> str:
@@ -313,13 +303,13 @@ def _gap(kind: str, times: Array) -> str:
 
     Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones.
     """
-    ratio, before, after = max(((b / a, a, b) for a, b in pairwise(times.tolist())), default=(1.0, 0.0, 0.0))
-    if not ratio > _DECADE:
+    ratios = times[1:] / times[:-1]
+    if not ratios.max(initial=1.0) > _DECADE:
         return ""
+    before, after = (format_quantity(float(times[ratios.argmax() + i]), "s") for i in (0, 1))
+    why = "the material between is a guess, and stated errors do not include it"
     return (
-        f"The {kind} table has no row between {format_quantity(before, 's')} and {format_quantity(after, 's')}, more "
-        "than a decade: the material between them is a guess, and stated errors do not include it. Use at least one "
-        "row per decade."
+        f"The {kind} table has no row between {before} and {after}, more than a decade: {why}. Use one row per decade."
     )
 
 
