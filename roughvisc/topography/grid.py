@@ -16,7 +16,7 @@ import xarray as xr
 
 from roughvisc.arguments import DataNeeded, NoData
 from roughvisc.errors import InputError, short_repr
-from roughvisc.units import number
+from roughvisc.units import is_quantity, number
 from roughvisc.variables import VARIABLES
 
 #: 16384 squared: a field of doubles takes 2 GB.
@@ -107,10 +107,9 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
 
 def metres_in(unit: str, name: str) -> float:
     """Return the length of a unit in metres; raise :class:`InputError` if the unit of `name` is not a length."""
-    try:
-        return number(f"1 {unit}", "m")
-    except InputError as error:
-        raise InputError(f"{name} has the unit {unit!r}: expected a length, such as 'm' or 'um'") from error
+    if not is_quantity(f"1 {unit}", "m"):
+        raise InputError(f"{name} has the unit {unit!r}: expected a length, such as 'm' or 'um'")
+    return number(f"1 {unit}", "m")
 
 
 def in_metres(numbers: Any, name: str) -> np.ndarray:

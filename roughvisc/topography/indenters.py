@@ -137,10 +137,8 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
         kept.append(slice(margin, -margin))
     heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
     heights[kept[0], kept[1]] = h.values
-    larger = with_coordinates(heights, *wider, h.attrs)
-    return noted(
-        larger, f"grown from {h.sizes['x']} x {h.sizes['y']} to {larger.sizes['x']} x {larger.sizes['y']} cells"
-    )
+    line = "grown from {} x {} to {} x {} cells".format(*h.shape, *heights.shape)
+    return noted(with_coordinates(heights, *wider, h.attrs), line)
 
 
 def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | None = None) -> xr.DataArray | None:
@@ -232,9 +230,8 @@ def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> x
     h.values = _INDENTERS[name](x, y, **parameters)
     absent = np.isnan(h.values)
     if absent.all():
-        raise InputError(
-            f"radius is {parameters['radius']!r}: expected one that contains a cell centre, for cells of {spacing(h)} m"
-        )
+        expected = f"one that contains a cell centre, for cells of {spacing(h)} m"
+        raise InputError(key="radius", found=parameters["radius"], expected=expected)
     if absent.any():
         h.attrs["missing"] = "absent"
     return h

@@ -69,11 +69,10 @@ def read_file(path: Path, format: str | None, channel: int | str | None, how: Re
         raise InputError(f"{path}: it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
     for axis, d, n in zip(("x", "y"), cell_sides(h, str(path)), h.shape, strict=True):
         if n * d > WIDEST or d < FINEST:
-            raise InputError(
-                f"{path}: it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible "
-                f"(at most {WIDEST:g} m, at least {FINEST:g} m): expected another unit or spacing, and "
-                "height_scale if its heights are in another unit too"
-            )
+            limits = f"which is not plausible (at most {WIDEST:g} m, at least {FINEST:g} m)"
+            expected = "another unit or spacing, and height_scale if its heights are in another unit too"
+            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m"
+            raise InputError(f"{path}: {found}, {limits}: expected {expected}")
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
     attrs["orientation"] = orientation(file.format)
     attrs["instrument"] = file.instrument or None
@@ -160,11 +159,9 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
         if spread > 0 and np.abs(rest - one).min() > _FAR * spread:
             here = values == one
             values = np.where(here, np.nan, values)
-            complaints.append(
-                f"{here.sum()} points have the height {one:g} and all others lie within {rest.min():g} to "
-                f"{rest.max():g}: taken as missing; no_data = {one:g} confirms this, any other number keeps these "
-                "heights"
-            )
+            others = f"all others lie within {rest.min():g} to {rest.max():g}"
+            remedy = f"no_data = {one:g} confirms this, any other number keeps these heights"
+            complaints.append(f"{here.sum()} points have the height {one:g} and {others}: taken as missing; {remedy}")
     return values
 
 
@@ -302,8 +299,7 @@ def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
         raise InputError(f"{source}: all {h.size} points are missing: expected heights")
     beyond = values[np.abs(values) > (highest if h.size >= _FEWEST else FARTHEST)]
     if beyond.size:
-        raise InputError(
-            f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} "
-            "m from zero): expected height_scale = 1e-6, or another factor, if they are in another unit than stated; "
-            "no_data = the number in the file, or NaN in an array, if it marks missing points"
-        )
+        limit = f"which is not plausible (at most {highest:g} m from zero)"
+        expected = "height_scale = 1e-6, or another factor, if they are in another unit than stated; "
+        expected += "no_data = the number in the file, or NaN in an array, if it marks missing points"
+        raise InputError(f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, {limit}: expected {expected}")

@@ -103,10 +103,8 @@ def open_scan(
         if "file" in table and stated is not None:
             found = sha256(existing(table["file"]))
             if stated.lower() != found:
-                raise InputError(
-                    f"the checksum of {Path(table['file']).name} is {found}, sha256 states {stated}: the file was "
-                    "changed or damaged"
-                )
+                name = Path(table["file"]).name
+                raise InputError(f"the checksum of {name} is {found}, not {stated}: the file was changed or damaged")
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
         raise error.prefixed(str(path)) from error

@@ -125,15 +125,10 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
-    return xr.Dataset(
-        {
-            "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
-            "modes": (
-                "wavevector",
-                counted[ring].astype(int),
-                {"units": "1", "long_name": "waves in the ring"},
-            ),
-        },
-        coords={"wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"})},
-        attrs={"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"},
-    )
+    variables = {
+        "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
+        "modes": ("wavevector", counted[ring].astype(int), {"units": "1", "long_name": "waves in the ring"}),
+        "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
+    }
+    about = {"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"}
+    return xr.Dataset(variables, attrs=about)

@@ -143,9 +143,7 @@ def self_affine(
     one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
     hurst = number(hurst, "1", "hurst", above=0, most=1.0)
     if (rms_slope is None) == (rms_height is None):
-        raise InputError(
-            f"rms_slope is {rms_slope!r} and rms_height is {rms_height!r}: expected exactly one of the two"
-        )
+        raise InputError(key="rms_slope", found=rms_slope, expected="exactly one of rms_slope and rms_height")
     target = rms_slope if rms_height is None else rms_height
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
     finest = 2 * max(d / s for d, s in zip(cell_of(size, shape), stretch, strict=True))

@@ -219,13 +219,6 @@ def test_gaussian_filter__equals_the_sum_that_the_standard_writes():
     assert float(gaussian_filter(h, cutoff)[i, j]) == pytest.approx(expected, rel=1e-9)
 
 
-def test_crop__keeps_the_coordinates():
-    h = rough()
-    part = crop(h, x=(1e-5, 2e-5), y=(0, 4e-5))
-    xr.testing.assert_equal(part, h.sel(x=slice(1e-5, 2e-5), y=slice(0, 4e-5)))
-    assert part.shape == (5, 13)
-
-
 def test_rotate90__turns_counter_clockwise():
     h = sphere(1e-4, (6e-5, 3e-5), (15, 10))
     h = h + 1e-7 * xr.where((h.x > 5e-5) & (h.y < 1e-5), 1.0, 0.0)  # a mark at lower right
@@ -250,16 +243,6 @@ def test_combine__adds_the_faces_and_refuses_unequal_grids():
     for other in (b.isel(x=slice(1, None)), b.assign_coords(x=b.x * 1.001), b.assign_coords(y=b.y + 1e-6)):
         with pytest.raises(InputError, match="one grid"):
             combine(a, other)
-
-
-def test_mirror__repeats_without_a_step():
-    h = rough((8, 5))
-    doubled = mirror(h)
-    assert doubled.shape == (16, 10)
-    np.testing.assert_array_equal(doubled[:8, :5], h)
-    np.testing.assert_array_equal(doubled, doubled[::-1, ::-1])
-    np.testing.assert_array_equal(doubled[0], doubled[-1])
-    np.testing.assert_allclose(np.diff(doubled.x), CELL[0], rtol=1e-9)
 
 
 def test_conditioning__is_the_same_in_nanometres():

@@ -7,7 +7,7 @@ import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import checked, in_metres, spacing
+from roughvisc.topography.grid import checked, spacing
 
 UNITS = pint.UnitRegistry()
 H = rv.self_affine((24e-6, 27e-6), (12, 9), hurst=0.8, rms_slope=0.1, seed=4)
@@ -48,14 +48,6 @@ def test_heights__are_metres_however_they_are_stated(form):
     assert {found.attrs["units"], found.x.attrs.get("units", "m"), found.y.attrs.get("units", "m")} == {"m"}
 
 
-def test_heights__of_integers_and_masked():
-    counts = xr.DataArray(masked(np.arange(108).reshape(12, 9)), H.coords, attrs={"units": "nm"})
-    found = checked(counts, "test")
-    expected = np.where(np.arange(108) == 7, np.nan, np.arange(108) * 1e-9).reshape(12, 9)
-    np.testing.assert_allclose(found, expected, rtol=1e-14)
-    np.testing.assert_array_equal(in_metres(masked(H.values), "heights"), np.where(expected >= 0, H, np.nan))
-
-
 REFUSED = {
     "kelvin": lambda: H.assign_attrs(units="K"),
     "nonsense": lambda: H.assign_attrs(units="bananas"),
@@ -86,11 +78,6 @@ def written(h, tmp_path, suffix):
     return rv.open_scan(tmp_path / f"scan{suffix}")
 
 
-def pressed(h, **how):
-    program = rv.Program().pressure(2e4, over=0)
-    return rv.simulate(h, rv.elastic(1e6), program, boundary="periodic", progress=False, **how)
-
-
 DOORS = {
     "level": rv.level,
     "mask_outliers": rv.mask_outliers,
@@ -105,8 +92,6 @@ DOORS = {
     "mirror": rv.mirror,
     "parameters": rv.parameters,
     "psd": rv.psd,
-    "simulate": pressed,
-    "simulate, with the grid's error": lambda h: pressed(h, grid_error=True),
 }
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -52,16 +51,6 @@ def test_combine__smaller_cells_keep_the_waves_that_the_larger_ones_hold():
     x, y = ((np.arange(n) + 0.5) / n for n in (9, 8))
     expected = 1e-7 * np.outer(np.cos(4 * np.pi * x), np.cos(3 * np.pi * y))
     np.testing.assert_allclose(both, expected, rtol=0, atol=1e-18)
-
-
-def test_combine__on_one_grid_is_the_same_however_it_is_aligned():
-    rng = np.random.default_rng(4)
-    a, b = (rv.from_array(rng.normal(0, 1e-7, (7, 12)), spacing=(1e-6, 0.3e-6)) for _ in range(2))
-    xr.testing.assert_allclose(rv.combine(a, b, "x"), rv.combine(a, b, "x", align="centre"), rtol=1e-13)
-    # a whole number of cells apart: cells of one against cells of the other
-    both = rv.combine(a, b, align="centre", offset=(2e-6, -0.6e-6))
-    np.testing.assert_allclose(both, a.values[2:, :-2] + b.values[:-2, 2:], rtol=1e-12)
-    assert both.x[0] == a.x[2]
 
 
 def test_combine__points_missing_or_filled_in_the_second_are_so_in_the_sum():

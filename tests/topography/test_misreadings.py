@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 import xarray as xr
-from scan_files import CELL, SHAPE, refusal, survive, tilted, write_sdf, write_text, write_x3p
+from scan_files import CELL, refusal, survive, tilted, write_sdf, write_text, write_x3p
 from support import refused
 
 from roughvisc.errors import InputError
@@ -38,13 +38,6 @@ def test_separated_values__empty_ones_are_missing_and_words_are_refused(tmp_path
     assert float(h[2, 1]) == pytest.approx(7e-6)
     path.write_text("1,2,3,4\n5,six,7,8\n9,10,11,12\n")
     assert "line 2" in refusal(path, unit="um", spacing=1e-6)
-
-
-def test_heights_of_metres__are_refused_as_widths_are(tmp_path):
-    from_array(1e6 * tilted(), CELL).to_netcdf(tmp_path / "scan.nc")
-    assert "heights" in refusal(tmp_path / "scan.nc")
-    from_array(0.9 + tilted(), CELL).to_netcdf(tmp_path / "high.nc")
-    assert open_scan(tmp_path / "high.nc").shape == SHAPE
 
 
 # -- headings ----------------------------------------------------------------------------------------------------------

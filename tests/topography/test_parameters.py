@@ -93,17 +93,6 @@ def test_psd__sums_to_the_variance(shape):
     assert spectrum.attrs["area"] == pytest.approx(h.size * 6e-12)
 
 
-def test_psd__is_the_two_dimensional_density():
-    """A single wave a cos(qx) is two modes of density a^2 A / 4 each."""
-    h = wavy(1e-6, 1e-4, SIZE, SHAPE, waves=1)
-    spectrum = psd(h)
-    ring = spectrum.sel(wavevector=2 * np.pi / 1e-4, method="nearest")
-    assert float(ring["psd"] * ring["modes"]) == pytest.approx(2 * 1e-12 / 4 * np.prod(SIZE), rel=1e-10)
-    assert float((spectrum["psd"] * spectrum["modes"]).sum() / (ring["psd"] * ring["modes"])) == pytest.approx(
-        1, rel=1e-9
-    )
-
-
 def test_psd__window_keeps_the_level_of_noise_and_stops_leakage():
     noise = from_array(np.random.default_rng(1).normal(size=(128, 125)), 1e-6)
     variances = [float((s["psd"] * s["modes"])[5:].sum()) for s in (psd(noise, "hann"), psd(noise))]

@@ -17,7 +17,6 @@ from scan_files import (
     file_card,
     real,
     refusal,
-    survive,
     tilted,
     write_x3p,
 )
@@ -165,13 +164,6 @@ def test_from_array__labels_and_refuses():
 
 
 # -- damaged files -----------------------------------------------------------------------------------------------------
-
-
-@real
-@pytest.mark.parametrize("name", [n for n in TABLE if n != "gwyddion-export-english.txt"] + ["nms-1.nms", "xyz-2.txt"])
-def test_damage__of_real_scans(name, tmp_path):
-    options = {"nms-1.nms": {"spacing": 1e-6}, "xyz-2.txt": {"unit": "um"}}.get(name, {})
-    survive(tmp_path / name, (SCANS / name).read_bytes(), **options)
 
 
 # -- surface cards -----------------------------------------------------------------------------------------------------

@@ -180,12 +180,6 @@ def test_self_affine__anisotropy_stretches_the_texture_along_x():
     assert slopes[1] / slopes[0] == pytest.approx(4.0, rel=0.1)
 
 
-def test_self_affine__is_the_same_in_nanometres():
-    metres = self_affine((3.0, 2.0), SHAPE, hurst=0.8, rms_slope=0.1, rolloff=1.0, seed=1)
-    nano = self_affine((3e-9, 2e-9), SHAPE, hurst=0.8, rms_slope=0.1, rolloff=1e-9, seed=1)
-    np.testing.assert_allclose(nano * 1e9, metres.values, rtol=1e-9, atol=1e-12)
-
-
 @pytest.mark.parametrize(
     "h",
     [

@@ -113,8 +113,8 @@ def creep_table(
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
     largest = float(np.abs(misfit).max())
     fluidity, terms = float(weights[0] / rows[-1]), (tuple(weights[1:].tolist()), tuple(tau.tolist()))
-    about = {"warning": _gap("creep", rows), "misfit": largest if largest > noise else 0.0}
-    return Prony(glassy, fluidity, *terms, poisson, note, longest=float(t[-1]), **about)
+    found = Prony(glassy, fluidity, *terms, poisson, note, longest=float(t[-1]), warning=_gap("creep", rows))
+    return dataclasses.replace(found, misfit=largest) if largest > noise else found
 
 
 @quantities(times="s", moduli="Pa")

@@ -42,26 +42,25 @@ def read_hdf5(path: Path) -> ScanFile:
 
 
 def _channel(path: Path, name: str, variable: xr.DataArray) -> Channel:
-    gridded = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
     unit = variable.attrs.get("units")
-    if not gridded or (unit is not None and not is_quantity(f"1 {unit}", "m")):
+    is_grid = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
+    if not is_grid or (unit is not None and not is_quantity(f"1 {unit}", "m")):
         return Channel(name, variable.shape, lambda: None, unit, kind="no areal height")
 
     def load() -> xr.DataArray:
         with _open(path) as dataset:
             return dataset[name].astype(float).compute().transpose("x", "y")
 
-    shape = (variable.sizes["x"], variable.sizes["y"])
-    if not {"x", "y"} <= set(variable.coords):
-        return Channel(name, shape, load, unit)
-    units = [variable[axis].attrs.get("units") for axis in "xy"]
-    positions = [variable[axis].values.astype(float) for axis in "xy"]
-    if None in units:
-        if units[0] != units[1]:
-            raise InputError(f"its coordinates x and y have the units {units[0]!r} and {units[1]!r}: expected both")
-        return Channel(name, shape, load, unit, None, positions=(positions[0], positions[1]))
-    x, y = (at * metres_in(str(one), axis) for at, one, axis in zip(positions, units, "xy", strict=True))
-    return Channel(name, shape, load, unit, "m", positions=(x, y))
+    positions, lateral, shape = None, None, (variable.sizes["x"], variable.sizes["y"])
+    if {"x", "y"} <= set(variable.coords):
+        x, y = (variable[axis].values.astype(float) for axis in "xy")
+        lateral, other = (variable[axis].attrs.get("units") for axis in "xy")
+        if (lateral is None) != (other is None):
+            raise InputError(f"its coordinates x and y have the units {lateral!r} and {other!r}: expected both")
+        if lateral is not None:
+            x, y, lateral = x * metres_in(str(lateral), "x"), y * metres_in(str(other), "y"), "m"
+        positions = (x, y)
+    return Channel(name, shape, load, unit, lateral, positions=positions)
 
 
 @contextmanager

@@ -83,38 +83,35 @@ def read_with_surface_topography(path: Path, format: str, source: BytesIO | Stri
         raise InputError(key="format", found=format, expected=f"one of {', '.join(sorted(suffixes()))}, or 'auto'")
     reader = lookup_reader_by_format[format](str(path) if source is None else source)
 
-    def load(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-        if found.is_uniform is False:
-            raise InputError("its points lie on no uniform grid: expected equal steps in x and y")
-        sized = found.physical_sizes is not None
-        topography = found.topography() if sized else found.topography(physical_sizes=shape)
-        return np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
-
-    channels = [_channel(found, load) for found in reader.channels]
+    channels = [_channel(found) for found in reader.channels]
     described = reader.channels[0].info.get("instrument", {}) if channels else {}
     instrument = described.get("name", "") if isinstance(described, dict) else ""
     default = getattr(reader, "_default_channel_index", None)
     return ScanFile(format, channels, default, str(instrument or ""), close=reader.close)
 
 
-def _channel(found: Any, load: Any) -> Channel:
+def _channel(found: Any) -> Channel:
     from SurfaceTopography.Support.UnitConversion import is_length_unit
 
-    shape = tuple(int(n) for n in found.nb_grid_pts or ())
+    shape, sizes = tuple(int(n) for n in found.nb_grid_pts or ()), found.physical_sizes
+
+    def load() -> np.ndarray:
+        topography = found.topography(**({} if sizes is not None else {"physical_sizes": shape}))
+        return np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan)
+
     # a reader may mistake another unit for a length: phases in Bruker files come as heights in ('µm', None)
     units = [unit for unit in (found.unit, found.data_unit) if unit is not None]
     is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
     if len(shape) == 1 or 1 in shape:
-        kind = "profile"
-    else:
-        kind = "height" if found.is_height_channel and found.dim == 2 and is_length else "no areal height"
-    unit = lateral = found.unit if kind == "height" else None
-    sides = None
-    if kind == "height" and found.physical_sizes is not None:
-        sides = tuple(float(size) / n for size, n in zip(found.physical_sizes, shape, strict=True))
+        return Channel(str(found.channel_id), shape, load, kind="profile")
+    if not (found.is_height_channel and found.dim == 2 and is_length and found.is_uniform is not False):
+        return Channel(str(found.channel_id), shape, load, kind="no areal height on a uniform grid")
+    lateral, sides = found.unit, None
+    if sizes is not None:
+        sides = tuple(float(size) / n for size, n in zip(sizes, shape, strict=True))
         header = found.info.get("raw_metadata", {})
-        if unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
+        if found.unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
             lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
             if lateral is not None and other != lateral:
                 sides = (sides[0], sides[1] * number(f"1 {other}", lateral))
-    return Channel(str(found.channel_id), shape, lambda: load(found, shape), unit, lateral, sides or None, kind=kind)
+    return Channel(str(found.channel_id), shape, load, found.unit, lateral, sides)

@@ -54,12 +54,3 @@ def test_short_ramp_before_a_long_hold__is_resolved(material):
     scale = references.punch_approach(1.0, rv.elastic(0.25), rv.Program().load(1.0, over=0), [0.0])
     assert found == pytest.approx(exact / scale, rel=1e-3, abs=0)
     assert ds.attrs["series_error"] <= 1e-4
-
-
-def test_noisy_table__dissipates():
-    """Under a held approach the force of a passive material falls at every moment, whatever the noise of the rows."""
-    noise = 1 + 0.03 * np.random.default_rng(2).standard_normal(ROWS.size)
-    table = rv.creep_table(ROWS, creep(ROWS) * noise, noise=0.4)
-    times = np.append(0, np.geomspace(1e-4, 10.0, 40))
-    _, ds = sunk(table, rv.Program().approach(1.0, over=0).hold(10.0), times)
-    assert (np.diff(ds.force.values) < 0).all()

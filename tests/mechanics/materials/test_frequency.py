@@ -37,18 +37,6 @@ def test_power_law__is_the_transform_of_its_creep():
     assert np.isinf(complex_compliance(material, 0.0))
 
 
-@pytest.mark.thorough
-def test_table_and_own_material__come_near_the_series_that_they_sample():
-    exact = rv.zener(1.0, 0.5, 0.5)
-    t = np.geomspace(1e-6, 1e6, 1200)
-    table = rv.creep_table(tuple(t), tuple(exact.creep_compliance(t)))
-    w = np.array([0.0, 0.1, 1.0, 20.0])
-    np.testing.assert_allclose(complex_compliance(table, w), complex_compliance(exact, w), rtol=2e-3)
-
-    own = rv.creep(exact.creep_compliance)
-    np.testing.assert_allclose(complex_compliance(own, w), complex_compliance(exact, w), rtol=2e-3)
-
-
 def test_table__has_its_own_poisson_ratio():
     t = np.geomspace(1e-4, 1e4, 40)
     half, third = (complex_compliance(rv.creep_table(t, 1 + t**0.3, poisson=nu), [0.1, 2.0]) for nu in (0.5, 0.3))
@@ -67,12 +55,6 @@ def test_shift__multiplies_the_frequency():
     for material in (rv.zener(1.0, 1.0, 1.0), rv.power_law(0.5, 2.0, 0.3)):
         shifted = complex_compliance(rv.shift(material, 7.0), FREQUENCIES)
         np.testing.assert_allclose(shifted, complex_compliance(material, 7.0 * FREQUENCIES), rtol=1e-12)
-
-
-def test_zero_frequency_alone__of_a_table_is_refused():
-    table = rv.creep_table((0.1, 1.0), (1.0, 1.1))
-    with pytest.raises(InputError, match="frequency is zero throughout"):
-        complex_compliance(table, 0.0)
 
 
 def test_frequencies_below_those_of_a_table__are_refused():

@@ -66,20 +66,6 @@ def test_shifted__a_table_ends_later_in_the_cold():
         cold.contact_compliance(7001.0)
 
 
-@pytest.mark.parametrize("material", [MATERIALS[name] for name in ("bulk", "power law", "own")])
-def test_simulate__ten_times_slower_material_and_program_make_the_same_contact(material):
-    height = rv.sphere(1e-2, (1e-3, 1.1e-3), (17, 20))
-
-    def run(body, slower):
-        program = rv.Program().load(0.02, over=0.1 * slower).hold(2.0 * slower)
-        times = slower * np.array([0.05, 0.1, 2.1])
-        return rv.simulate(height, body, program, times=times, tolerance=1e-3, progress=False)
-
-    warm, cold = run(material, 1.0), run(rv.shift(material, 10.0), 10.0)
-    assert cold.approach.values == pytest.approx(warm.approach.values, rel=2e-3)
-    assert cold.contact_area.values == pytest.approx(warm.contact_area.values)
-
-
 @pytest.mark.parametrize(
     ("wrong", "key"),
     [
