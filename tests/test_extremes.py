@@ -98,15 +98,6 @@ def test_power_law(glassy, exponent, duration):
     assert_follows(*step_load(rv.power_law(glassy, 1.0, exponent), duration))
 
 
-@pytest.mark.parametrize("count", [2, 60])
-@pytest.mark.parametrize("duration", [1e-11, 1e11])
-def test_exponentials_over_24_decades(count, duration):
-    material = rv.Prony(1.0, 0.0, (4.0 / count,) * count, tuple(np.geomspace(1e-12, 1e12, count)))
-    ds, exact = step_load(material, duration)
-    assert_follows(ds, exact)
-    assert ds.attrs["memory"].startswith(f"{count} exponential")
-
-
 def test_steps_of_all_sizes_in_one_program():
     """Holds from 1e-15 to 1e15 retardation times, ascending."""
     program = rv.Program().load(0.1 / R, over=0)
@@ -127,9 +118,7 @@ def test_steps_of_all_sizes_in_one_program():
             {},
             r"program\.1: a segment lasts 1e-15 s where time has reached",
         ),
-        (rv.Program().load(1e-3, over=1e10) + rv.Program.cycle(1e-3, 5e-4, 1e-8, 3), {}, "the period of a cycle lasts"),
         (rv.Program().load(1e-3, over=1e200), {}, r"an end by 1e\+100 s"),
-        (rv.Program().load(1e-3, over=1e-200), {}, "expected at least 1e-100 s"),
         (rv.Program().load(1e150, over=1.0), {}, "the load reaches 1e"),
         (
             rv.Program().load(1e90, over=0),

@@ -106,11 +106,10 @@ def test_steps__belong_to_every_selection_of_rows(ball, select):
     [
         lambda one, other: concatenated([one, other], "case", data_vars="all"),
         lambda one, other: concatenated([one.isel(time=[-1]), other.isel(time=[-1])], "time", data_vars="minimal"),
-        lambda one, other: one.assign_coords(time=one.time * 1e3),
         lambda one, other: one.interp(time=[0.1, 0.2]),
         lambda one, other: one.assign(force=other.force),
     ],
-    ids=["cases", "times", "milliseconds", "interpolated", "changed"],
+    ids=["cases", "times", "interpolated", "changed"],
 )
 def test_steps__of_another_result_are_refused(ball, heavier, change):
     """xarray keeps the encoding of the first Dataset."""

@@ -129,12 +129,3 @@ def test_grid_error__is_estimated_by_default_if_it_takes_at_most_a_third(cells, 
     assert found(slid, fields=()) is stated
     assert found(pressed, grid_error=True)
     assert not found(pressed, grid_error=False)
-
-
-def test_grid_error__is_in_a_result_by_default():
-    settings = {"progress": False, "fields": ("pressure",), "times": [0.0]}
-    ball, press = rv.sphere(1e-2, 1e-3, (256, 257)), rv.Program().load(1e-3, over=0)
-    found = rv.simulate(ball, rv.elastic(1e6), press, **settings)
-    exact = rv.closed_forms.hertz(1e-2, 4e6, 1e-3)
-    assert abs(float(found.approach[0]) / exact.approach - 1) < float(found.grid_error_approach[0]) < 0.01
-    assert "grid_error" not in rv.simulate(ball, rv.elastic(1e6), press, grid_error=False, **settings)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from layered_ball import POISSONS, errors
-from references import Cone, ElasticLayer, OnSheet, Paraboloid, PunchOnSheet
+from references import Cone, ElasticLayer, OnSheet, Paraboloid
 
 import roughvisc as rv
 from roughvisc.mechanics.layer import effective_compliance
@@ -22,17 +22,13 @@ def test_elastic_ball__agrees_with_the_integral_equation(ratio, wide, poissons):
     assert max(errors(ratio, wide, poissons, 129)) < 1e-3
 
 
-def test_cone_and_punch__agree_with_the_integral_equation():
+def test_cone__agrees_with_the_integral_equation():
     layer, a = ElasticLayer(THICKNESS, 0.5, 0.3, 0.2), 1.5 * THICKNESS
     body = rv.layer(rv.elastic(1e6), THICKNESS, on=rv.elastic(5e6, 0.3))
     exact = OnSheet(Cone(0.1), layer)
     load = rv.Program().load(float(exact.scaled_force(a)) * 4e6, over=0)
     ds = pressed(rv.cone(0.1, 2.6 * a, 65), body, load)
     assert float(ds.approach[0]) == pytest.approx(float(exact.reduced(a)), rel=1e-3)
-    load, punch = rv.Program().load(1e-3, over=0), rv.flat_punch(a, 2.6 * a, 65)
-    # of counted cells it has a radius right to half of one, as on a half-space: the ratio of both is closer
-    found = pressed(punch, rv.elastic(1e6), load).approach[0] / pressed(punch, body, load).approach[0]
-    assert float(found) == pytest.approx(PunchOnSheet(a, layer).scaled_stiffness / (2 * a), rel=1.3 / 65)
 
 
 @pytest.mark.thorough

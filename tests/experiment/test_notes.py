@@ -2,6 +2,7 @@
 
 import re
 
+import numpy as np
 import pytest
 
 import roughvisc as rv
@@ -24,6 +25,18 @@ def test_accuracy__is_no_warning_if_every_row_keeps_the_tolerance():
 @pytest.mark.parametrize("material", [rv.kelvin_voigt(1e6, 1e5), rv.zener(1e8, 1e6, 1e5)])
 def test_accuracy__warns_of_materials_with_little_instantaneous_compliance(material):
     assert "instantaneous" in warnings_of(press(material).attrs)["accuracy"]
+
+
+@pytest.mark.filterwarnings("ignore:.*table:UserWarning")
+def test_series__warns_of_a_table_far_from_any_passive_material():
+    """Creep that gathers speed; noise within the stated noise is no reason."""
+    times, rows = np.linspace(0.0, 1.0, 21), np.geomspace(1e-3, 10.0, 40)
+    gathering = rv.creep_table(times, 1e-6 * (1 + 20 * np.maximum(times - 0.3, 0)))
+    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
+    noisy = rv.creep_table(rows, 1e-6 * rows**0.4 * noise, noise=0.1)
+    assert "no passive material" in warnings_of(press(gathering).attrs)["series"]
+    for material, tolerance in ((gathering, 0.99), (noisy, 1e-2)):
+        assert "series" not in warnings_of(press(material, tolerance=tolerance).attrs)
 
 
 ROUGH = rv.self_affine((64e-6, 48e-6), (64, 48), hurst=0.8, rms_slope=0.1, rolloff=3e-5, shortcut=8e-6, seed=1)

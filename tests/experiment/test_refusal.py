@@ -5,12 +5,10 @@ from types import SimpleNamespace
 
 import psutil
 import pytest
-from samples import RUBBER
 from scipy import fft
 from support import ROUGH, refused
 
 import roughvisc as rv
-from roughvisc.errors import TooLargeError
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
@@ -46,13 +44,6 @@ def test_run__refuses_what_cannot_fit_and_says_what_would(study, limited, tmp_pa
     status, _, wrong = invoke("run", str(path), "--no-plots", "--out", tmp_path / "out")
     assert (status, "300 x 256 cells" in wrong) == (2, True)
     assert not list(tmp_path.glob("out/*")), "nothing is kept of it"
-
-
-def test_simulate__refuses_what_cannot_fit(limited):
-    height = rv.self_affine((1e-3, 1e-3), (512, 512), hurst=0.8, rms_slope=0.1, seed=1)
-    limited(120e6, "left of the container's limit")
-    with pytest.raises(TooLargeError, match="120 MB"):
-        rv.simulate(height, RUBBER, PRESS, boundary="periodic", times=100, progress=False)
 
 
 def test_sweep__refuses_only_what_does_not_fit(study, limited, tmp_path):

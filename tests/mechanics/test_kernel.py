@@ -1,12 +1,10 @@
 """Influence of one cell: full precision at any distance, positive symbols."""
 
-import math
-
 import mpmath
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol
 from roughvisc.mechanics.half_space import love_kernel
 
 
@@ -38,9 +36,3 @@ def test_love_kernel__is_exact_at_any_distance(spacing, error):
 def test_free_space_symbol__is_positive(aspect):
     symbol = free_space_symbol(HALF_SPACE, (64, 48), (1.0, float(aspect)))
     assert symbol.min() > 0.5  # of the short side; zero at the middle offset would make it negative
-
-
-def test_periodic_symbol__is_two_over_the_wave_number():
-    symbol = periodic_symbol(HALF_SPACE, (9, 6), (0.5, 0.25))
-    assert symbol[2, 1] == pytest.approx(2 / math.hypot(2 * 2 * math.pi / 4.5, 2 * math.pi / 1.5), rel=1e-14)
-    assert symbol[0, 0] == 0

@@ -34,20 +34,6 @@ def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
         assert one.approach == other.approach
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_on_threads__does_each_part_once_and_raises_what_one_raises(threads):
-    field = np.zeros(1001)
-
-    def work(part):
-        field[part] += 1
-        if part.stop == 1001:
-            raise ValueError("the last part")
-
-    with pytest.raises(ValueError, match="the last part"):
-        grids.on_threads(work, 1001, 64, threads)
-    np.testing.assert_array_equal(field, 1)
-
-
 def doubled(queue):
     field = np.ones(1000)
     grids.on_threads(lambda part: np.multiply(field[part], 2, out=field[part]), 1000, 64, 2)
