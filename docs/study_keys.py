@@ -77,13 +77,6 @@ _EXTRA = {
     "program.table: a file": {
         "file": ("", "required", "the path of a table of a test machine, relative to the study")
     },
-    "keep": {
-        "precision": (
-            "",
-            "none",
-            "relative precision of the fields in the file; exact without it",
-        )
-    },
     "observe": {
         "leakage": ("", "none", "leak rate of a fluid through the gap"),
         "conductance": ("", "none", "conductance of the contact spots"),

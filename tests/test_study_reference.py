@@ -65,7 +65,7 @@ EXPECTED = {
     ("program.table",): keys_of(rv.Program.table) - {"control"},
     ("program.table: a file",): {"file", *keys_of(read_history, 1)},
     ("friction",): keys_of(SteadySliding),
-    ("solve", "keep"): keys_of(Settings) - {"missing"} | {"precision"},
+    ("solve", "keep"): keys_of(Settings) - {"missing"},
     ("observe.leakage",): keys_of(rv.observables.leakage, 1),
     ("observe.conductance",): keys_of(rv.observables.conductance, 1),
     ("audit",): keys_of(rv.audit, 1),

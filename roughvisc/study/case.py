@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["Case", "read_cases", "read_study", "vary"]
 
 #: Incremented whenever the numbers of an unchanged case change.
-NUMERICS_REVISION = 48
+NUMERICS_REVISION = 49
 
 
 @cache
@@ -77,8 +77,6 @@ class Case:
         Settings of the solve, with the boundary that ``auto`` resolves to.
     late_times : tuple of float
         Listed times after the end of the program, which are not kept. [s]
-    precision : float or None
-        Relative precision of the fields in the file; None if they are exact.
     """
 
     tables: Mapping[str, Any]
@@ -89,7 +87,6 @@ class Case:
     experiment: Experiment = field(compare=False)
     settings: Settings = field(compare=False)
     late_times: tuple[float, ...] = field(compare=False)
-    precision: float | None = field(compare=False)
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -169,7 +166,7 @@ class Case:
             {name: value for name, value in face.items() if name not in ("file", "second") and value is not False}
             for face in _faces(self.surface)
         ]
-        return _digest([tables, surface, settings, self.precision, self._checksums, NUMERICS_REVISION])[:16]
+        return _digest([tables, surface, settings, self._checksums, NUMERICS_REVISION])[:16]
 
     def height(self) -> xr.DataArray:
         """Return the conditioned heights of the surface, peaks up. [m]

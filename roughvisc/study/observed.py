@@ -88,7 +88,7 @@ def _add(case: Case, path: Path) -> bool:
             found, compat="equals", join="exact"
         )
         whole.attrs = result.attrs | {"case": case.to_json(), OBSERVED: json.dumps(known)}
-        write_result(whole, path, precision=case.precision)
+        write_result(whole, path)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True
 

@@ -85,9 +85,8 @@ _FILE, _WRITE = 0.05, 3e-9
 _FULL = 0.95
 #: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
 _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
-#: Size of a row without its fields [byte], and bits per value of a compressed pressure and of another compressed field
-#: in addition to the bits of the precision. Measured at precisions of 1e-2 and 1e-4.
-_ROW, _PRESSURE_BITS, _FIELD_BITS = 300.0, 9.0, 3.0
+#: Size of a row without its fields. [byte]
+_ROW = 300.0
 
 
 def plan(
@@ -455,7 +454,7 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
     Parameters
     ----------
     case : Case
-        Case, with its fields and their precision.
+        Case, with its fields.
     cells : int
         Number of cells of the surface.
     rows, steps : float
@@ -463,12 +462,7 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
     contact : float
         Mean part of the cells in contact at kept times.
     """
-    touching = rows * (contact + 0.01)
-    pressure, other = touching, rows
-    if case.precision is not None:
-        bits = -math.log2(case.precision)
-        pressure, other = touching * (bits + _PRESSURE_BITS) / 64, rows * (bits + _FIELD_BITS) / 64
-    fields = sum(pressure if name == "pressure" else other for name in case.settings.fields)
+    fields = sum(rows * (contact + 0.01) if name == "pressure" else rows for name in case.settings.fields)
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
 
 

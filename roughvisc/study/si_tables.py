@@ -117,7 +117,7 @@ def _units() -> dict[str, dict[str, str]]:
         "program": UNITS | segments,
         "friction": units(SteadySliding) | {"from": "m/s", "to": "m/s"},
         "solve": units(Settings) | {"time_step": "s"},
-        "keep": {"times": "s", "precision": "1"},
+        "keep": {"times": "s"},
         "observe": units(*OBSERVABLES.values()),
         "audit": units(audit),
     }

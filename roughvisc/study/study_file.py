@@ -46,9 +46,9 @@ SEGMENTS: dict[str, Callable[..., Program]] = {
     "slide": Program.slide,
 }
 PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": Program.table}
-#: Table of each setting, and of the precision of the fields in a file.
+#: Table of each setting.
 TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
-TABLE_OF |= dict.fromkeys(("fields", "times", "precision"), "keep")
+TABLE_OF |= dict.fromkeys(("fields", "times"), "keep")
 #: Observable -> fields, one of which it needs.
 _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
 #: Largest number of speeds of ``from``, ``to`` and ``count``.
@@ -202,9 +202,6 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
     else:
         experiment = call(SteadySliding, "friction", a_table("friction", tables["friction"]))
     settings, late_times = settings_of(tables, experiment)
-    precision = tables.get("keep", {}).get("precision")
-    if precision is not None:
-        precision = number(precision, "1", "keep.precision", above=0, below=1)
     check_observed(a_table("observe", tables.get("observe", {})), settings)
     check(audit, "audit", a_table("audit", tables.get("audit", {})))
     return {
@@ -213,7 +210,6 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
         "experiment": experiment,
         "settings": settings,
         "late_times": late_times,
-        "precision": precision,
     }
 
 
@@ -299,7 +295,6 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Sett
         here = a_table(table, tables.get(table, {}))
         refuse_unknown(table, here, [name for name, one in TABLE_OF.items() if one == table])
         stated |= here
-    stated.pop("precision", None)
     if stated.get("times") == "all":
         del stated["times"]
     try:

@@ -180,7 +180,7 @@ def run_case(
                 keeper.resume()
                 try:
                     dataset = compute(case, keeper, progress=progress, threads=threads)
-                    write_result(dataset, path, precision=case.precision)
+                    write_result(dataset, path)
                 except RoughviscError as error:
                     if not error.transient:  # it would fail again in the same way
                         keeper.remove()

@@ -33,10 +33,9 @@ from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 ERRORS = (OSError, RuntimeError, LookupError, ValueError, AttributeError)
 #: Free space below which a full disk counts as the cause of a failed write. [byte]
 _NEARLY_FULL = 1 << 20
-#: Fields that are compressed only if they are rounded, because hardly any of their numbers are equal. On 512 x 512
-#: cells compression takes 34 ms for an exact gap, to 0.66 of its size; 15 ms for a gap rounded to 1e-4, to 0.23; and
-#: 3.6, 6.2 and 9.7 ms for a pressure on 2, 9 and 18 % of the cells, to 0.03, 0.10 and 0.19. With shuffled bytes a
-#: pressure takes longer and needs larger files.
+#: Fields that are not compressed, because hardly any of their numbers are equal. On 512 x 512 cells compression takes
+#: 34 ms for a gap, to 0.66 of its size, and 3.6, 6.2 and 9.7 ms for a pressure on 2, 9 and 18 % of the cells, to 0.03,
+#: 0.10 and 0.19. With shuffled bytes a pressure takes longer and needs larger files.
 _DENSE = ("gap", "height")
 _TINY = 1 << 12  # largest size without compression [byte]
 #: Chunk of a field over (time, x, y). Times to read one frame, and the history of one cell, at 512 x 512 x 50,
@@ -222,7 +221,7 @@ def verify(place: str | Path) -> dict[Path, str]:
     return flaws
 
 
-def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | None = None) -> Path:
+def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
     """Write a result to one NetCDF file, by a temporary file and a rename.
 
     Parameters
@@ -232,9 +231,6 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
         layers of one chunk. The history of accepted steps in the Dataset becomes the group ``steps``.
     path : path
         The file to write; an existing file is replaced.
-    precision : float, optional
-        Relative precision of fields over (time, x, y), which are rounded in binary for better compression. Their
-        attributes state the precision. None: exact.
 
     Returns
     -------
@@ -264,9 +260,9 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
             try:
                 # all variables are declared before values are written: each change of mode writes the metadata again
                 with NETCDF:
-                    declared = _declare(file, root, precision)
+                    declared = _declare(file, root)
                     if steps is not None:
-                        declared += _declare(file.createGroup(STEPS), steps, None)
+                        declared += _declare(file.createGroup(STEPS), steps)
                 for stored, variable in declared:
                     _write(stored, variable)
             finally:
@@ -281,9 +277,7 @@ def write_result(dataset: xr.Dataset, path: str | Path, *, precision: float | No
     return Path(path)
 
 
-def _declare(
-    place: netCDF4.Dataset, part: xr.Dataset, precision: float | None
-) -> list[tuple[netCDF4.Variable, xr.Variable]]:
+def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
     place.setncatts(part.attrs)
     labels = {str(name): set(one.dims) for name, one in part.coords.items() if name not in part.dims}
@@ -301,20 +295,17 @@ def _declare(
         for dimension, size in variable.sizes.items():
             if dimension not in place.dimensions and dimension not in getattr(place.parent, "dimensions", ()):
                 place.createDimension(str(dimension), size)
-        encoding = encoding_of(str(name), variable, precision)
+        encoding = encoding_of(str(name), variable)
         stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
         stored.set_auto_maskandscale(False)
         if "chunksizes" in encoding:  # chunks are written whole; by default the library caches 64 MB per variable
             stored.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
-        if bits := encoding.get("significant_digits"):
-            attributes["relative_precision"] = precision
-            attributes["quantization"] = f"rounded to nearest in binary, {bits} bits of the fraction kept"
         stored.setncatts(attributes)
         declared.append((stored, variable))
     return declared
 
 
-def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> dict[str, Any]:
+def encoding_of(name: str, variable: xr.Variable) -> dict[str, Any]:
     """Return the arguments of netCDF4 to create a variable; coordinates have no fill value."""
     encoding: dict[str, Any] = {"fill_value": False}
     if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
@@ -322,18 +313,9 @@ def encoding_of(name: str, variable: xr.Variable, precision: float | None) -> di
     if not variable.ndim:
         return encoding
     encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
-    rounded = precision is not None and is_field(variable)
-    if rounded:  # a double has 52 bits of fraction
-        bits = min(max(math.ceil(-math.log2(precision)) - 1, 1), 52)
-        encoding |= {"significant_digits": bits, "quantize_mode": "BitRound"}
-    if variable.nbytes > _TINY and (rounded or name not in _DENSE):
+    if variable.nbytes > _TINY and name not in _DENSE:
         encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
     return encoding
-
-
-def is_field(variable: xr.Variable) -> bool:
-    """Return whether a variable is a field for each row of a result."""
-    return variable.ndim == 3 and variable.dims[0] in AXES and variable.dims[1:] == ("x", "y")
 
 
 def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -346,7 +328,7 @@ def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
     """Write a variable; a field in layers of one chunk, so that only one layer is in memory."""
-    together = chunks(variable.shape)[0] if is_field(variable) else 0
+    together = chunks(variable.shape)[0] if variable.ndim == 3 else 0
     for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
         values = variable[layer].values  # without the lock, because reading the source may need it
         with NETCDF:
