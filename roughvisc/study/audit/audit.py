@@ -171,13 +171,11 @@ def audit(
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
     expect_result(result, "force", "approach", "contact_area", "contact_fraction")
-    case = None
     if "case" in result.attrs:
         from roughvisc.study.case import Case  # imports this module
 
-        case = Case.from_json(result.attrs["case"])
-        given = {**case.audit_inputs, **given}
-    scene, findings = Scene(result, case, given), []
+        given = {**Case.from_json(result.attrs["case"]).audit_inputs, **given}
+    scene, findings = Scene(result, given), []
     for name, limit in LIMITS.items():
         try:
             found = limit.check(scene)

@@ -2,35 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.experiment.loading import Loading
 from roughvisc.observables.histories import history
-from roughvisc.topography.borders import is_analytic, recipe_name
+from roughvisc.topography.borders import is_analytic
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.variables import axis_of
 
-if TYPE_CHECKING:
-    from roughvisc.study.case import Case
-
 Array = NDArray[np.float64]
 
-#: Relative rounding of loads and areas.
+#: Relative rounding of loads.
 _ROUNDING = 1e-9
-#: Margin of the shortest wavelength of a recipe.
-_JUST_BELOW = 0.99
 
 
 class NotKnown(Exception):
@@ -45,14 +38,11 @@ class Scene:
     ----------
     dataset : xarray.Dataset
         Result of one case.
-    case : Case or None
-        Case of the result, if the result belongs to a study.
     given : mapping
         Stated properties, in SI.
     """
 
     dataset: xr.Dataset
-    case: Case | None
     given: Mapping[str, Any]
 
     def need(self, *names: str) -> list[float]:
@@ -111,22 +101,10 @@ class Scene:
         """Whether the surface has no roughness: a smooth recipe, or wavelengths above a quarter of the shorter side."""
         return is_analytic(self.period) or self.waves[2] > min(self.sides) / 2
 
-    @property
-    def is_complete(self) -> bool:
-        """Whether the grid holds all waves: of an analytic recipe, or of one that states its shortest wavelength."""
-        if is_analytic(self.period) or recipe_name(self.period) != "self_affine":
-            return is_analytic(self.period)
-        made = json.loads(self.height.attrs["recipe"])["parameters"]
-        shortest = made["shortcut"] / math.sqrt(made["anisotropy"])
-        # conditioning may have added shorter waves
-        return bool(shortest > 2 * max(self.cells) and self.waves[2] / 2 > _JUST_BELOW * shortest)
-
     @cached_property
     def loaded_slope(self) -> float:
         """Root mean square slope of the loaded surface: in free space, of the part above the largest approach. [-]"""
-        depth, highest = math.inf, float(self.height.max())
-        if self.boundary == "free":  # the highest point of an indenter may lie between the cells
-            depth = float(self.dataset["approach"].max()) - (float(self.height.attrs.get("highest", highest)) - highest)
+        depth = float(self.dataset["approach"].max()) if self.boundary == "free" else math.inf
         slope = rms_slope(self.height, self.boundary == "periodic", depth)
         if math.isnan(slope):
             raise NotKnown("The result contains no loaded heights.")
@@ -137,11 +115,9 @@ class Scene:
     @cached_property
     def fullest(self) -> xr.Dataset:
         """Row with the largest force; among equal forces the last row with the largest contact area."""
-        force = self.dataset["force"].values
-        area = np.nan_to_num(self.dataset["contact_area"].values)  # NaN: not solved
-        area = np.where(force >= force.max() * (1 - _ROUNDING), area, -1.0)
-        last = int(np.flatnonzero(area >= area.max() * (1 - _ROUNDING))[-1])
-        return self.dataset.isel({axis_of(self.dataset): last})
+        force, area = self.dataset["force"].values, self.dataset["contact_area"].values
+        ranks = np.lexsort((np.nan_to_num(area), force >= force.max() * (1 - _ROUNDING)))  # NaN: not solved
+        return self.dataset.isel({axis_of(self.dataset): ranks[-1]})
 
     @property
     def force(self) -> float:
@@ -182,41 +158,29 @@ class Scene:
         return float(xr.DataArray(curvature).where(self.pressure > 0).mean())
 
     @cached_property
-    def slide(self) -> tuple[float, float]:
-        """Largest speed [m/s] and friction power [W]; zero if nothing slides."""
+    def slide(self) -> tuple[float, float, xr.Dataset]:
+        """Largest speed [m/s], largest friction power [W], and the row with this power; zeros if nothing slides."""
         if "speed" in self.dataset.dims:
-            speed = self.dataset["speed"]
-            return float(speed.max()), float((self.dataset["friction_force"] * speed).max())
+            power = np.nan_to_num((self.dataset["friction_force"] * self.dataset["speed"]).values)  # NaN: not solved
+            return float(self.dataset["speed"].max()), float(power.max()), self.dataset.isel(speed=power.argmax())
         if "sliding_distance" not in self.dataset:
-            return 0.0, 0.0
+            return 0.0, 0.0, self.fullest
         steps = history(self.dataset)
         lasting = np.diff(steps["time"]) > 0
         if not lasting.any():
             raise NotKnown("The speed of the slides is not known: audit the result with all of its steps.")
         speeds = np.diff(steps["sliding_distance"])[lasting] / np.diff(steps["time"])[lasting]
-        return float(speeds.max()), float(np.max(steps["friction_force"].values[1:][lasting] * speeds))
+        power = steps["friction_force"].values[1:][lasting] * speeds
+        return float(speeds.max()), float(np.max(power)), self.fullest
 
     # ----------------------------------------------------------------------------------------------------- bodies
 
-    @cached_property
-    def creep_time(self) -> float:
-        """Time during which the material of a stored result creeps. [s]"""
-        assert self.case is not None
-        if isinstance(self.case.experiment, Loading):
-            return self.case.experiment.program.duration
-        longest = max(float(np.ptp(self.height[axis].values)) for axis in ("x", "y"))
-        return longest / min(self.case.experiment.speeds)
-
-    @cached_property
-    def facts(self) -> Mapping[str, Any]:
-        """Attributes of the result; for a stored result also the facts on material and program from its case."""
-        if self.case is None:
-            if "time_scale" not in self.dataset.attrs:
-                raise NotKnown("The material is not stated: audit the file from run, or the Dataset from simulate.")
-            return self.dataset.attrs
-        experiment = self.case.experiment
-        time_scale = experiment.program.time_scale if isinstance(experiment, Loading) else math.inf
-        return self.case.body.facts(self.creep_time) | {"time_scale": time_scale} | self.dataset.attrs
+    @property
+    def facts(self) -> Mapping[Any, Any]:
+        """Attributes of the result, with facts on material and program."""
+        if "time_scale" not in self.dataset.attrs:
+            raise NotKnown("The material is not stated: audit the file from run, or the Dataset from simulate.")
+        return self.dataset.attrs
 
     @property
     def late(self) -> float:

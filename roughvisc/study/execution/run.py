@@ -43,8 +43,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
-#: Facts that a stored result omits, because its attribute ``case`` contains them.
-_IN_THE_CASE = ("compliance_at_once", "compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
 #: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
@@ -111,7 +109,7 @@ def compute(
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,
     }
-    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
+    dataset.attrs = provenance | dataset.attrs
     return dataset.assign_coords(labels_of_case(json.loads(stated)))
 
 

@@ -1,14 +1,15 @@
 """Checks of the assumptions of the model, compared with closed forms and with runs that model what was left out."""
 
+import cmath
 import math
 
 import numpy as np
 import pytest
+from scipy import special
 from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms as cf
-from roughvisc.study.audit import effects
 from roughvisc.study.audit.audit import VERDICTS, Finding
 from roughvisc.study.audit.checks import LIMITS
 from roughvisc.study.case import read_study
@@ -81,14 +82,6 @@ def test_adhesion__of_a_sphere_is_its_pull_off_force_by_jkr(ball):
     assert rv.audit(ball)["adhesion"].verdict == "not known"
 
 
-def test_adhesion__of_a_stiff_sphere_is_its_pull_off_force_by_dmt():
-    tip = rv.sphere(1e-8, 8e-10, (20, 21))
-    stiff = rv.simulate(tip, rv.elastic(4e10), rv.Program().load(5e-11, over=1.0), **QUICK)
-    assert effects.tabor_parameter(1e-8, 1.6e11, 1e-3, 3e-10) < 0.01
-    found = rv.audit(stiff, work_of_adhesion=1e-3)["adhesion"]
-    assert found.number == pytest.approx(2 * math.pi * 1e-3 * 1e-8 / 5e-11, rel=2e-3)
-
-
 def test_stickiness__of_a_smooth_soft_gel_is_broken():
     heights = rv.self_affine((2e-5, 2e-5), 48, hurst=0.8, rms_height=5e-8, rolloff=1e-5, shortcut=2e-6, seed=1)
     gel = rv.simulate(heights, rv.elastic(2.5e3), rv.Program().pressure(20.0, over=1.0), boundary="periodic", **QUICK)
@@ -119,9 +112,6 @@ def test_thickness__predicts_the_approach_on_the_sheet(poisson, base, width):
     found = rv.audit(half_space, thickness=a / width, base=base)["thickness"]
     assert found.number == pytest.approx(1 - float(sheet.approach[-1] / half_space.approach[-1]), rel=0.25)
     assert rv.audit(sheet)["thickness"].verdict == "holds"
-    assert rv.audit(sheet, thickness=2 * a / width)["thickness"].verdict == "not known", (
-        "the result is for another sheet"
-    )
 
 
 @pytest.mark.parametrize("thickness", [3e-4, 1e-4])
@@ -188,22 +178,49 @@ def rubbed(speed):
     )
 
 
+def moving_compliance(speed, shear, density, poisson):
+    """Displacement of the wave ``exp(ik(x - Vt))``, times ``k``, under a unit pressure: Navier's equations, solved.
+
+    Potentials ``phi = A exp(-k a z)`` and ``psi = B exp(-k b z)``: the surface carries normal and no shear stress.
+    """
+    lame = 2 * shear * poisson / (1 - 2 * poisson)
+    fast, slow = (lame + 2 * shear) / density, shear / density
+    a, b = (cmath.sqrt(1 - speed**2 / square) for square in (fast, slow))
+    # u = phi_x - psi_z, w = phi_z + psi_x, at z = 0 with k = 1
+    normal = [lame * (a**2 - 1) + 2 * shear * a**2, -2j * shear * b]
+    shearing = [-2j * shear * a, -shear * (1 + b**2)]
+    potentials = np.linalg.solve(np.array([normal, shearing]), [-1.0, 0.0])
+    return (-a * potentials[0] + 1j * potentials[1]).real
+
+
 def test_inertia__of_a_slide_is_by_its_speed_over_that_of_waves():
     density = 1100.0
     wave = math.sqrt(SHEAR / density)
-    verdicts = [rv.audit(rubbed(part * wave), density=density)["inertia"].verdict for part in (0.1, 0.85, 1.0)]
-    assert verdicts == ["holds", "broken", "broken"]
-    half = rv.audit(rubbed(0.5 * wave), density=density)["inertia"]
-    assert half.number == pytest.approx(effects.moving_load_excess(0.5, 1.0, 1.0, 0.5), rel=1e-2)
+    found = {part: rv.audit(rubbed(part * wave), density=density)["inertia"] for part in (0.1, 0.5, 0.85, 1.01)}
+    assert [one.verdict for one in found.values()] == ["holds", "doubtful", "broken", "broken"]
+    still, moving = (moving_compliance(part * wave, SHEAR, density, 0.499) for part in (1e-3, 0.5))
+    assert 1 < found[0.5].number / (moving / still - 1) < 1.4
 
 
-def test_heating__is_that_of_the_friction_power_in_the_spots():
+def exact_flash(peclet):
+    """Mean over the spot, over ``q a / k``, by the Fourier transforms of a disk and of a moving source."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    angles, weights = (nodes + 1) * math.pi / 4, weights * math.pi / 4
+    s = np.concatenate([np.geomspace(1e-8, 0.5, 600), np.linspace(0.5, 100, 6000)[1:]])
+    # beyond the last node J1^2 is 1 / (pi s) on average, and the motion does not matter
+    around = 4 * np.sum(weights / np.sqrt(s[:, None] ** 2 + 1j * s[:, None] * np.cos(angles) * peclet), axis=1).real
+    return np.trapezoid(special.j1(s) ** 2 / s * around, s) / math.pi + 1 / (math.pi * 100**2)
+
+
+@pytest.mark.parametrize("conductivity", [0.2, 2.0, 2e4])
+def test_heating__is_that_of_the_friction_power_in_the_spots(conductivity):
     """A wave in full contact: one spot of the whole surface, and the power is force times speed."""
-    ds = rubbed(0.5)
+    ds, capacity = rubbed(0.5), 1.8e6
     force, area = float(rv.observables.history(ds).friction_force.max()), float(ds.contact_area[-1])
-    rise = effects.flash_temperature(force * 0.5 / area, math.sqrt(area / math.pi), 0.5, 0.2, 1.8e6)
-    found = rv.audit(ds, heat_conductivity=0.2, volumetric_heat_capacity="1.8 MJ/m^3/K")["heating"]
-    assert found.number == pytest.approx(rise, rel=1e-9)
+    radius = math.sqrt(area / math.pi)
+    exact = force * 0.5 / area * radius / conductivity * exact_flash(0.5 * radius * capacity / conductivity)
+    given = {"heat_conductivity": conductivity, "volumetric_heat_capacity": "1.8 MJ/m^3/K"}
+    assert 0.96 * exact < rv.audit(ds, **given)["heating"].number <= 1.001 * exact
     assert rv.audit(ds, heat_conductivity=0.2)["heating"].verdict == "not known"
 
 
@@ -220,8 +237,8 @@ def test_friction_curve__is_judged_by_its_speeds():
     powers = slow.friction_force * slow.speed
     row, power = slow.isel(speed=int(powers.values.argmax())), float(powers.max())
     radius = math.sqrt(float(row.contact_area) / math.pi)  # of one crest, one spot
-    rise = effects.flash_temperature(power / float(row.contact_area), radius, 0.1, 0.2, 2e6)
-    assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise)
+    rise = power / float(row.contact_area) * radius / 0.2 * exact_flash(0.1 * radius * 2e6 / 0.2)
+    assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise, rel=0.04)
 
 
 # ----------------------------------------------------------------------------------------------------------------
