@@ -89,6 +89,7 @@ def test_grid_error__holds_what_a_peak_between_the_cells_may_hide(offset, contro
     force = abs(float(ds.force[0]) / (np.pi / 2 * slope) - 1)
     approach = abs(float(ds.approach[0]) / exact.approach - 1)
     assert float(ds.grid_error[0]) > max(force, approach)
+    assert (float(ds.grid_error_approach[0]) == 0) == (control == "approach")
     assert float(ds.grid_error_area[0]) > abs(float(ds.contact_area[0]) / np.pi - 1)
 
 

@@ -68,10 +68,13 @@ def test_every_step_that_is_a_row__keeps_the_tolerance(surface, material, progra
     assert relative_errors(found, exact)[rows].max() <= TOLERANCE
 
 
-def test_approach_error__is_not_zero_if_a_hold_keeps_the_force_that_was_found():
-    program = rv.Program().approach(0.06, over=0.5).hold(1.0, control="load")
-    found = pressed("sphere", MATERIALS["zener"], program, times=(0.25, 1.0, 1.5))
-    assert (found.approach_error > 0).values.tolist() == [False, True, True]
+def test_approach_error__is_zero_only_if_the_program_states_the_approach():
+    """A hold may keep a force or an approach that was found."""
+    force_found = rv.Program().approach(0.06, over=0.5).hold(1.0, control="load")
+    approach_found = rv.Program().load(0.03, over=0.5).hold(1.0, control="approach")
+    for program, at_first in ((force_found, False), (approach_found, True)):
+        found = pressed("sphere", MATERIALS["zener"], program, times=(0.25, 1.0, 1.5))
+        assert (found.approach_error > 0).values.tolist() == [at_first, True, True]
 
 
 def test_row_right_after_a_corner__is_judged():
