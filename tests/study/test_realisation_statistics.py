@@ -139,6 +139,12 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
         assert (row["count"], row["unit"], row["where"]) == (3, "m^2", "end")
 
 
+def test_realisations__of_a_study_in_which_nothing_else_varies(study, tmp_path):
+    found = sweep(study("[sweep]\nrealisations = 3\n"), tmp_path / "out", workers=0, progress=False)
+    assert found["contact_area"].dims == ("case", "realisation", "time")
+    assert found["realisation"].values.tolist() == [1, 2, 3]
+
+
 def test_open_results__what_is_not_computed_is_missing(study, tmp_path):
     out = tmp_path / "out"
     sweep(study(SWEEP.format(count=3)), out, workers=0, progress=False)

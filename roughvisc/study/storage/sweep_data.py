@@ -279,7 +279,7 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
     if pairs.has_duplicates:
         return flat
     settings = [identifier(key) for key in parameters if key not in (REALISATION, *DRAWN)]
-    of_cases = flat[settings].isel(case=np.unique(flat["case"].values, return_index=True)[1]).reset_coords()
+    of_cases = flat[["case", *settings]].isel(case=np.unique(flat["case"].values, return_index=True)[1]).reset_coords()
     texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind == "U"}
     runs = flat.drop_vars(["case", REALISATION, *settings]).rename_dims(case="run")
     runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
