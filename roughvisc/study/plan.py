@@ -26,7 +26,6 @@ from scipy.special import erf, erfinv
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Problem, Rows
-from roughvisc.experiment.coarser import coarser_shape, on_fewer_cells
 from roughvisc.experiment.loading import LoadingRows
 from roughvisc.experiment.resources import (
     PART,
@@ -49,7 +48,6 @@ from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import existing_part
 from roughvisc.study.storage.sweep_data import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
-from roughvisc.topography.indenters import remade
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import unit_for
 from roughvisc.variables import STEPPED
@@ -112,7 +110,7 @@ def plan(
         speeds of a friction curve; ``rows``, the kept ones; ``convolutions``, of one forward and one inverse transform
         each; ``wall_time`` in one process with one thread [s]; ``memory`` of the process at its peak and ``disk``, the
         size of the result [byte]; the largest ``contact_fraction`` and ``nominal_pressure`` [Pa], if the case had a
-        coarse run. ``marched``: whether it had, or the numbers are from the most similar case. ``note``: how a measured
+        coarse run. ``marched``: whether it had, or the numbers are from the nearest case. ``note``: how a measured
         history became segments, and times that are left out. ``warning``: expected full contact, or contact at the
         border, which ends a run. ``refusal``: why it cannot run.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
@@ -130,7 +128,7 @@ def plan(
     its speeds. Steps and convolutions are extrapolated to the real grid. The contact fraction comes from the coarse
     run; Persson's theory corrects it for the slopes that the coarse grid does not resolve. The time follows from a few
     iterations on the real grid. The time is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2.
-    In a sweep with many cases some have no coarse run, and the coarse run of the most similar case is used for them.
+    In a sweep with many cases some have no coarse run, and the coarse run of the nearest case in the list is used.
     """
     if isinstance(cases, str | Path):
         cases = read_cases(cases)
@@ -160,11 +158,8 @@ def plan(
             if is_own:
                 runs[number] = coarse_run(own, case)
                 expected = len(cases) * float(np.mean([one.seconds for one in runs.values()]))
-            differing = {
-                other: (sum(values[other] != values[number] for values in parameters.values()), abs(other - number))
-                for other in runs
-            }
-            row |= _costs(case, own, runs[min(runs, key=differing.__getitem__)], seconds, there)
+            nearest = min(runs, key=lambda other: abs(other - number))
+            row |= _costs(case, own, runs[nearest], seconds, there)
             if not is_own:
                 row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
         except (InputError, ConvergenceError) as error:
@@ -223,15 +218,16 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         The case.
     """
     settings, experiment = replace(case.settings, fields=(), grid_error=False), case.experiment
-    few, height, share, program = coarse_surface(own), solved(own), 1.0, None
-    if isinstance(own, LoadingRows):
-        program, settings = own.scene.program, replace(settings, edge="accept", missing="absent")
+    few, height, share = coarse_surface(own), solved(own), 1.0
+    program = own.scene.program if isinstance(own, LoadingRows) else None
+    if program is not None:
+        settings = replace(settings, edge="accept", missing="absent")
     elif isinstance(experiment, SteadySliding):
         speeds = np.sort(experiment.speeds)
-        chosen = np.unique(np.linspace(0, speeds.size - 1, min(_FEW_SPEEDS, speeds.size)).astype(int))
-        experiment, share = replace(experiment, speeds=speeds[chosen]), chosen.size / speeds.size
+        chosen = speeds[:: math.ceil(speeds.size / _FEW_SPEEDS)]
+        experiment, share = replace(experiment, speeds=chosen), chosen.size / speeds.size
 
-    still, slid = np.zeros(2), list[float]()  # steps and convolutions, and convolutions of each step of a slide
+    spent = np.zeros((2, 2))  # steps and convolutions at rest, and in slides
     kept, contact, largest, force, before = 0, list[float](), 0.0, 0.0, 0.0
     with fft.set_workers(1):
         rows = experiment.rows(Problem(few, case.body, settings))
@@ -244,21 +240,17 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
                 slides = program.segments[max(bisect_left(program.corners, row.at) - 1, 0)].slide is not None
                 if row.state is not None:
                     total = row.state.march.convolutions
-            if slides:
-                slid.append(total - before)
-            else:
-                still += 1.0, total - before
+            spent[int(slides)] += 1.0, total - before
             before, kept = total, kept + bool(row.values and row.kept)
             if row.values:
                 fraction = float(np.nan_to_num(row.values["contact_fraction"]))
                 largest, force = max(largest, fraction), float(np.fmax(force, row.values["force"]))
                 if row.kept or slides:  # corners alone do not represent the kept times of a slide
                     contact.append(fraction)
-            if program is not None and (total > _MOST_CONVOLUTIONS or still[0] + len(slid) > _MOST_STEPS):
-                share = _part_done(program, row.at)
+            if program is not None and (total > _MOST_CONVOLUTIONS or spent[:, 0].sum() > _MOST_STEPS):
+                share, compliance = _part_done(program, row.at), case.body.material.contact_compliance
                 rest = sum(one.duration for one in program.segments if one.slide is None)
-                compliance = case.body.material.contact_compliance
-                now, end = (float(compliance(one)) for one in (min(row.at, rest), rest))
+                now, end = float(compliance(min(row.at, rest))), float(compliance(rest))
                 if force * now > 0:  # further loading, and creep except in slides
                     largest = scaled_contact(largest, max(program.largest_load * end / (force * now), 1.0))
                 break
@@ -267,13 +259,12 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
             touching = float(np.mean([*contact, largest]))
             beyond = max(timed_convolution(own, touching) - timed_convolution(rows, touching), 0.0)
 
-    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(still[0] + len(slid), 1.0)
-    rate = float(np.mean(slid[len(slid) // 2 :])) if slid else still[1] / max(still[0], 1.0)
-    still /= share
+    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(spent[:, 0].sum(), 1.0)
+    still, moving = spent[0] / share, spent[1]
     if isinstance(own, LoadingRows):
         cells = sum(one.slide.cells(spacing(few)) for one in own.scene.program.segments if one.slide is not None)
-        left = max(cells - len(slid), 0)  # the first steps of a slide take the most convolutions
-        moving = np.array([len(slid) + left, sum(slid) + left * rate])
+        step = moving / moving[0] if moving[0] else still / max(still[0], 1.0)
+        moving = step * max(cells, moving[0])
         growth = np.array([0.0 if own.scene.time_step else _STEPS_GROW, _WORK_GROWS])
         steps, work = (still * 2.0 ** (octaves * growth) + moving * 2.0**octaves).tolist()
         dearer = work + steps * (_STEP + _EXPONENTIAL * own.scene.memory.times.size)
@@ -317,18 +308,9 @@ def solved(rows: Rows) -> xr.DataArray:
 
 
 def coarse_surface(rows: Rows) -> xr.DataArray:
-    """Return the heights of the solved grid on few cells, with the waves that these cells resolve. [m]"""
+    """Return the heights of the solved grid at a part of its points, evenly spread. [m]"""
     height = solved(rows)
-    factor = max(height.shape) / (_COARSE if isinstance(rows, LoadingRows) else _COARSE_CURVE)
-    if factor <= 1:
-        return height
-    sides = height.sizes["x"] * spacing(height)[0], height.sizes["y"] * spacing(height)[1]
-    few = remade(rows.problem.height, coarser_shape(height.shape, factor, same_parity=True), sides)
-    if few is not None:
-        return few
-    if np.isfinite(height.values).all():
-        return on_fewer_cells(height, coarser_shape(height.shape, factor, False), rows.problem.settings.boundary)
-    stride = math.ceil(factor)
+    stride = math.ceil(max(height.shape) / (_COARSE if isinstance(rows, LoadingRows) else _COARSE_CURVE))
     return height.isel(x=slice(stride // 2, None, stride), y=slice(stride // 2, None, stride))
 
 
