@@ -302,6 +302,14 @@ def test_single_cell_left__carries_all():
     assert ds.pressure.values[1:, 5, 6] == pytest.approx(32**2, rel=1e-12)
 
 
+def test_float32_heights__differ_by_their_rounding():
+    program = rv.Program().load(1e-2, over=0.1).hold(1.0)
+    found, exact = (simulate(h, ZENER, program, boundary="periodic") for h in (ROUGH.astype("float32"), ROUGH))
+    assert found.height.dtype == np.float64
+    rounding = 2**-24 * float(abs(ROUGH).max() / exact.approach.max())
+    assert found.approach.values == pytest.approx(exact.approach.values, rel=4 * rounding + 1e-3 * TOLERANCE)
+
+
 # ----------------------------------------------------------------------------------------------------------------
 # nothing modelled that the scene does not need
 

@@ -69,11 +69,24 @@ def test_nearly_equal_materials__are_a_half_space(material, boundary):
     program = rv.Program().pressure(2e4, over=0.05).hold(0.2).pressure(5e3, over=0.1).hold(0.1)
     if boundary == "periodic":
         program = program.slide(0.3 * SIDE, speed=0.02).slide(0.2 * SIDE, speed=0.02, direction="-y")
+    else:  # contact that is lost, and found on the dent
+        deep = 0.5 * float(height.max() - height.mean())
+        program = rv.Program().approach(deep, over=0.1).approach(-deep, over=0.05).approach(deep, over=0.3)
     settings = {"boundary": boundary, "edge": "accept", "times": 6, "fields": ("pressure",)}
     found = simulated(height, (material, rv.shift(material, 1 + 1e-6)), 1e-4, program, **settings)
     expected = rv.simulate(height, material, program, progress=False, **settings)
     assert "waves" in found.attrs["memory"]
     assert relative_errors(found, expected).max() < 1e-3
+
+
+def test_ball__is_that_on_elastic_layers_at_once_and_in_the_end():
+    pair, ball, load = (POLYMER, RUBBER), rv.sphere(1e-2, (8e-4, 7e-4), (23, 21)), rv.Program().load(5e-3, over=0)
+    ds = simulated(ball, pair, 2e-4, load.hold(1e3), times=[0.0, 1e3], tolerance=1e-2)
+    for row, time in enumerate((0.0, np.inf)):
+        elastic = [rv.elastic(1 / float(one.creep_compliance(time)), one.poisson) for one in pair]
+        exact = simulated(ball, elastic, 2e-4, load, times=1)
+        assert float(ds.approach[row]) == pytest.approx(float(exact.approach[0]), rel=4e-3)
+        assert float(abs(ds.pressure[row] - exact.pressure[0]).sum() / exact.pressure[0].sum()) < 4e-3
 
 
 #: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.

@@ -14,7 +14,6 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
 from roughvisc.study.case import read_cases
 
-PRESS = rv.Program().pressure(6e3, over=0.01)
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")
 
 

@@ -100,6 +100,16 @@ def test_half_space__is_the_same_by_both(boundary, shape, monkeypatch):
         np.testing.assert_allclose(a, b, rtol=0, atol=precision * np.abs(a).max())
 
 
+def test_ducc0__is_used_if_installed_and_not_refused(by_ducc0, monkeypatch):
+    calls, transform = [], grids.ducc0.fft.r2c
+    monkeypatch.setattr(grids.ducc0.fft, "r2c", lambda *given, **how: calls.append(1) or transform(*given, **how))
+    Grid((9, 8), (1.0, 1.0)).displacement(np.ones((9, 8)))
+    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
+    used = len(calls)
+    Grid((9, 8), (1.0, 1.0)).displacement(np.ones((9, 8)))
+    assert len(calls) == used > 0
+
+
 def test_without_ducc0__scipy_is_taken(by_ducc0, monkeypatch):
     monkeypatch.setattr(grids, "ducc0", None)
     assert transform_library().startswith("scipy.fft ")
