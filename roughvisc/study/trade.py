@@ -37,8 +37,6 @@ _FEWEST, _MOST = 12, 1024
 _SHARPER = 5.0
 #: Number of kept times if the study keeps all accepted steps, which differ between settings.
 _FEW = 9
-#: Wall times within this factor are taken as equal.
-_EQUAL = 1.1
 
 
 def trade(
@@ -225,12 +223,10 @@ def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
         Quantity whose error counts.
     """
     spent, wrong = dataset["run_time"].values, dataset["error"].sel(quantity=quantity).values
-    known = np.isfinite(spent) & np.isfinite(wrong)
     wrong = np.array([float(f"{value:.1e}") for value in wrong])
-    best = known.copy()
-    for i in np.flatnonzero(known):
-        no_worse = known & (spent <= spent[i]) & (wrong <= wrong[i])
-        best[i] = not (no_worse & ((spent < spent[i]) | (wrong < wrong[i]))).any()
+    order, best = np.lexsort((wrong, spent)), np.zeros(wrong.size, dtype=bool)
+    faster = np.fmin.accumulate(np.append(np.inf, wrong[order]))[:-1]
+    best[order] = wrong[order] < faster
     return best
 
 
@@ -245,7 +241,7 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
 
     The error of a setting is its largest error at this and all smaller tolerances on its grid, so that a chance
     agreement does not count, plus the uncertainty of the reference. For a scan only settings on its own grid are
-    chosen, because another grid means another surface. Among settings of nearly equal times the first is chosen.
+    chosen, because another grid means another surface.
     """
     error, spent = dataset["error"].sel(quantity=quantity).values, dataset["run_time"].values
     tolerance, coarsening = dataset["tolerance"].values, dataset["coarsening"].values
@@ -253,6 +249,4 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     accurate = np.array([error[one].max() for one in sharper]) + uncertainty(dataset, quantity) <= target
     if dataset.attrs.get("grid_is_data"):
         accurate &= coarsening == 1
-    if not accurate.any():
-        return None
-    return int(np.flatnonzero(accurate & (spent <= _EQUAL * spent[accurate].min()))[0])
+    return int(np.where(accurate, spent, np.inf).argmin()) if accurate.any() else None
