@@ -6,7 +6,7 @@
 import re
 import sys
 
-from roughvisc.study.audit.checks import LIMITS
+from roughvisc.study.audit import LIMITS
 from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
 
 

@@ -33,7 +33,7 @@ from roughvisc.mechanics.sheet import sheet as sheet
 from roughvisc.observables.deformed import deformed as deformed
 from roughvisc.reports.report import report as report
 from roughvisc.settings import Numerics as Numerics
-from roughvisc.study.audit.audit import audit as audit
+from roughvisc.study.audit import audit as audit
 from roughvisc.study.case import Case as Case
 from roughvisc.study.case import read_cases as read_cases
 from roughvisc.study.case import read_study as read_study

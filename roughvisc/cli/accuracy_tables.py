@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.cli.tables import titled
-from roughvisc.study.audit.audit import BROKEN, DOUBTFUL, NOT_KNOWN, Audit
+from roughvisc.study.audit import BROKEN, DOUBTFUL, NOT_KNOWN, Audit
 from roughvisc.study.trade import cheapest, pareto_front
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of

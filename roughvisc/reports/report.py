@@ -25,7 +25,7 @@ from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, resul
 from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.reports.realisations import realisation_rows
-from roughvisc.study.audit.audit import audit
+from roughvisc.study.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.netcdf import open_result

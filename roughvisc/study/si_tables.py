@@ -18,7 +18,7 @@ from roughvisc.mechanics.program import UNITS
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import Settings
-from roughvisc.study.audit.audit import audit
+from roughvisc.study.audit import audit
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.scans import open_scan

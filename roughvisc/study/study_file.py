@@ -26,7 +26,7 @@ from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.study.audit.audit import audit
+from roughvisc.study.audit import audit
 from roughvisc.study.machine_history import read_history
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.scans import check_surface, surface_boundary

@@ -10,8 +10,7 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms as cf
-from roughvisc.study.audit.audit import VERDICTS, Finding
-from roughvisc.study.audit.checks import LIMITS
+from roughvisc.study.audit import LIMITS, VERDICTS, Finding
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result
