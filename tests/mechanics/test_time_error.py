@@ -24,7 +24,7 @@ PROGRAMS = {
 TIMES = (0.05, 0.2, 0.33, 0.5, 0.7, 0.77, 1.0, 1.1, 1.4, 1.7, 2.0)
 SURFACES = {
     "sphere": (rv.sphere(1.0, (1.5, 1.45), (19, 16)), "free"),
-    "rough": (rv.self_affine((1.1, 1.05), (18, 15), hurst=0.7, rms_height=0.04, seed=5), "periodic"),
+    "rough": (rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=0.04, shortcut=0.35, seed=5), "periodic"),
 }
 
 
