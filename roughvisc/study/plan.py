@@ -77,8 +77,6 @@ _BUDGET, _SHARE = 1.2, 0.05
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
 #: Work of the run on a coarser grid for the grid error, over the work of the run. [-]
 _GRID_ERROR = 0.3
-#: Time to write a file without fields, and each byte of a field. [s]
-_FILE, _WRITE = 0.05, 3e-9
 #: Contact fraction that counts as full contact.
 _FULL = 0.95
 #: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
@@ -401,7 +399,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     if late := case.late_times:
         texts, end = ", ".join(unit_for(late, "s").text(one) for one in late), case.program.duration
         note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
-    seconds += run.seconds * _work(height.size) / _work(run.cells)
+    seconds += run.seconds * height.size / run.cells
     if own.problem.settings.grid_error:
         seconds *= 1 + _GRID_ERROR
     fraction, warning = float(run.contact[-1]) * part, ""
@@ -421,7 +419,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         "contact_fraction": fraction,
         "nominal_pressure": force / area,
         "convolutions": round(run.convolutions),
-        "wall_time": seconds + _FILE + rows * whole.size * 8 * len(settings.fields) * _WRITE,
+        "wall_time": seconds,
         "memory": needed(whole.size),
         "disk": _VARIABLES[kind] + disk(case, whole.size, rows, run.steps, part * float(run.contact.mean())),
         "note": note.strip(),
@@ -446,11 +444,6 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
     """
     fields = sum(rows * (contact + 0.01) if name == "pressure" else rows for name in case.settings.fields)
     return 8.0 * cells * (fields + 1.0) + rows * _ROW + steps * 8 * len(STEPPED)
-
-
-def _work(cells: float) -> float:
-    """Return the work of a transform, in an arbitrary unit."""
-    return cells * math.log2(cells + 2)
 
 
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:

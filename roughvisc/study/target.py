@@ -176,7 +176,7 @@ def choose(
             break
         # neither a finer grid nor a smaller tolerance reduces the errors of other sources
         _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
-        level, places = level - 1, own[axis].values
+        level -= 1
 
     path = result_path(folder, chosen.key)
     if not is_result_of(chosen, path):
@@ -220,7 +220,5 @@ def _refuse_missed(
 
 
 def _percent(half_width: float, digits: int = 2) -> str:
-    """Return a half-width of a logarithm in %, or as a factor if it is large."""
-    if half_width > 0.5:
-        return f"a factor of {math.exp(half_width):.2g}"
+    """Return a half-width of a logarithm in %."""
     return f"±{100 * math.expm1(half_width):.{digits}g} %"
