@@ -59,21 +59,15 @@ class Observable:
         The mean gap of a periodic surface has the error of the approach. The relative change of a leak rate is up to
         six times the change of the mean gap, near the load that closes the gap. A conductance follows the contact area.
         """
-        relative = np.zeros_like(values)
-        if self.follows == "area" and "contact_area_error" in result:
-            error = result["contact_area_error"].values
-            upper = result["contact_area"].values + error
-            np.divide(error, upper, out=relative, where=upper > 0)
-        elif self.follows == "gap" and "approach_error" in result:
-            gap = np.abs(result["mean_gap"].values)
-            np.divide(6 * result["approach_error"].values, gap, out=relative, where=gap > 0)
-        else:
-            if self.follows == "approach" and "approach_error" in result:
-                error = result["approach_error"].values
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if self.follows == "area" and "contact_area_error" in result:
+                error = result["contact_area_error"].values
+                relative = error / (result["contact_area"].values + error)
+            elif self.follows in ("approach", "gap") and "approach_error" in result:
+                size = values if self.follows == "approach" else result["mean_gap"].values / 6
+                relative = result["approach_error"].values / np.abs(size)
             else:
-                error = result["stated_error"].values * float(np.nanmax(np.abs(values)))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                relative = error / np.abs(values)
+                relative = result["stated_error"].values * float(np.nanmax(np.abs(values))) / np.abs(values)
         return np.log1p(np.where(values == 0, np.nan, relative))
 
 

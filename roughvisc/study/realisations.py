@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -73,12 +71,11 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         itself = found["itself"] = values.values[numbers == ITSELF][0]
         mean = found["mean"]
         found["ratio"] = np.divide(itself, mean, out=np.full_like(mean, np.nan), where=mean != 0)
-    units, name = values.attrs.get("units"), str(values.attrs.get("long_name", values.name or "values"))
+    units, name = values.attrs.get("units", "1"), str(values.attrs.get("long_name", values.name or "values"))
     variables = {}
     for one, array in found.items():
-        attributes: dict[str, Any] = {"long_name": f"{one.replace('_', ' ')}: {name}"}
-        if one in ("count", "ratio") or units is not None:
-            attributes["units"] = "1" if one in ("count", "ratio") else units
+        unit = "1" if one in ("count", "ratio") else units
+        attributes = {"long_name": f"{one.replace('_', ' ')}: {name}", "units": unit}
         variables[one] = (values.dims[1:], array, attributes)
     coords = {key: one for key, one in values.coords.items() if REALISATION not in one.dims}
     return xr.Dataset(variables, coords, {"quantity": str(values.name or "")})
