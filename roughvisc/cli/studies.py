@@ -141,7 +141,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case
-    from roughvisc.study.storage.folder import is_writable, result_path
+    from roughvisc.study.storage.folder import result_path
 
     path = result_path(folder, case.key)
     if not is_result_of(case, path):
@@ -149,9 +149,6 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
             run_case(case, folder, progress=report, threads=threads or threads_each(1))
     else:
         say(console, "Already finished: nothing to compute")
-        if not is_writable(folder):
-            complain(f"{folder}: is not writable: the finished result is shown, and nothing is written")
-            plots = False
     missed = _observe([case], folder, console)
     with rv.open_result(path) as dataset:
         console.print(result_table(dataset))

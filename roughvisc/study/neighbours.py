@@ -271,7 +271,7 @@ def solve(
     outcomes = run_cases(
         list(distinct.values()),
         folder,
-        display=Display(progress, summary=False),
+        display=Display(progress),
         client=client,
         workers=workers if client is None else None,
         threads=threads,

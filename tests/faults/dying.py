@@ -6,6 +6,7 @@ what happened, at which operation, and how the run ended.
 """
 
 import errno
+import math
 import os
 import random
 import signal
@@ -16,6 +17,7 @@ from pathlib import Path
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
+from roughvisc.study.storage import checkpoint
 
 #: What is asked of the system of a folder's files. Not listing it: what is not found is not there.
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.truncate", "os.utime")
@@ -39,7 +41,8 @@ def strike(case, folder, at, what):
         raise OSError(getattr(errno, what), os.strerror(getattr(errno, what)), str(arguments[0]))
 
     sys.addaudithook(hook)
-    run_case(case, folder, checkpoint_steps=3)
+    checkpoint._SHARE = math.inf  # at every step, however long it takes to write
+    run_case(case, folder, checkpoint_seconds=0)
     return count
 
 

@@ -71,7 +71,7 @@ def test_damaged_checkpoints(case, wanted, tmp_path, count):
     """The state, rows, or all: each run ends with the same bits, from the checkpoint or from the start."""
     rng, steps = np.random.default_rng(24), iter(range(1000))
     with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path / "stopped", checkpoint_steps=2, stop=lambda: next(steps) >= 6)
+        run_case(case, tmp_path / "stopped", checkpoint_seconds=0, stop=lambda: next(steps) >= 6)
     (unfinished,) = (tmp_path / "stopped").glob(".*.unfinished")
     names = sorted(path.name for path in unfinished.iterdir())
     assert {"rows-0000.npz", "rows-0001.npz", "state.npz"} <= set(names)

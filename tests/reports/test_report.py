@@ -15,8 +15,10 @@ from roughvisc.reports.report import report
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
+from roughvisc.study.storage.folder import write_json
 from roughvisc.study.storage.results_table import to_table
-from roughvisc.study.storage.sweep_data import sweep_cases, write_sweep
+from roughvisc.study.storage.sweep_data import SWEEP as LISTED
+from roughvisc.study.storage.sweep_data import sweep_cases
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = f"""
@@ -57,7 +59,7 @@ def folder(tmp_path_factory):
     cases = read_cases(study)
     for case in cases:
         run_case(case, folder)
-    write_sweep(folder, sweep_cases(cases))
+    write_json(folder / LISTED, sweep_cases(cases))
     failed = {"title": "<i>Too far</i>", "varied": {"program.0.load": 9.0}}
     record = {"message": "contact reached the <u>border</u>", "case": failed}
     (folder / "0123456789abcdef.failed.json").write_text(json.dumps(record))

@@ -111,13 +111,13 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
     more = sweep(study(SWEEP.format(count=3)), out, workers=0, progress=False)
     assert all((out / name).stat().st_mtime_ns == changed for name, changed in before.items())
     assert more["realisation"].values.tolist() == [1, 2, 3]
-    assert more["surface_seed"].values.tolist() == [5, 6, 7]
+    assert more["surface_seed"].values.tolist() == [[5, 6, 7]] * 2
     assert more["program_0_pressure"].dims == ("case",)
     again = open_results(out)
     xr.testing.assert_identical(again.compute(), more.compute())
     for case, realisation in ((0, 2), (1, 0)):
         one = again.isel(case=case, realisation=realisation)
-        with xr.open_dataset(out / f"{one['case_key'].item()}.nc") as file:
+        with open_result(out / f"{one['case_key'].item()}.nc") as file:
             np.testing.assert_array_equal(one["pressure"], file["pressure"])
             np.testing.assert_array_equal(one["height"], file["height"])
             assert json.loads(file.attrs["case"])["surface"]["seed"] == 5 + realisation

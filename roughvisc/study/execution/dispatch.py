@@ -12,6 +12,7 @@ import secrets
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import count
@@ -129,7 +130,7 @@ def distribute(
                 if not client.nthreads():
                     alone_since = math.inf
                     log.warning(_ALONE, len(futures))
-                    display.warn(_ALONE % len(futures))
+                    warnings.warn(_ALONE % len(futures), stacklevel=1)  # also without a display
     except (KeyboardInterrupt, SystemExit, GeneratorExit):  # dask-jobqueue turns Ctrl-C into SystemExit
         display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
         with suppress(OSError):  # a full disk, or a lost scheduler

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from roughvisc.errors import printable
 from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.run import Outcome
 from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
-
-#: Largest number of messages on failed and unconverged cases.
-_SHOWN = 8
 
 
 class Display:
@@ -26,22 +21,19 @@ class Display:
     Parameters
     ----------
     show : bool
-        Whether to show more than urgent messages.
+        Whether to show anything.
     console : rich.console.Console, optional
         Default: the standard error. Without a terminal it shows a line every few seconds.
-    summary : bool
-        Whether the last line states how many cases are done.
     """
 
-    def __init__(self, show: bool = True, console: Console | None = None, *, summary: bool = True) -> None:
-        self._shows, self._sums_up = show, summary
+    def __init__(self, show: bool = True, console: Console | None = None) -> None:
         self._bars = Bars(console if show else Console(quiet=True))
         self._lock = threading.Lock()
         self._names: dict[str, str] = {}
         self._at: dict[str, Callable[[float, float], str]] = {}
         self._running: dict[str, float] = {}  # computed fraction of each program
         self._ended: dict[str, Outcome] = {}
-        self._complaints, self._began = 0, time.monotonic()
+        self._began = time.monotonic()
 
     def begin(self, cases: Sequence[Case]) -> None:
         """Show the cases, in the order of the study."""
@@ -70,25 +62,16 @@ class Display:
             self._bars.close(self._names[outcome.key])
             self._move()
         if outcome.kind != "done" and not outcome.reused:
-            self._complaints += 1
-            if self._complaints <= _SHOWN:
-                self._bars.say(f"{self._names[outcome.key]}: {outcome.kind}: {outcome.message}")
+            self.say(f"{outcome.kind}: {outcome.message}", outcome.key)
 
     def say(self, text: str, key: str = "") -> None:
         """Write a line; with `key` the name of this case comes first."""
         self._bars.say(f"{self._names[key]}: {text}" if key else text)
 
-    def warn(self, text: str) -> None:
-        """Write an urgent message."""
-        if self._shows:
-            self._bars.say(text)
-        else:
-            print(f"roughvisc: {printable(text)}", file=sys.stderr)
-
     def close(self) -> None:
         """End the display."""
         self._bars.stop()
-        if self._names and self._sums_up:
+        if self._names:
             self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
 
     def _move(self) -> None:

@@ -10,8 +10,8 @@ import re
 import time
 import traceback
 from collections.abc import Callable
-from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -26,7 +26,6 @@ from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.folder import (
     checkpoint_path,
     existing_part,
-    is_writable,
     lock_case,
     lock_path,
     require_writable,
@@ -120,7 +119,6 @@ def run_case(
     progress: bool | Progress = False,
     stop: Callable[[], bool] | None = None,
     checkpoint_seconds: float = 30.0,
-    checkpoint_steps: int | None = None,
     threads: int | None = None,
 ) -> Path:
     """Run one case unless its file exists, and return the path of the file.
@@ -143,8 +141,6 @@ def run_case(
         :class:`KeyboardInterrupt` raised.
     checkpoint_seconds : float
         Least time between checkpoints, which take at most a twentieth of the run. [s]
-    checkpoint_steps : int, optional
-        Number of accepted steps after which a checkpoint is also written.
     threads : int, optional
         As for :func:`roughvisc.simulate`.
 
@@ -161,20 +157,22 @@ def run_case(
     """
     folder = Path(folder)
     path = result_path(folder, case.key)
-    if is_result_of(case, path) and not (is_writable(folder) and any(folder.glob(f".{case.key}.*"))):
+    if is_result_of(case, path) and not any(folder.glob(f".{case.key}.*")):
         return path  # finished, without leftovers to remove
     require_writable(folder, "since the case is not finished")
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        every = {"seconds": checkpoint_seconds, "steps": checkpoint_steps}
+        unfinished = checkpoint_path(folder, case.key)
         with (
             lock_case(lock_path(folder, case.key)),
-            closing(CheckpointWriter(checkpoint_path(folder, case.key), case.key, stop=stop, **every)) as keeper,
+            closing(CheckpointWriter(unfinished, case.key, seconds=checkpoint_seconds, stop=stop)) as keeper,
         ):
             for torn in folder.glob(f".{case.key}.*.part.nc"):
                 torn.unlink()
-            if not is_result_of(case, path, set_aside=True):
+            if not is_result_of(case, path):
+                if path.exists():
+                    aside = path.replace(f"{path}.damaged")
+                    log.warning("%s: is damaged: it is renamed to %s and computed again", path, aside.name)
                 keeper.resume()
                 try:
                     dataset = compute(case, keeper, progress=progress, threads=threads)
@@ -187,8 +185,7 @@ def run_case(
                     keeper.save()
                     raise
                 stated = warnings_of(dataset.attrs)
-                complaints = unconverged(dataset), stated.get("tolerance"), stated.get("material")
-                for complaint in filter(None, complaints):
+                for complaint in filter(None, (unconverged(dataset), stated.get("tolerance"), stated.get("material"))):
                     log.warning("%s: %s", path, complaint)
             keeper.remove()
     except OSError as error:
@@ -196,10 +193,6 @@ def run_case(
             raise
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
-    finally:
-        for place in made:  # rmdir removes only empty folders
-            with suppress(OSError):
-                place.rmdir()
     return path
 
 
@@ -214,7 +207,7 @@ def run_stated(
     return dataset
 
 
-def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
+def is_result_of(case: Case, path: Path) -> bool:
     """Return whether a file is the result of a case; an absent or damaged file is not.
 
     Parameters
@@ -223,8 +216,6 @@ def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
         The case.
     path : Path
         File named by the key of the case.
-    set_aside : bool
-        Rename a damaged file, and log a warning. The caller must hold the lock of the case.
 
     Raises
     ------
@@ -236,11 +227,7 @@ def is_result_of(case: Case, path: Path, *, set_aside: bool = False) -> bool:
     try:
         with open_result(path) as dataset:
             found = dataset.attrs.get("case_key")
-    except DamagedError as error:
-        if set_aside:
-            aside = path.with_name(f"{path.name}.damaged")
-            os.replace(path, aside)
-            log.warning("%s: is damaged: %s; it is renamed to %s and computed again", path, error.found, aside.name)
+    except DamagedError:
         return False
     if found != case.key:
         raise unusable(path, f"holds the result of case {found}", f"the result of case {case.key}, as its name says")
@@ -281,18 +268,19 @@ class Outcome:
     reused: bool = False
 
 
-def outcome_of(entry: Entry, reused: bool = False) -> Outcome:
+def outcome_of(entry: Entry, *, seconds: float = 0.0, reused: bool = False) -> Outcome:
     """Return the outcome of a case whose result exists."""
     message = unconverged(entry.arrays)
-    return Outcome(entry.key, "unconverged" if message else "done", message, entry=entry, reused=reused)
+    kind: Kind = "unconverged" if message else "done"
+    return Outcome(entry.key, kind, message, seconds=seconds, entry=entry, reused=reused)
 
 
 def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:
     """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
     began, kind, trace = time.perf_counter(), "hindered", ""
     try:
-        found = outcome_of(read_entry(run_case(case, folder, progress=progress, **settings)))
-        return replace(found, seconds=time.perf_counter() - began)
+        entry = read_entry(run_case(case, folder, progress=progress, **settings))
+        return outcome_of(entry, seconds=time.perf_counter() - began)
     except MemoryError as error:
         name, advice = type(error).__name__, "roughvisc plan says how much a case needs, and fewer --workers leave more"
         message = f"not enough memory; the last checkpoint is kept: {advice}"

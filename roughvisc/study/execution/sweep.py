@@ -6,7 +6,7 @@ import errno
 import json
 import logging
 from collections.abc import Iterator, Sequence
-from contextlib import closing, nullcontext, suppress
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,16 +19,16 @@ from roughvisc.study.execution.cluster import default_client, local_client, requ
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import (
-    is_writable,
     log_file,
     record_failure,
     record_path,
     recorded_failure,
     require_writable,
+    write_json,
 )
 from roughvisc.study.storage.index import clean_folder, index_of
 from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_data import open_results, sweep_cases, write_sweep
+from roughvisc.study.storage.sweep_data import SWEEP, open_results, sweep_cases
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,7 +133,7 @@ def run_cases(
     Raises
     ------
     InputError
-        If a setting is wrong, or there are cases to compute and the folder is not writable.
+        If a setting is wrong, or the folder is not writable.
     OSError
         If the disk is full; no further case is started.
     RoughviscError
@@ -142,17 +142,15 @@ def run_cases(
         If interrupted; running cases finish their step first.
     """
     if workers is not None and (client is not None or workers < 0):
-        expected = "no number of workers together with a client" if client is not None else "0 or more"
-        raise InputError(key="workers", found=workers, expected=expected)
+        raise InputError(key="workers", found=workers, expected="0 or more, and none together with a client")
     if client is not None and client.asynchronous:
         raise InputError(key="client", found=client, expected="a Client(asynchronous=False)")
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
-    writable = is_writable(folder)
-    if writable:
-        folder.mkdir(parents=True, exist_ok=True)
-        clean_folder(folder)
-        write_sweep(folder, sweep_cases(cases))
-    with log_file(folder) if writable else nullcontext():
+    require_writable(folder, "for the results")
+    folder.mkdir(parents=True, exist_ok=True)
+    clean_folder(folder)
+    write_json(folder / SWEEP, sweep_cases(cases))
+    with log_file(folder):
         index, outcomes = index_of(folder), dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
@@ -161,19 +159,15 @@ def run_cases(
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        if todo:
-            require_writable(folder, f"since there are cases to compute ({len(todo)} of {len(distinct)})")
         display.begin(cases)
         for outcome in outcomes.values():
             display.ended(outcome)
-        if not writable:
-            display.warn(f"{folder}: is not writable: all cases are finished, and nothing is written")
         warned = set[str]()
         try:
             with closing(_computed(todo, folder, display, client, workers, threads)) as found:
                 for outcome in found:
                     outcomes[outcome.key] = outcome
-                    _record(outcome, distinct[outcome.key], folder, alone=len(distinct) == 1)
+                    _record(outcome, distinct[outcome.key], folder)
                     display.ended(outcome)
                     for subject, text in warnings_of(outcome.entry.attributes).items() if outcome.entry else ():
                         if subject not in ("accuracy", "speeds", *warned):  # the message states unsolved speeds
@@ -184,15 +178,13 @@ def run_cases(
                         text = f"{outcome.message} ({done} of {len(distinct)} cases are finished)"
                         raise OSError(errno.ENOSPC, text)
         except (KeyboardInterrupt, SystemExit, OSError) as error:
-            reason = str(error) or type(error).__name__
-            log.warning("interrupted after %d of %d cases: %s", len(outcomes), len(distinct), reason)
+            log.warning("interrupted after %d of %d cases: %r", len(outcomes), len(distinct), error)
             raise
         finally:
-            if writable:
-                index = index_of(folder, [outcome.entry for outcome in outcomes.values() if outcome.entry])
-                for key in [key for key, one in outcomes.items() if one.entry is None and key in index]:
-                    outcomes[key] = outcome_of(index[key], reused=True)  # another run has finished it
-                write_table(folder)
+            index = index_of(folder, [outcome.entry for outcome in outcomes.values() if outcome.entry])
+            for key in [key for key, one in outcomes.items() if one.entry is None and key in index]:
+                outcomes[key] = outcome_of(index[key], reused=True)  # another run has finished it
+            write_table(folder)
             display.close()
     return {key: outcomes[key] for key in distinct}
 
@@ -233,17 +225,14 @@ def _computed(
             display.say(f"{len(large)} cases need more memory: they are computed in fewer processes ({processes})")
 
 
-def _record(outcome: Outcome, case: Case, folder: Path, *, alone: bool) -> None:
+def _record(outcome: Outcome, case: Case, folder: Path) -> None:
     """Log the end of a case, and write or remove the record of its failure."""
     level = logging.INFO if outcome.kind == "done" else logging.WARNING
     told = (outcome.key, outcome.kind, outcome.seconds, json.dumps(dict(case.varied)), outcome.message)
     log.log(level, "%s %s %.3g s %s %s", *told)
-    if outcome.trace:
-        log.error("%s", outcome.trace)
     for text in warnings_of(outcome.entry.attributes).values() if outcome.entry else ():
         log.info("%s: %s", outcome.key, text)
     if outcome.entry:
-        with suppress(OSError):  # the case failed before
-            record_path(folder, outcome.key).unlink(missing_ok=True)
-    elif outcome.kind == "failed" and not alone:
+        record_path(folder, outcome.key).unlink(missing_ok=True)  # the case failed before
+    elif outcome.kind == "failed":
         record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)

@@ -41,7 +41,7 @@ _SHARE = 0.05
 _PLAIN = "plain"
 #: Errors that occur when a damaged file is read.
 _DAMAGED = (*DAMAGED, RuntimeError, zipfile.BadZipFile)
-_KINDS = {kind.__name__: kind for kind in STATES}
+_KINDS = {kind.__name__: kind for kind in (Checkpoint, *STATES)}
 
 
 class CheckpointWriter(Recorder):
@@ -53,9 +53,8 @@ class CheckpointWriter(Recorder):
         Folder of this run alone; created if necessary.
     key : str
         Key of the case.
-    seconds, steps : float, int or None
-        Time between checkpoints, which is extended until writing takes at most a twentieth; and number of accepted
-        steps after which a checkpoint is also written.
+    seconds : float
+        Time between checkpoints, which is extended until writing takes at most a twentieth.
     stop : callable or None
         Called after every accepted step; the run stops if it returns true.
     """
@@ -63,29 +62,21 @@ class CheckpointWriter(Recorder):
     in_memory = False
 
     def __init__(
-        self,
-        folder: Path,
-        key: str,
-        *,
-        seconds: float = 30.0,
-        steps: int | None = None,
-        stop: Callable[[], bool] | None = None,
+        self, folder: Path, key: str, *, seconds: float = 30.0, stop: Callable[[], bool] | None = None
     ) -> None:
         super().__init__()  # keeps the rows that are not in a file yet
         folder.mkdir(exist_ok=True)
         self._folder = folder
         self._owner = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT}
-        self._interval, self._steps, self._stop = seconds, steps, stop
-        self._pending, self._last_save = 0, time.monotonic()
+        self._interval, self._stop = seconds, stop
+        self._saved, self._last_save = self.latest, time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
-        self._waiting = 0  # size of the arrays in memory [byte]
         self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
         super().append(plain, arrays)
-        self._waiting += sum(array.nbytes for array in arrays.values())
-        if self._waiting > _WAITING:
+        if sum(array.nbytes for row in self._arrays for array in row.values()) > _WAITING:
             self._write_rows()
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
@@ -114,16 +105,15 @@ class CheckpointWriter(Recorder):
         path = self._folder / STATE
         if path.exists():
             try:
-                plain, arrays = _read(path)
+                plain = _read(path)
                 ends = plain["ends"]
                 if plain["owner"] == self._owner:
                     rows = []
                     for number, end in enumerate(ends[1:]):
-                        rows += _read(self._rows_path(number))[0][: end - len(rows)]
+                        rows += _read(self._rows_path(number))[: end - len(rows)]
                     if len(rows) != ends[-1]:
                         raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
-                    parts = {name: _unflatten(value, arrays) for name, value in plain["reached"].items()}
-                    self.latest = Checkpoint(**parts)
+                    self.latest = self._saved = plain["reached"]
                     count = self.latest.rows  # rows after the state are computed again
                     self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
                     log.info("%s: goes on from here", path)
@@ -142,33 +132,30 @@ class CheckpointWriter(Recorder):
             If `stop` returns true, after a checkpoint is written.
         """
         self.latest = reached
-        self._pending += 1
         if self._stop is not None and self._stop():
             self.save()
             raise KeyboardInterrupt
-        due = time.monotonic() - self._last_save >= self._interval
-        if due or (self._steps is not None and self._pending >= self._steps):
+        if time.monotonic() - self._last_save >= self._interval:
             self.save()
 
     def restart(self) -> None:
         """Delete all rows, because the run starts again."""
         super().restart()
         self._reading = -1, None
-        self.latest, self._ends, self._waiting, self._pending = Checkpoint(), [0], 0, 0
+        self.latest = self._saved = Checkpoint()
+        self._ends = [0]
         (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
         for path in self._folder.iterdir():
             path.unlink()
 
     def save(self) -> None:
         """Write a checkpoint, if anything has been computed since the last one."""
-        if not self._pending:
+        if self.latest is self._saved:
             return
         began = time.monotonic()
         self._write_rows()  # before the state, which refers to the rows
-        arrays: dict[str, Array] = {}
-        parts = {one.name: _flatten(getattr(self.latest, one.name), arrays, {}) for one in fields(self.latest)}
-        _write(self._folder / STATE, {"owner": self._owner, "ends": self._ends, "reached": parts}, arrays)
-        self._pending, self._last_save = 0, time.monotonic()
+        _write(self._folder / STATE, {"owner": self._owner, "ends": self._ends, "reached": self.latest}, {})
+        self._saved, self._last_save = self.latest, time.monotonic()
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 
     def remove(self) -> None:
@@ -190,53 +177,53 @@ class CheckpointWriter(Recorder):
         arrays = {f"{row}/{name}": one for row, found in enumerate(self._arrays, first) for name, one in found.items()}
         _write(self._rows_path(len(self._ends) - 1), self.plain[first:], arrays)
         self._ends = [*self._ends, len(self.plain)]
-        self._arrays, self._waiting = [], 0
+        self._arrays = []
 
     def _rows_path(self, number: int) -> Path:
         return self._folder / f"rows-{number:04d}.npz"
 
 
 def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:
-    """Write plain values as JSON, and arrays; floats are exact in both."""
-    text = np.frombuffer(json.dumps(plain).encode(), np.uint8)
+    """Write arrays, and plain values and states as JSON, which refers to the arrays in them; floats are exact."""
+    arrays, names = dict(arrays), dict[int, str]()
+
+    def encoded(value: Any) -> Any:
+        if isinstance(value, np.generic):
+            return value.item()
+        if is_dataclass(value):
+            return {
+                "type": type(value).__name__,
+                "parts": {one.name: getattr(value, one.name) for one in fields(value)},
+            }
+        if not hasattr(value, "dtype"):  # no array of NumPy or CuPy
+            raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
+        name = names.setdefault(id(value), f"array{len(names)}")  # each array once
+        arrays[name] = to_host(value)
+        return {"array": name}
+
+    text = np.frombuffer(json.dumps(plain, default=encoded).encode(), np.uint8)
     with atomic_write(path) as temporary:
         np.savez(temporary, allow_pickle=False, **{_PLAIN: text}, **arrays)
 
 
-def _read(path: Path) -> tuple[Any, dict[str, Array]]:
-    """Return the plain values and the arrays of a file."""
+def _read(path: Path) -> Any:
+    """Return the plain values and states of a file."""
     with zipfile.ZipFile(path) as archive:
         if damaged := archive.testzip():  # np.load would allocate the shape of a damaged header
             raise ValueError(f"{path.name}, {damaged}")
+
+    def decoded(value: dict[str, Any]) -> Any:
+        if "array" in value:
+            return arrays[value["array"]]
+        if "type" in value:
+            return _KINDS[value["type"]](**{name: _tuples(part) for name, part in value["parts"].items()})
+        return value
+
     with np.load(path, allow_pickle=False) as found:
         arrays = dict(found)
-    return json.loads(arrays[_PLAIN].tobytes()), arrays
+    return json.loads(arrays[_PLAIN].tobytes(), object_hook=decoded)
 
 
-def _flatten(value: Any, arrays: dict[str, Array], seen: dict[int, str]) -> Any:
-    """Return a value in the types of JSON; move its arrays to ``arrays``, each array once, and refer to their names."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if hasattr(value, "dtype"):  # an array of NumPy or CuPy
-        name = seen.setdefault(id(value), f"array{len(arrays)}")
-        arrays[name] = to_host(value)
-        return {"array": name}
-    if is_dataclass(value):
-        parts = {field.name: _flatten(getattr(value, field.name), arrays, seen) for field in fields(value)}
-        return {"type": type(value).__name__, "parts": parts}
-    if isinstance(value, tuple):
-        return {"tuple": [_flatten(part, arrays, seen) for part in value]}
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
-
-
-def _unflatten(value: Any, arrays: Mapping[str, Array]) -> Any:
-    if not isinstance(value, dict):
-        return value
-    if "array" in value:
-        return arrays[value["array"]]
-    if "tuple" in value:
-        return tuple(_unflatten(part, arrays) for part in value["tuple"])
-    parts = value["parts"].items()
-    return _KINDS[value["type"]](**{name: _unflatten(part, arrays) for name, part in parts})
+def _tuples(value: Any) -> Any:
+    """Return tuples for lists, because states contain tuples only."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

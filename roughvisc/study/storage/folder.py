@@ -14,9 +14,8 @@ import logging
 import os
 import secrets
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -79,11 +78,6 @@ def existing_part(folder: Path) -> Path:
     return next(place for place in (folder, *folder.absolute().parents) if place.exists())
 
 
-def is_writable(folder: Path) -> bool:
-    """Return whether files can be created in a folder, which may be absent yet."""
-    return os.access(existing_part(folder), os.W_OK)
-
-
 def require_writable(folder: Path, why: str = "") -> None:
     """Refuse a folder in which files cannot be created.
 
@@ -92,11 +86,10 @@ def require_writable(folder: Path, why: str = "") -> None:
     InputError
         If neither the folder nor a file in it can be created; the message includes the purpose `why`.
     """
-    if not is_writable(folder):
+    if not os.access(there := existing_part(folder), os.W_OK):
         needed = f", {why}" if why else ""
-        raise InputError(
-            f"{existing_part(folder)}: is not writable: expected a folder with write permission{needed}", transient=True
-        )
+        text = f"{there}: is not writable: expected a folder with write permission{needed}"
+        raise InputError(text, transient=True)
 
 
 def require_folder(folder: Path) -> None:
@@ -118,21 +111,15 @@ def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc
 
 
 def require_file(path: Path) -> None:
-    """Refuse a path that is not a readable regular file, because opening a pipe may never return.
+    """Refuse a path that is not a regular file, because opening a pipe may never return.
 
     Raises
     ------
     InputError
-        If the file is absent, a folder, a pipe or a device, or without read permission.
+        If the file is absent, a folder, a pipe or a device.
     """
-    try:
-        found = "is no regular file" if path.exists() else "does not exist"
-        if path.is_file():
-            path.open("rb").close()
-            return
-    except OSError as error:
-        found = f"cannot be read: {error.strerror or error}"
-    raise unusable(path, found)
+    if not os.path.isfile(path):
+        raise unusable(path, "is no regular file" if os.path.exists(path) else "does not exist")
 
 
 @contextmanager
@@ -188,21 +175,19 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write a compressed JSON file with a checksum; if writing fails, an existing file is not changed."""
+def write_json(path: Path, value: Any, default: Callable[[Any], Any] | None = None) -> None:
+    """Write a compressed JSON file with a checksum; if writing fails, an existing file is not changed.
+
+    `default` returns the JSON of any other object.
+    """
     with suppress(OSError, InputError), atomic_write(path) as temporary:
-        temporary.write_bytes(gzip.compress(json.dumps(value).encode(), compresslevel=1, mtime=0))
+        text = json.dumps(value, default=default).encode()
+        temporary.write_bytes(gzip.compress(text, compresslevel=1, mtime=0))
 
 
 def read_json(path: Path) -> Any:
     """Return the value of a compressed JSON file; raise one of :data:`DAMAGED` if it is damaged."""
     return json.loads(gzip.decompress(path.read_bytes()))
-
-
-@cache
-def warn_once(message: str) -> None:
-    """Log a warning once per process."""
-    log.warning("%s", message)
 
 
 @contextmanager
@@ -242,11 +227,8 @@ def record_path(folder: Path, key: str) -> Path:
 
 def record_failure(folder: Path, case: Case, **what: str) -> None:
     """Write the record of a failed case: its message, error and traceback, the program, and the case."""
-    path = record_path(folder, case.key)
-    try:
-        write_text(path, json.dumps(what | {"source": program(), "case": json.loads(case.to_json())}, indent=1))
-    except (OSError, InputError) as problem:
-        log.warning("%s cannot be written: %s", path, problem)
+    record = what | {"source": program(), "case": json.loads(case.to_json())}
+    write_text(record_path(folder, case.key), json.dumps(record, indent=1))
 
 
 def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
@@ -264,18 +246,15 @@ class _LogFile(logging.FileHandler):
 
 @contextmanager
 def log_file(folder: Path) -> Iterator[None]:
-    """Append all log messages of roughvisc to a file next to the results, within the block, if it can be written."""
-    level, handler = log.level, None
-    with suppress(OSError):
-        handler = _LogFile(folder / LOG, encoding="utf-8")
-        handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
-        log.addHandler(handler)
-        log.setLevel(min(level or logging.INFO, logging.INFO))
+    """Append all log messages of roughvisc to a file next to the results, within the block."""
+    level, handler = log.level, _LogFile(folder / LOG, encoding="utf-8")
+    handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
+    log.addHandler(handler)
+    log.setLevel(min(level or logging.INFO, logging.INFO))
     try:
         yield
     finally:
         log.setLevel(level)
-        if handler is not None:
-            log.removeHandler(handler)
-            with suppress(OSError):
-                handler.close()
+        log.removeHandler(handler)
+        with suppress(OSError):
+            handler.close()

@@ -7,6 +7,7 @@ is absent, damaged or older than the results.
 from __future__ import annotations
 
 import json
+import logging
 import re
 import shutil
 import time
@@ -31,19 +32,19 @@ from roughvisc.study.storage.folder import (
     lock_path,
     read_json,
     require_folder,
-    result_files,
     result_path,
-    warn_once,
     write_json,
 )
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.variables import axis_of
 
+log = logging.getLogger("roughvisc")
+
 INDEX = ".index.json.gz"
-#: Names of results are their keys.
-_KEY = re.compile(r"[0-9a-f]{16}")
+#: Pattern of a key.
+_KEY = "[0-9a-f]" * 16
 #: Hidden files of a case: its lock, its checkpoint, and incomplete files.
-_OF_A_CASE = re.compile(r"\.([0-9a-f]{16})\.")
+_OF_A_CASE = re.compile(rf"\.({_KEY})\.")
 #: Age of an incomplete file that belongs to no case, above which the file counts as a leftover. [s]
 _ABANDONED = 3600.0
 
@@ -81,11 +82,6 @@ class Entry:
     def along(self) -> str:
         """Axis of the rows."""
         return axis_of(self.arrays)
-
-    @property
-    def rows(self) -> int:
-        """Number of kept times, or of speeds."""
-        return len(self.arrays[self.along])
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -139,9 +135,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
     cached = _read_cache(folder)
     before = cached | {entry.file: entry for entry in known}
     entries = {}
-    for path in result_files(folder):
-        if not _KEY.fullmatch(path.stem):  # not the file of a case
-            continue
+    for path in sorted(folder.glob(f"{_KEY}.nc")):
         try:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
@@ -150,22 +144,17 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
                 raise InputError(f"{path}: holds the result of case {entry.key}: expected the case of its name")
             entries[entry.key] = entry
         except InputError as error:
-            warn_once(str(error))
+            log.warning("%s", error)
         except FileNotFoundError:  # removed in the meantime
             continue
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
-        results = [
-            (
-                one.file,
-                one.stamp,
-                one.attributes,
-                one.fields,
-                {name: (array.dtype.str, b64encode(array).decode()) for name, array in one.arrays.items()},
-            )
-            for one in entries.values()
-        ]
-        write_json(folder / INDEX, {"version": program_version(), "results": results})
+        results = [[one.file, one.stamp, one.attributes, one.fields, one.arrays] for one in entries.values()]
+        write_json(folder / INDEX, {"version": program_version(), "results": results}, _packed)
     return entries
+
+
+def _packed(array: NDArray[Any]) -> tuple[str, str]:
+    return array.dtype.str, b64encode(array).decode()
 
 
 def _read_cache(folder: Path) -> dict[str, Entry]:
@@ -222,17 +211,8 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     for key in keys:
         lock, checkpoint = lock_path(folder, key), checkpoint_path(folder, key)
         with suppress(OSError), lock_case(lock, patience=0.0):  # which also removes the lock
-            kept = [lock, *([] if everything or _is_left(checkpoint, result_path(folder, key)) else [checkpoint])]
-            for path in sorted(set(folder.glob(f".{key}.*")) - set(kept)):
-                remove(path)
+            resumes = (checkpoint / STATE).exists() and not result_path(folder, key).exists()
+            for path in sorted(folder.glob(f".{key}.*")):
+                if path != lock and (everything or path != checkpoint or not resumes):
+                    remove(path)
     return removed
-
-
-def _is_left(checkpoint: Path, result: Path) -> bool:
-    """Return whether a checkpoint is of no use: without a state, or beside a result."""
-    if not (checkpoint / STATE).exists():
-        return True
-    with suppress(InputError):  # the case is not finished
-        open_result(result).close()
-        return True
-    return False

@@ -123,13 +123,11 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
     """Return the variables of a file or a group."""
     variables = {}
     for name, stored in file.variables.items():
-        lazily = stored.dimensions[-2:] == ("x", "y")
-        read = partial(read_variable, path, name)
-        data = (
-            lazy(read, stored.shape, stored.dtype, indexing.IndexingSupport.OUTER)
-            if lazily
-            else np.asarray(stored[...])
-        )
+        if stored.dimensions[-2:] == ("x", "y"):
+            read = partial(read_variable, path, name)
+            data = lazy(read, stored.shape, stored.dtype, indexing.IndexingSupport.OUTER)
+        else:
+            data = np.asarray(stored[...])
         variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__)
     decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
     texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
@@ -338,7 +336,6 @@ def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
 
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> Path:
     """Write a Dataset other than a result to one NetCDF file atomically."""
-    numbers = [str(name) for name in dataset.variables if dataset[name].dtype.kind == "f"]
     with atomic_write(path) as temporary:
-        dataset.to_netcdf(temporary, engine="netcdf4", encoding={name: {"_FillValue": math.nan} for name in numbers})
+        dataset.to_netcdf(temporary, engine="netcdf4")
     return Path(path)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ from roughvisc.observables.frames import expect_result
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
-from roughvisc.study.storage.index import Entry, index_of
+from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import (
@@ -78,7 +78,10 @@ def to_table(out: str | Path) -> pd.DataFrame:
         if entry is not None:
             message = unconverged(entry.arrays)
             status = "unconverged" if message else "converged"
-            found = {heading(name, VARIABLES[name].units): value for name, value in _telling(entry).items()}
+            row = AXES[entry.along].telling_row(entry.arrays)
+            for name in chain.from_iterable((name, *ERRORS[name]) for name in variables_in_table("last")):
+                if name not in GRID_ERROR.values() and len(entry.arrays.get(name, ())):
+                    found[heading(name, VARIABLES[name].units)] = float(entry.arrays[name][row])
             for name in variables_in_table("largest"):
                 known = filter(np.isfinite, entry.arrays.get(name, ()))
                 found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
@@ -88,7 +91,9 @@ def to_table(out: str | Path) -> pd.DataFrame:
             status = "not computed"
         numbers.append(found)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
-    table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated], **_parameters(stated)})
+    table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated]})
+    for key, values in parameters_of(stated).items():
+        table[heading(key, unit_of(key, stated[0]) if values.dtype.kind in "if" else "")] = values
     table = table.join(pd.DataFrame(numbers, table.index)).dropna(axis="columns", how="all").join(pd.DataFrame(ends))
     return table.set_index(pd.Index(numbers_of(cases).values(), name="case"))
 
@@ -101,26 +106,6 @@ def write_table(folder: Path) -> None:
             to_table(folder).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
     except (OSError, InputError) as error:
         log.warning("%s cannot be written: %s", folder / CASES, error)
-
-
-def _telling(entry: Entry) -> dict[str, float]:
-    """Return the numbers of a case, each with its error, at the end or at the speed of largest friction of a curve."""
-    row = AXES[entry.along].telling_row(entry.arrays)
-    names = [
-        one
-        for name in variables_in_table("last")
-        for one in (name, *ERRORS[name])
-        if one not in GRID_ERROR.values() and len(entry.arrays.get(one, ()))
-    ]
-    return {name: float(entry.arrays[name][row]) for name in names}
-
-
-def _parameters(stated: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the values of varied parameters, under their keys with the unit of numbers."""
-    return {
-        heading(key, unit_of(key, stated[0]) if values.dtype.kind in "if" else ""): values.tolist()
-        for key, values in parameters_of(stated).items()
-    }
 
 
 def realisations_table(table: pd.DataFrame) -> pd.DataFrame:

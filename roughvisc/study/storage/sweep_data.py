@@ -18,7 +18,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.study.case import Case
 from roughvisc.study.si_tables import default_of, unit_of
-from roughvisc.study.storage.folder import DAMAGED, no_results, read_json, warn_once, write_json
+from roughvisc.study.storage.folder import DAMAGED, no_results, read_json
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import lazy, read_variable
 from roughvisc.study.sweep_table import DRAWN, REALISATION, value_at
@@ -37,16 +37,7 @@ _BLOCK = 16 << 20
 
 def sweep_cases(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
     """Return key -> JSON of each distinct case, in the order of the study."""
-    found: dict[str, dict[str, Any]] = {}
-    for case in cases:
-        if case.key not in found:
-            found[case.key] = json.loads(case.to_json())
-    return found
-
-
-def write_sweep(folder: Path, cases: Mapping[str, Any]) -> None:
-    """Write the cases of a sweep to its folder; if writing fails, the list of an earlier sweep stays."""
-    write_json(folder / SWEEP, cases)
+    return {key: json.loads(case.to_json()) for key, case in {case.key: case for case in cases}.items()}
 
 
 def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
@@ -63,11 +54,8 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
     except FileNotFoundError:
         return {}
     except DAMAGED as error:
-        raise InputError(
-            f"{path}: cannot be read, or is damaged ({error}): expected the cases of the last sweep; run it again, "
-            "which computes nothing that is finished",
-            key=SWEEP,
-        ) from error
+        found = f"cannot be read, or is damaged ({error})"
+        raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
 def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
@@ -158,7 +146,6 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         - Cases with different times or speeds: variables over ``(case, row, x, y)``, with the coordinates
           ``time(case, row)`` or ``speed(case, row)``, and ``rows(case)``, the number of rows of each case. Later rows
           are NaN. Whole numbers, such as ``status``, become floats.
-        - Cases on different grids: histories only, without fields, and a warning in the log names the grids.
 
         Varied parameters are coordinates over ``case``, numbers in SI or strings. The name of each is its dotted key
         with underscores, ``program_0_load``. A sweep with ``realisations`` has ``realisation`` as second dimension, in
@@ -168,7 +155,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     Raises
     ------
     InputError
-        If there are no results, or some results lie over time and others over speed.
+        If there are no results, some results lie over time and others over speed, or their grids differ.
 
     Examples
     --------
@@ -183,9 +170,11 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     if not here:
         raise no_results(folder)
     entries = [index[key] for key in listed if key in index]
-    if len(axes := {entry.along: entry.file for entry in entries}) > 1:
-        found = ", ".join(f"{file} over {along}" for along, file in axes.items())
-        raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
+    kinds = {(one.along, one.arrays["x"].tobytes(), one.arrays["y"].tobytes()): one for one in entries}
+    if len(kinds) > 1:
+        size = "{0.file} over {0.along} on {0.arrays[x].size} x {0.arrays[y].size} cells"
+        found = ", ".join(size.format(one) for one in kinds.values())
+        raise InputError(f"{folder}: found {found}: expected one axis and one grid; give cases", key="cases")
     numbers, keys = numbers_of(listed), [entry.key for entry in entries]
     parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
     labels = labels_of(parameters, listed[keys[0]], ("case",)) | {
@@ -207,20 +196,13 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
         for name in shared
         if name not in (along, "x", "y")
     }
-    coords = {along: places[0]} if common else {}
-    grids = {(entry.arrays["x"].tobytes(), entry.arrays["y"].tobytes()): entry.arrays for entry in entries}
-    if len(grids) == 1:
-        coords |= {"x": first.arrays["x"], "y": first.arrays["y"]}
-        one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
-        for name in first.fields:
-            if name in VARIABLES and all(name in entry.fields for entry in entries):
-                of_all = one_surface and VARIABLES[name].dims == ("x", "y")
-                field = _field(folder, entries[:1] if of_all else entries, name)
-                variables[name] = field[0] if of_all else field
-    else:
-        cells = {f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values()}
-        found = f"found {len(grids)} grids ({', '.join(sorted(cells))})"
-        warn_once(f"{folder}: {found}: opened without fields; open_result gives the fields of each result")
+    coords = {name: first.arrays[name] for name in ("x", "y", *([along] if common else []))}
+    one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
+    for name in first.fields:
+        if name in VARIABLES and all(name in entry.fields for entry in entries):
+            of_all = one_surface and VARIABLES[name].dims == ("x", "y")
+            field = _field(folder, entries[:1] if of_all else entries, name)
+            variables[name] = field[0] if of_all else field
     others = [entry.attributes for entry in entries]
     alike = {name: one for name, one in first.attributes.items() if all(other.get(name) == one for other in others)}
     dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))
@@ -240,7 +222,7 @@ def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
 def _field(folder: Path, entries: Sequence[Entry], name: str) -> xr.Variable:
     """Return a variable over (case, ...) in blocks of one case and some rows, which Dask reads."""
     dims = ("case", *VARIABLES[name].over(entries[0].along))
-    counts = [entry.rows for entry in entries]
+    counts = [len(entry.arrays[entry.along]) for entry in entries]
     dtype = np.result_type(*(entry.fields[name] for entry in entries))
     shape = (len(entries), *[max(counts)] * (len(dims) - 3), *(len(entries[0].arrays[axis]) for axis in ("x", "y")))
     paths = [str(folder / entry.file) for entry in entries]
@@ -285,11 +267,5 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
     runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
     found = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
     found = found.assign_coords({name: of_cases.variables[name] for name in settings})
-    for name in (identifier(key) for key in DRAWN if key in parameters):
-        if (found[name].values == found[name].values[:1]).all():  # each case has the same seeds
-            found = found.assign_coords({name: found.variables[name][0]})
-    found[REALISATION].attrs = {
-        "long_name": "realisation",
-        "comment": "number of another patch of the same roughness; 0: the measured surface itself",
-    }
+    found[REALISATION].attrs["comment"] = "another patch of the same roughness; 0: the measured surface itself"
     return found

@@ -8,6 +8,7 @@ import threading
 import time
 from contextlib import contextmanager
 from functools import partial
+from types import SimpleNamespace
 
 import dask
 import pytest
@@ -72,20 +73,17 @@ def short_hold(study):
 
 
 class Ear(Display):
-    """Keeps what a sweep displays: times reached, lines, and urgent messages."""
+    """Keeps what a sweep displays: times reached, and lines."""
 
     def __init__(self):
         super().__init__(False)
-        self.heard, self.lines, self.messages = [], [], []
+        self.heard, self.lines = [], []
 
     def reached(self, key, now, end):
         self.heard.append((key, now, end))
 
     def say(self, text, key=""):
         self.lines.append(text)
-
-    def warn(self, text):
-        self.messages.append(text)
 
     def wait_until(self, condition):
         wait_for(lambda: condition(self.heard))
@@ -262,18 +260,19 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
     monkeypatch.setattr(dispatch, "_ALONE_AFTER", 0.3)
     monkeypatch.setattr(sweep_module, "local_client", lambda processes: bare_cluster())
 
-    class CtrlC(Ear):
-        def warn(self, text):
-            super().warn(text)
-            raise KeyboardInterrupt
+    ear, messages = Ear(), []
 
-    ear = CtrlC()
+    def ctrl_c(text, **_):
+        messages.append(text)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(dispatch, "warnings", SimpleNamespace(warn=ctrl_c))
     with bare_cluster() as cluster:
         how = {"client": cluster} if where == "cluster" else {"workers": 2}
         with pytest.raises(KeyboardInterrupt):
             run_cases(study(), tmp_path / "out", display=ear, **how)
     assert ear.lines[-1].startswith("stopping")
-    (message,) = ear.messages
+    (message,) = messages
     assert "no worker" in message
     assert message in (tmp_path / "out" / "sweep.log").read_text()
     assert not list((tmp_path / "out").glob("*.failed.json"))

@@ -221,7 +221,7 @@ def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, 
 @pytest.mark.parametrize("damaged", [("state.npz",), ("rows-0000.npz",), ("state.npz", "rows-0001.npz")])
 def test_damage__costs_work_and_no_bit_of_the_result(whole, tmp_path, caplog, damaged):
     case, expected, steps = whole(MODES)
-    unfinished = stopped(case, tmp_path, steps // 2, checkpoint_steps=5)
+    unfinished = stopped(case, tmp_path, steps // 2, checkpoint_seconds=0)
     assert {"state.npz", "rows-0000.npz", "rows-0001.npz"} <= set(names(unfinished))
     for name in damaged:
         content = (unfinished / name).read_bytes()
@@ -237,7 +237,7 @@ def test_damage__costs_work_and_no_bit_of_the_result(whole, tmp_path, caplog, da
 
 def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path):
     case, expected, steps = whole(MODES)
-    unfinished = stopped(case, tmp_path, steps // 2, checkpoint_steps=5)
+    unfinished = stopped(case, tmp_path, steps // 2, checkpoint_seconds=0)
     number = len(list(unfinished.glob("rows-*")))
     shutil.copy(unfinished / "rows-0000.npz", unfinished / f"rows-{number:04d}.npz")
     (unfinished / ".rows-0009.0f0f0f0f.part.npz").write_bytes(b"torn off while it was written")
@@ -249,17 +249,19 @@ import os, random, signal, sys, time
 from pathlib import Path
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
+from roughvisc.study.storage import checkpoint
+checkpoint._SHARE = float("inf")  # at every step
 study, out, kills, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
 case, draw, done = read_study(study), random.Random(seed), 0
 for warm in ("imports", "timed"):
     began, told = time.perf_counter(), []
-    run_case(case, out.parent / warm, checkpoint_steps=2, progress=lambda now, end: told.append(now))
+    run_case(case, out.parent / warm, checkpoint_seconds=0, progress=lambda now, end: told.append(now))
     step = (time.perf_counter() - began) / len(told)
 
 def work(pipe):
     def report(now, end):
         os.write(pipe, f"{now!r}\\n".encode())
-    run_case(case, out, progress=report, checkpoint_steps=2)
+    run_case(case, out, progress=report, checkpoint_seconds=0)
 
 def after(reports, pipe):
     "What a run has told by then, or before it ended; at a random instant of the next step."
@@ -336,7 +338,7 @@ def test_full_disk__loses_nothing(whole, tmp_path, small_disk, size):
     folder, remount = small_disk
     remount(f"size={size}")
     with pytest.raises(OSError, match=r"No space left on device; .* make room and run it again") as caught:
-        run_case(case, folder, checkpoint_steps=5)
+        run_case(case, folder, checkpoint_seconds=0)
     assert caught.value.errno == errno.ENOSPC
     assert not list(folder.glob("*.nc"))
     assert not list(folder.glob(".*.lock"))

@@ -17,7 +17,6 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.index import clean_folder
 from roughvisc.study.storage.netcdf import DamagedError, verify
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
@@ -264,13 +263,3 @@ def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invok
     assert invoke("verify", out)[0] == 0
     shutil.rmtree(out)
     assert invoke("verify", out)[0] == 2
-
-
-def test_clean__keeps_the_checkpoint_of_a_case_whose_result_is_damaged(copied):
-    _, case, path = copied
-    unfinished = path.parent / f".{case.key}.unfinished"
-    unfinished.mkdir()
-    (unfinished / "state.npz").write_bytes(b"state")
-    os.truncate(path, 100)
-    clean_folder(path.parent)
-    assert unfinished.exists()
