@@ -43,14 +43,18 @@ def test_attributes__are_plain(stored):
     )
 
 
-def test_result__has_few_variables_and_attributes(stored):
+def test_result__has_few_variables_and_attributes(stored, tmp_path):
     rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
     material = rv.sheet(RUBBER, 1e-3)
     press = rv.Program().pressure(1e4, over=0.1)
     shared = {"grid_error": True, "progress": False}
     curve = rv.friction(rough, material, speeds=[1e-3, 1e-2], load=0.02, fields=("pressure", "gap"), **shared)
     scan = rv.simulate(rough, material, press, boundary="periodic", times=2, **shared)
-    for ds in (stored, curve, scan):
+    sheet = STUDY.replace("[[program]]", 'thickness = "0.1 mm"\n[[program]]', 1)
+    (tmp_path / "sheet.toml").write_text(sheet + "[solve]\ntime_step = 0.1\n")
+    fullest = rv.run(tmp_path / "sheet.toml", progress=False)
+    assert {"thickness", "warnings"} <= set(fullest.attrs)
+    for ds in (stored, fullest, curve, scan):
         assert len(ds.variables) <= 26
         assert len(ds.attrs) <= 14
     assert stored.stated_error.attrs["long_name"] == "numerical error"
