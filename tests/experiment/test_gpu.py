@@ -108,6 +108,7 @@ def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name,
     stopped = CheckpointWriter(tmp_path / "run", "key", seconds=0, stop=lambda: next(count) == 4)
     with pytest.raises(KeyboardInterrupt):
         solve(problem, Loading(program), stopped)
+    stopped.save()
     stopped.close()
     resumed = CheckpointWriter(tmp_path / "run", "key")
     resumed.resume()
@@ -140,4 +141,4 @@ def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeyp
     said = " ".join(capsys.readouterr().err.split())
     assert "device" in said
     assert expected in said
-    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["study.toml"]

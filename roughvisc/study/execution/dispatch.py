@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import logging
-import math
 import secrets
 import signal
 import threading
@@ -128,7 +127,6 @@ def distribute(
             if time.monotonic() - alone_since > _ALONE_AFTER:
                 alone_since = time.monotonic()
                 if not client.nthreads():
-                    alone_since = math.inf
                     log.warning(_ALONE, len(futures))
                     warnings.warn(_ALONE % len(futures), stacklevel=1)  # also without a display
     except (KeyboardInterrupt, SystemExit, GeneratorExit):  # dask-jobqueue turns Ctrl-C into SystemExit

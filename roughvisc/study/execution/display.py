@@ -71,8 +71,7 @@ class Display:
     def close(self) -> None:
         """End the display."""
         self._bars.stop()
-        if self._names:
-            self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
+        self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
 
     def _move(self) -> None:
         """Move the bar of the sweep."""

@@ -129,11 +129,10 @@ class CheckpointWriter(Recorder):
         Raises
         ------
         KeyboardInterrupt
-            If `stop` returns true, after a checkpoint is written.
+            If `stop` returns true; the caller writes a checkpoint.
         """
         self.latest = reached
         if self._stop is not None and self._stop():
-            self.save()
             raise KeyboardInterrupt
         if time.monotonic() - self._last_save >= self._interval:
             self.save()

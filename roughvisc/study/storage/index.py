@@ -143,10 +143,8 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
             if entry.key != path.stem:
                 raise InputError(f"{path}: holds the result of case {entry.key}: expected the case of its name")
             entries[entry.key] = entry
-        except InputError as error:
+        except (InputError, FileNotFoundError) as error:  # damaged, or removed in the meantime
             log.warning("%s", error)
-        except FileNotFoundError:  # removed in the meantime
-            continue
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
         results = [[one.file, one.stamp, one.attributes, one.fields, one.arrays] for one in entries.values()]
         write_json(folder / INDEX, {"version": program_version(), "results": results}, _packed)

@@ -19,14 +19,7 @@ from roughvisc.study.storage.folder import atomic_write, no_results, recorded_fa
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
 from roughvisc.study.sweep_table import DRAWN, REALISATION
-from roughvisc.variables import (
-    AXES,
-    ERRORS,
-    GRID_ERROR,
-    VARIABLES,
-    axis_of,
-    variables_in_table,
-)
+from roughvisc.variables import AXES, ERRORS, GRID_ERROR, VARIABLES, axis_of, variables_in_table
 
 if TYPE_CHECKING:
     import pandas as pd
