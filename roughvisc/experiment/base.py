@@ -212,6 +212,10 @@ class Experiment(ABC):
         """
 
     @abstractmethod
+    def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
+        """Return the attributes of a result that an audit needs: facts about the body, and the time scale [s]."""
+
+    @abstractmethod
     def progress(self, done: float, end: float) -> str:
         """Return the progress in words."""
 

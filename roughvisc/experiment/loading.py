@@ -99,6 +99,10 @@ class Loading(Experiment):
         """Return all accepted steps; the kept ones are rows of the result."""
         return LoadingRows(problem, self.program, state, in_memory=in_memory)
 
+    def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
+        """Return facts about the body at the end of the program, and the time scale of the program."""
+        return body.facts(self.program.duration) | {"time_scale": self.program.time_scale}
+
     def progress(self, done: float, end: float) -> str:
         """Return the time reached, in words."""
         unit = unit_for(end, "s")
@@ -304,10 +308,7 @@ class LoadingRows(Rows):
         warnings = loading_warnings(
             scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border
         )
-        attributes = body.facts(self.end) | {"time_scale": scene.program.time_scale}
-        if body.separates:  # of the series that was solved; for layers the values of the top layer remain
-            attributes["compliance_at_once"] = scene.memory.compliance(0.0)
-            attributes["compliance_at_end"] = scene.memory.compliance(self.end)
+        attributes = Loading(scene.program).facts(body, self.problem.height)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
         if cycles := scene.program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)

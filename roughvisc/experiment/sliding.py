@@ -141,6 +141,11 @@ class SteadySliding(Experiment):
             if found != getattr(Settings, name):
                 yield name, found, "a result over speed has none: expected the usual"
 
+    def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
+        """Return facts about the body after the time in which the surface slides past a point, at the lowest speed."""
+        longest = max(float(np.ptp(height["x"].values)), float(np.ptp(height["y"].values)))
+        return body.facts(longest / min(self.speeds)) | {"time_scale": math.inf}
+
     def progress(self, done: float, end: float) -> str:
         """Return the number of solved speeds, in words."""
         return f"speed {done:.0f} of {end:.0f}"
@@ -288,15 +293,13 @@ class SlidingRows(Rows):
         """Return the result with the direction, numbers for an audit, and warnings."""
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
-        longest = max(float(np.ptp(height["x"].values)), float(np.ptp(height["y"].values)))
         warnings = {
             "slope": slope_warning(height, "periodic", np.inf),
             "border": border_warning(height, xr.Dataset()),
             "wake": wake_warning(left, self._grids[0].period),
         }
         stated = {"speeds": speeds_warning(dataset), "material": table_warning(self._body.materials)}
-        attributes = self.problem.body.facts(longest / min(self._curve.speeds))
-        attributes |= {"time_scale": math.inf, "direction": self._curve.direction}
+        attributes = self._curve.facts(self.problem.body, height) | {"direction": self._curve.direction}
         if text := warnings_text(stated | warnings):
             attributes["warnings"] = text
         return dataset.drop_vars("creep_left").assign_attrs(attributes)

@@ -298,7 +298,6 @@ class Body:
             Time at which the creep ends. [s]
         """
         facts = self.kernel.described()
-        facts["compliance_at_once"] = float(self.material.contact_compliance(0.0))
         facts["compliance_at_end"] = float(self.material.contact_compliance(end))
         if not self.material.stands_for:
             facts["poisson"] = self.material.poisson

@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import xarray as xr
@@ -30,6 +30,9 @@ from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import hann, last_octave, modes
 from roughvisc.units import Quantity, format_quantity, quantities
 from roughvisc.variables import axis_of
+
+if TYPE_CHECKING:
+    from roughvisc.study.case import Case
 
 Array = NDArray[np.float64]
 
@@ -73,10 +76,13 @@ class Scene:
         Result of one case.
     given : mapping
         Stated properties, in SI.
+    case : Case or None
+        Case of a stored result, which states the material and the program.
     """
 
     dataset: xr.Dataset
     given: Mapping[str, Any]
+    case: Case | None = None
 
     def need(self, *names: str) -> list[float]:
         """Return stated properties by name. [SI]"""
@@ -208,9 +214,11 @@ class Scene:
 
     # ----------------------------------------------------------------------------------------------------- bodies
 
-    @property
+    @cached_property
     def facts(self) -> Mapping[Any, Any]:
-        """Attributes of the result, with facts on material and program."""
+        """Facts on material and program: attributes of the result, or derived from the case of a stored one."""
+        if self.case is not None:
+            return self.case.experiment.facts(self.case.body, self.height)
         if "time_scale" not in self.dataset.attrs:
             raise NotKnown("The material is not stated: audit the file from run, or the Dataset from simulate.")
         return self.dataset.attrs
@@ -591,11 +599,13 @@ def audit(
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
     expect_result(result, "force", "approach", "contact_area", "contact_fraction")
+    case = None
     if "case" in result.attrs:
         from roughvisc.study.case import Case  # imports this module
 
-        given = {**Case.from_json(result.attrs["case"]).audit_inputs, **given}
-    scene, findings = Scene(result, given), []
+        case = Case.from_json(result.attrs["case"])
+        given = {**case.audit_inputs, **given}
+    scene, findings = Scene(result, given, case), []
     for name, limit in LIMITS.items():
         try:
             found = limit.check(scene)

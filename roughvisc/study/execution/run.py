@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 Progress = Callable[[float, float], None]
+#: Facts that a stored result omits, because its attribute ``case`` determines them.
+_IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
 #: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
 Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
@@ -108,7 +110,7 @@ def compute(
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,
     }
-    dataset.attrs = provenance | dataset.attrs
+    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
     return dataset.assign_coords(labels_of_case(json.loads(stated)))
 
 
