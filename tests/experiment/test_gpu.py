@@ -141,4 +141,4 @@ def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeyp
     said = " ".join(capsys.readouterr().err.split())
     assert "device" in said
     assert expected in said
-    assert [path.name for path in tmp_path.rglob("*.*")] == ["study.toml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]

@@ -10,7 +10,7 @@ import re
 import time
 import traceback
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -162,6 +162,7 @@ def run_case(
     if is_result_of(case, path) and not any(folder.glob(f".{case.key}.*")):
         return path  # finished, without leftovers to remove
     require_writable(folder, "since the case is not finished")
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         unfinished = checkpoint_path(folder, case.key)
@@ -195,6 +196,10 @@ def run_case(
             raise
         advice = "what was computed up to the last checkpoint is kept: make room and run it again"
         raise OSError(error.errno, f"{os.strerror(error.errno)}; {advice}", str(path)) from error
+    finally:
+        for place in made:  # rmdir removes only empty folders
+            with suppress(OSError):
+                place.rmdir()
     return path
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import zip_longest
@@ -23,6 +24,8 @@ from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import lazy, read_variable
 from roughvisc.study.sweep_table import DRAWN, REALISATION, value_at
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
+
+log = logging.getLogger("roughvisc")
 
 #: File with the cases of the last sweep.
 SWEEP = ".cases.json.gz"
@@ -146,6 +149,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         - Cases with different times or speeds: variables over ``(case, row, x, y)``, with the coordinates
           ``time(case, row)`` or ``speed(case, row)``, and ``rows(case)``, the number of rows of each case. Later rows
           are NaN. Whole numbers, such as ``status``, become floats.
+        - Cases on different grids: histories only, without fields, and a warning in the log names the grids.
 
         Varied parameters are coordinates over ``case``, numbers in SI or strings. The name of each is its dotted key
         with underscores, ``program_0_load``. A sweep with ``realisations`` has ``realisation`` as second dimension, in
@@ -155,7 +159,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     Raises
     ------
     InputError
-        If there are no results, some results lie over time and others over speed, or their grids differ.
+        If there are no results, or some results lie over time and others over speed.
 
     Examples
     --------
@@ -170,11 +174,9 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     if not here:
         raise no_results(folder)
     entries = [index[key] for key in listed if key in index]
-    kinds = {(one.along, one.arrays["x"].tobytes(), one.arrays["y"].tobytes()): one for one in entries}
-    if len(kinds) > 1:
-        size = "{0.file} over {0.along} on {0.arrays[x].size} x {0.arrays[y].size} cells"
-        found = ", ".join(size.format(one) for one in kinds.values())
-        raise InputError(f"{folder}: found {found}: expected one axis and one grid; give cases", key="cases")
+    if len(axes := {entry.along: entry.file for entry in entries}) > 1:
+        found = ", ".join(f"{file} over {along}" for along, file in axes.items())
+        raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
     numbers, keys = numbers_of(listed), [entry.key for entry in entries]
     parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
     labels = labels_of(parameters, listed[keys[0]], ("case",)) | {
@@ -196,13 +198,19 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
         for name in shared
         if name not in (along, "x", "y")
     }
-    coords = {name: first.arrays[name] for name in ("x", "y", *([along] if common else []))}
-    one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
-    for name in first.fields:
-        if name in VARIABLES and all(name in entry.fields for entry in entries):
-            of_all = one_surface and VARIABLES[name].dims == ("x", "y")
-            field = _field(folder, entries[:1] if of_all else entries, name)
-            variables[name] = field[0] if of_all else field
+    coords = {along: places[0]} if common else {}
+    grids = {(entry.arrays["x"].tobytes(), entry.arrays["y"].tobytes()): entry.arrays for entry in entries}
+    if len(grids) == 1:
+        coords |= {"x": first.arrays["x"], "y": first.arrays["y"]}
+        one_surface = all(entry.case.get("surface") == first.case.get("surface") for entry in entries)
+        for name in first.fields:
+            if name in VARIABLES and all(name in entry.fields for entry in entries):
+                of_all = one_surface and VARIABLES[name].dims == ("x", "y")
+                field = _field(folder, entries[:1] if of_all else entries, name)
+                variables[name] = field[0] if of_all else field
+    else:
+        cells = ", ".join(sorted({f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values()}))
+        log.warning("%s: found %s: opened without fields; open_result gives the fields of each result", folder, cells)
     others = [entry.attributes for entry in entries]
     alike = {name: one for name, one in first.attributes.items() if all(other.get(name) == one for other in others)}
     dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))

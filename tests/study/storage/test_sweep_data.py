@@ -133,12 +133,13 @@ boundary = "periodic"
     assert ds.friction_coefficient.notnull().equals(ds.speed.notnull())
 
 
-def test_open_results__refuses_different_grids(study, tmp_path):
+def test_open_results__on_different_grids_has_histories(study, tmp_path, caplog):
     cases = study(SMALL + '[sweep]\n"surface.shape" = [[12, 9], [16, 12]]\n')
-    with pytest.raises(InputError, match=r"over time on 12 x 9 cells, .* over time on 16 x 12 cells"):
-        sweep(cases, tmp_path / "out", workers=0, progress=False)
-    assert rv.open_results(tmp_path / "out", cases=cases[1:]).sizes["x"] == 16
-    assert rv.to_table(tmp_path / "out")["status"].tolist() == ["converged"] * 2
+    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
+    assert ds.contact_area.dims == ("case", "time")
+    assert not {"x", "y", "pressure", "height"} & set(ds.variables)
+    assert "12 x 9 cells" in caplog.text
+    assert "16 x 12 cells" in caplog.text
 
 
 def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_path):
