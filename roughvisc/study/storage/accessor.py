@@ -7,11 +7,15 @@ Every module that opens or computes a result registers the accessor. Each functi
 from __future__ import annotations
 
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 import xarray as xr
 
 from roughvisc.labels import require_steps
+
+#: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
+_ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
 
 @xr.register_dataset_accessor("roughvisc")
@@ -33,9 +37,8 @@ class ResultAccessor:
         return require_steps(self._dataset)
 
     def __getattr__(self, name: str) -> Any:
-        from roughvisc import observables, plot
-
-        room, function = (plot, name[5:]) if name.startswith("plot_") else (observables, name)
+        start = "plot_" if name.startswith("plot_") else ""
+        room, function = import_module(_ROOMS[start]), name.removeprefix(start)
         if function not in room.__all__:
             raise AttributeError(f"the accessor roughvisc has no {name!r}")
         method = partial(getattr(room, function), self._dataset)
@@ -43,6 +46,5 @@ class ResultAccessor:
         return method
 
     def __dir__(self) -> list[str]:
-        from roughvisc import observables, plot
-
-        return [*super().__dir__(), *observables.__all__, *(f"plot_{name}" for name in plot.__all__)]
+        known = (start + name for start, module in _ROOMS.items() for name in import_module(module).__all__)
+        return [*super().__dir__(), *known]
