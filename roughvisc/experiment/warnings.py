@@ -83,7 +83,7 @@ def loading_warnings(
     if missed.size:
         tolerance = (
             f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
-            f"tolerance {limit:g}, {missed.max():.2g} at worst (stated_error)."
+            f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
         )
         if scene.time_step is not None:
             tolerance += " The time step is fixed, and not chosen by the tolerance."
