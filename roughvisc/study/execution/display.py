@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rich.console import Console
 
@@ -12,7 +12,6 @@ from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.run import Outcome
-from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
 
 
 class Display:
@@ -35,9 +34,8 @@ class Display:
         self._ended: dict[str, Outcome] = {}
         self._began = time.monotonic()
 
-    def begin(self, cases: Sequence[Case]) -> None:
-        """Show the cases, in the order of the study."""
-        numbers = numbers_of(sweep_cases(cases))
+    def begin(self, cases: Sequence[Case], numbers: Mapping[str, int]) -> None:
+        """Show the cases, in the order of the study; `numbers` gives the number of each key."""
         for case in cases:
             varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
             self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:60]})" if varied else "")

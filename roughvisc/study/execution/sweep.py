@@ -28,7 +28,7 @@ from roughvisc.study.storage.folder import (
 )
 from roughvisc.study.storage.index import clean_folder, index_of
 from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_data import SWEEP, open_results, sweep_cases
+from roughvisc.study.storage.sweep_data import SWEEP, numbers_of, open_results, sweep_cases
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -149,7 +149,8 @@ def run_cases(
     require_writable(folder, "for the results")
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
-    write_json(folder / SWEEP, sweep_cases(cases))
+    listed = sweep_cases(cases)
+    write_json(folder / SWEEP, listed)
     with log_file(folder):
         index, outcomes = index_of(folder), dict[str, Outcome]()
         for key in distinct:
@@ -159,7 +160,7 @@ def run_cases(
                 outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
-        display.begin(cases)
+        display.begin(cases, numbers_of(listed))
         for outcome in outcomes.values():
             display.ended(outcome)
         warned = set[str]()

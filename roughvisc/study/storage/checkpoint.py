@@ -71,12 +71,14 @@ class CheckpointWriter(Recorder):
         self._interval, self._stop = seconds, stop
         self._saved, self._last_save = self.latest, time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
+        self._waiting = 0  # size of the arrays in memory [byte]
         self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
         super().append(plain, arrays)
-        if sum(array.nbytes for row in self._arrays for array in row.values()) > _WAITING:
+        self._waiting += sum(array.nbytes for array in arrays.values())
+        if self._waiting > _WAITING:
             self._write_rows()
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
@@ -142,7 +144,7 @@ class CheckpointWriter(Recorder):
         super().restart()
         self._reading = -1, None
         self.latest = self._saved = Checkpoint()
-        self._ends = [0]
+        self._ends, self._waiting = [0], 0
         (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
         for path in self._folder.iterdir():
             path.unlink()
@@ -176,7 +178,7 @@ class CheckpointWriter(Recorder):
         arrays = {f"{row}/{name}": one for row, found in enumerate(self._arrays, first) for name, one in found.items()}
         _write(self._rows_path(len(self._ends) - 1), self.plain[first:], arrays)
         self._ends = [*self._ends, len(self.plain)]
-        self._arrays = []
+        self._arrays, self._waiting = [], 0
 
     def _rows_path(self, number: int) -> Path:
         return self._folder / f"rows-{number:04d}.npz"
