@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.variables import AXES, ERRORS, NOT_CONVERGED, ROW, VARIABLES, axis_of
+from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,18 +132,6 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
         for one in (result, steps)
     )
     return steps if rows <= known else None
-
-
-def unconverged(histories: Mapping[Any, Any]) -> str:
-    """Return a message about speeds, or times, that did not converge; empty if all did."""
-    if "status" not in histories:  # over time, where a step that does not converge ends the run
-        return ""
-    status, axis = np.asarray(histories["status"]), AXES[axis_of(histories)]
-    bad = np.flatnonzero(status == NOT_CONVERGED)
-    if not bad.size:
-        return ""
-    first = axis.place(float(histories[axis.name][bad[0]]))
-    return f"{bad.size} of {status.size} {axis.rows} did not converge, first at {first}: try a looser tolerance"
 
 
 def cost_of(result: xr.Dataset) -> tuple[float, float]:

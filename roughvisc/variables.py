@@ -19,8 +19,7 @@ from roughvisc.units import unit_for
 RESULT_FORMAT = 1
 
 #: How an accepted step ended; the values of ``status``, in order.
-STATUS_MEANINGS = ("converged", "not_converged", "open", "full_contact")
-NOT_CONVERGED = STATUS_MEANINGS.index("not_converged")
+STATUS_MEANINGS = ("converged", "open", "full_contact")
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
 ROW, ROWS = "row", "rows"

@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -22,8 +21,6 @@ import strategies  # noqa: F401  (loads the profile of the random examples)
 from roughvisc.cli import main
 from roughvisc.mechanics.grid import Grid
 from roughvisc.plot import save as save_module
-from roughvisc.study.execution import run as run_module
-from roughvisc.variables import axis_of
 
 
 @pytest.fixture
@@ -73,16 +70,3 @@ def small_disk(tmp_path):
 def coarse_pictures(monkeypatch):
     """Pictures are written with few points, where nobody looks at them."""
     monkeypatch.setattr(save_module, "DPI", 40)
-
-
-@pytest.fixture
-def stubborn(monkeypatch):
-    """Every run ends with a kept time, the second, that did not converge."""
-    press = run_module.solve
-
-    def one_missed(*args, **settings):
-        ds = press(*args, **settings)
-        status = np.arange(ds.sizes[axis_of(ds.variables)]) == 1
-        return ds.assign(status=(axis_of(ds.variables), status.astype("int8")))
-
-    monkeypatch.setattr(run_module, "solve", one_missed)

@@ -135,14 +135,6 @@ def test_budget__names_what_open_sources_need(invoke, coarse_pictures):
     assert (status, "time_scale_error" in out, "--time-scale-error" in out) == (0, True, False), "no option of run"
 
 
-def test_run__not_converged_is_status_1_and_the_file_is_kept(invoke, tmp_path, stubborn):
-    status, out, err = invoke("run", write_study(), "--no-plots")
-    assert status == 1
-    assert "1 of 3 kept times did not converge" in err
-    assert "Result: " in out
-    assert len(list((tmp_path / "results" / "ball").iterdir())) == 1
-
-
 def test_run__of_contact_at_the_border_is_status_2_and_writes_nothing(invoke, tmp_path):
     status, out, err = invoke("run", write_study(BALL, ('"5 mN"', '"50 N"')), "-q")
     assert (status, out) == (2, "")

@@ -136,7 +136,6 @@ def run(
 def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
     """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
     from roughvisc.cli.tables import result_table
-    from roughvisc.labels import unconverged
     from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
@@ -156,7 +155,7 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
         if plots:
             say_figures(console, save_figures(dataset, folder, case.key, names=DEFAULT))
             say(console, f"For all figures, run: roughvisc plot --all {near(folder)}")
-        return unconverged(dataset) or missed
+        return missed
 
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.arguments import one_of
-from roughvisc.errors import InputError
+from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
 from roughvisc.experiment.grid_error import counting_error, grid_errors, grid_uncertainties, hidden_opening
@@ -23,7 +23,6 @@ from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.warnings import (
     border_warning,
     slope_warning,
-    speeds_warning,
     stands_alone,
     table_warning,
     unrecovered,
@@ -39,15 +38,13 @@ from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import OVER_TIME, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.resampling import resample_periodic
-from roughvisc.units import Quantity, quantities, unit_for
+from roughvisc.units import Quantity, format_quantity, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
-#: Variables of a speed at which the contact is not solved; the others are missing.
-_OF_UNSOLVED = ("force", "nominal_pressure", "residual", "status")
 #: Fields that a row may have.
 _FIELDS = ("pressure", "gap")
 #: Direction -> quarter turns of the grid, counter-clockwise, after which the profile moves along +x.
@@ -242,7 +239,11 @@ class SlidingRows(Rows):
             states, across, convolutions, creep = [], 0.0, 0, 0.0
             for cells in self._grids:
                 sliding = Sliding(law, cells.gap.shape, cells.spacing, speed, xp)
-                found = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=tolerance)
+                try:
+                    found = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=tolerance)
+                except ConvergenceError as error:
+                    advice = "try a looser tolerance, a coarser grid, or layers whose moduli differ less"
+                    raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
                 if not states:  # the grid of the surface
                     across, convolutions = sliding.force(found.pressure, axis=1), sliding.convolutions
                 pressure, displacement = to_host(found.pressure), to_host(found.displacement)
@@ -252,10 +253,7 @@ class SlidingRows(Rows):
             row["friction_force_across"] = across
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, states)
-            if not found.converged:
-                row = {name: value if name in _OF_UNSOLVED else math.nan for name, value in row.items()}
-                fields = {name: np.full_like(field, math.nan) for name, field in fields.items()}
-            elif stands_alone(self._profile.height, found.pressure, 0):
+            if stands_alone(self._profile.height, found.pressure, 0):
                 for one in law.materials:
                     crept = float(one.contact_compliance(grid.period / speed))
                     creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
@@ -268,7 +266,7 @@ class SlidingRows(Rows):
         force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
         counted, contact_area = self._grids[0].areas(found.pressure > 0)
         gap = self._grids[0].opening(found)
-        whole = "full_contact" if (found.pressure > 0).all() else "converged"
+        status = "full_contact" if (found.pressure > 0).all() else "converged"
         row = {
             "force": force,
             "nominal_pressure": force / area,
@@ -281,7 +279,7 @@ class SlidingRows(Rows):
             "friction_force": found.power_force,
             "stated_error": max(found.residual, found.friction_residual),
             "residual": found.residual,
-            "status": STATUS_MEANINGS.index(whole if found.converged else "not_converged"),
+            "status": STATUS_MEANINGS.index(status),
         }
         fields = {}
         for name in self._settings.fields:
@@ -298,9 +296,9 @@ class SlidingRows(Rows):
             "border": border_warning(height, xr.Dataset()),
             "wake": wake_warning(left, self._grids[0].period),
         }
-        stated = {"speeds": speeds_warning(dataset), "material": table_warning(self._body.materials)}
+        warnings["material"] = table_warning(self._body.materials)
         attributes = self._curve.facts(self.problem.body, height) | {"direction": self._curve.direction}
-        if text := warnings_text(stated | warnings):
+        if text := warnings_text(warnings):
             attributes["warnings"] = text
         return dataset.drop_vars("creep_left").assign_attrs(attributes)
 
@@ -318,16 +316,15 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
     Returns
     -------
     dict
-        Name of a variable -> error; NaN without friction, or if no coarser grid has a solution.
+        Name of a variable -> error; NaN without friction, or without a coarser grid.
     """
     grid, found = grids[0], states[0]
-    if len(grids) == 1 or not (found.converged and found.power_force > 0):
+    if len(grids) == 1 or found.power_force <= 0:
         return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
     runs = []
     for cells, state in zip(grids, states, strict=True):
         area, gap = cells.areas(state.pressure > 0)[1], float(cells.opening(state).mean())
-        numbers = (state.power_force, area, state.approach, gap) if state.converged else [math.nan] * 4
-        runs.append(dict(zip(_QUANTITIES, numbers, strict=True)))
+        runs.append(dict(zip(_QUANTITIES, (state.power_force, area, state.approach, gap), strict=True)))
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
 
     contact = found.pressure > 0

@@ -17,7 +17,6 @@ from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import format_quantity
-from roughvisc.variables import NOT_CONVERGED
 
 Array = NDArray[np.float64]
 #: Unrecovered part of the creep after a period from which a result warns. Measured error of the friction of a sphere on
@@ -135,18 +134,6 @@ def loading_warnings(
         "series": series,
         "material": table_warning(materials),
     }
-
-
-def speeds_warning(dataset: xr.Dataset) -> str:
-    """Return a warning with the speeds at which the contact is not solved, else ''."""
-    missing = dataset["speed"].values[dataset["status"].values == NOT_CONVERGED]
-    if not missing.size:
-        return ""
-    which = ", ".join(format_quantity(speed, "m/s") for speed in missing)
-    return (
-        f"{missing.size} of {dataset.sizes['speed']} speeds are not solved and missing: {which}. Try a looser "
-        "tolerance, a coarser grid, or layers whose moduli differ less."
-    )
 
 
 def table_warning(materials: Sequence[Material]) -> str:

@@ -36,8 +36,9 @@ from typing import Any
 import numpy as np
 from scipy import fft
 
-from roughvisc.errors import InputError
+from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.contact.solver import unsolved
 from roughvisc.mechanics.grid import namespace, threads_of, transforms
 
 Array = Any  # an array of NumPy or CuPy
@@ -80,8 +81,6 @@ class SteadyState:
         Estimated error of the pressure: sum of its absolute values over the load. [-]
     friction_residual : float
         Estimated relative error of the power force. [-]
-    converged : bool
-        Whether both residuals are within the tolerance.
     iterations : int
         Interior-point iterations.
     vectors : int
@@ -94,7 +93,6 @@ class SteadyState:
     power_force: float
     residual: float
     friction_residual: float
-    converged: bool
     iterations: int
     vectors: int
 
@@ -230,20 +228,25 @@ def steady_state(
     tolerance : float
         Largest residual of pressure and friction. [-]
     max_iterations : int
-        Largest number of iterations; then the state is returned as not converged.
+        Largest number of iterations.
 
     Returns
     -------
     SteadyState
+
+    Raises
+    ------
+    ConvergenceError
+        If the residuals do not reach the tolerance.
     """
     xp, total = namespace(gap), load / sliding.cell_area
     pressure = xp.full(gap.shape, total / gap.size)
     opening = gap + sliding.displacement(pressure)
     if xp.ptp(gap) == 0:  # uniform pressure, without friction
-        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, True, 0, 0)
+        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, 0, 0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
-    vectors, converged = 0, False
+    vectors, errors = 0, [math.inf]
     for iteration in range(max_iterations + 1):
         products = float((pressure * separation).sum())
         energy = sliding.self_influence * float((pressure**2).sum())
@@ -256,7 +259,7 @@ def steady_state(
         step, approach_step, count, is_accurate = system.solve(right, enough)
         vectors += count
         if not math.isfinite(float(step.sum())):  # the tolerance is below rounding
-            break
+            raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
         found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
@@ -265,9 +268,10 @@ def steady_state(
             step, approach_step, count, is_accurate = system.solve(right, enough, _STATED, start=step)
             vectors += count
             force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
-        converged = max(errors) <= tolerance and is_accurate
-        if converged or iteration == max_iterations:
+        if max(errors) <= tolerance and is_accurate:
             break
+        if iteration == max_iterations:
+            raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
         widening = -separation - diagonal * step
         length = min(_longest(pressure, step), _longest(separation, widening))
         reached = float(((pressure + length * step) * (separation + length * widening)).sum())
@@ -293,7 +297,6 @@ def steady_state(
         power_force=force,
         residual=errors[0],
         friction_residual=errors[1],
-        converged=converged,
         iterations=iteration,
         vectors=vectors,
     )

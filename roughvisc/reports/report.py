@@ -33,7 +33,7 @@ from roughvisc.study.storage.results_table import realisations_table, to_table
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, NOT_CONVERGED, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import AXES, VARIABLES, axis_of, variables_in_table
 
 #: Largest numbers of cases with figures, audit and study, which are evenly spread, and of cases with every figure.
 _SHOWN, _DRAWN = 6, 3
@@ -192,9 +192,6 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
         cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
-    if "status" in dataset:
-        bad = int((dataset["status"].values == NOT_CONVERGED).sum())
-        cells["Status"] = f"{bad} of {dataset['status'].size} {axis.rows} not converged" if bad else "converged"
     seconds = cost_of(dataset)[0]
     if np.isfinite(seconds):
         cells["Wall time"] = unit_for([seconds], "s").text(seconds)

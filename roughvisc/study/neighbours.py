@@ -8,7 +8,6 @@ another patch the logarithm of :math:`Q` changes, and the error is a weight time
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +38,6 @@ from roughvisc.variables import VARIABLES
 if TYPE_CHECKING:
     from distributed import Client
 
-log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 Population = Literal["patch", "ensemble"]
 #: Inputs of a budget that the user has to state.
@@ -280,8 +278,6 @@ def solve(
     for key, outcome in outcomes.items():
         if outcome.entry is None:
             raise RoughviscError(f"a neighbouring case failed ({distinct[key].varied}): {outcome.message}")
-        if outcome.kind != "done":
-            log.warning("a neighbouring case (%s): %s: %s", distinct[key].varied, outcome.kind, outcome.message)
     return {key: open_result(result_path(folder, key)) for key in outcomes}
 
 

@@ -53,7 +53,7 @@ class Display:
                 self._move()
 
     def ended(self, outcome: Outcome) -> None:
-        """Close the bar of a case, and write the message of a failed or unconverged case."""
+        """Close the bar of a case, and write the message of a failed case."""
         with self._lock:
             self._ended[outcome.key] = outcome
             self._running.pop(outcome.key, None)
@@ -79,6 +79,6 @@ class Display:
     def _summary(self) -> str:
         kinds = [outcome.kind for outcome in self._ended.values()]
         parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
-        for kind in ("unconverged", "failed", "hindered"):
+        for kind in ("failed", "hindered"):
             parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
         return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])

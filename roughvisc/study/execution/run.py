@@ -16,9 +16,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from roughvisc.errors import ConvergenceError, InputError, RoughviscError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.base import Problem
-from roughvisc.labels import unconverged, warnings_of
+from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, program, program_version
@@ -46,7 +46,7 @@ Progress = Callable[[float, float], None]
 _IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
 #: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
-Kind = Literal["done", "unconverged", "failed", "hindered", "interrupted"]
+Kind = Literal["done", "failed", "hindered", "interrupted"]
 #: Errors of a case that another run computes, and of a full disk.
 IN_USE, FULL = errno.errorcode[errno.EWOULDBLOCK], ("ENOSPC", "EDQUOT")
 #: Errors that refuse the input of a case.
@@ -149,7 +149,7 @@ def run_case(
     Raises
     ------
     InputError, ConvergenceError
-        As for :func:`roughvisc.run`, except that an unconverged result is stored without an error.
+        As for :func:`roughvisc.run`.
     BlockingIOError
         If another run computes this case in this folder.
     RoughviscError
@@ -188,7 +188,7 @@ def run_case(
                     keeper.save()
                     raise
                 stated = warnings_of(dataset.attrs)
-                for complaint in filter(None, (unconverged(dataset), stated.get("tolerance"), stated.get("material"))):
+                for complaint in filter(None, (stated.get("tolerance"), stated.get("material"))):
                     log.warning("%s: %s", path, complaint)
             keeper.remove()
     except OSError as error:
@@ -208,10 +208,7 @@ def run_stated(
 ) -> xr.Dataset:
     """Run a case unless its result exists, and open the result; see :func:`roughvisc.run`."""
     path = run_case(case, result_folder(case, out), progress=progress, threads=threads)
-    dataset = open_result(path)
-    if complaint := unconverged(dataset):
-        raise ConvergenceError(f"{complaint}; the result is kept in {path}, see its variable 'status'")
-    return dataset
+    return open_result(path)
 
 
 def is_result_of(case: Case, path: Path) -> bool:
@@ -277,9 +274,7 @@ class Outcome:
 
 def outcome_of(entry: Entry, *, seconds: float = 0.0, reused: bool = False) -> Outcome:
     """Return the outcome of a case whose result exists."""
-    message = unconverged(entry.arrays)
-    kind: Kind = "unconverged" if message else "done"
-    return Outcome(entry.key, kind, message, seconds=seconds, entry=entry, reused=reused)
+    return Outcome(entry.key, "done", seconds=seconds, entry=entry, reused=reused)
 
 
 def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import heading, unconverged
+from roughvisc.labels import heading
 from roughvisc.observables.frames import expect_result
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.si_tables import unit_of
@@ -67,10 +67,9 @@ def to_table(out: str | Path) -> pd.DataFrame:
     cases = cases or {key: entry.case for key, entry in index.items()}
     stated, numbers, ends = [*cases.values()], [], []
     for key in cases:
-        found, message, entry = {}, "", index.get(key)
+        found, status, message, entry = {}, "not computed", "", index.get(key)
         if entry is not None:
-            message = unconverged(entry.arrays)
-            status = "unconverged" if message else "converged"
+            status = "converged"
             row = AXES[entry.along].telling_row(entry.arrays)
             for name in chain.from_iterable((name, *ERRORS[name]) for name in variables_in_table("last")):
                 if name not in GRID_ERROR.values() and len(entry.arrays.get(name, ())):
@@ -80,8 +79,6 @@ def to_table(out: str | Path) -> pd.DataFrame:
                 found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
         elif record := recorded_failure(folder, key):
             status, message = "failed", str(record.get("message", ""))
-        else:
-            status = "not computed"
         numbers.append(found)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated]})

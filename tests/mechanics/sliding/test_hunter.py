@@ -33,8 +33,6 @@ def test_cylinder__is_that_of_hunter_without_its_neighbours(speed):
     """
     exact = sliding_cylinder(RADIUS, RUBBER, LOAD, speed)
     near, far = (slid(cells, speed) for cells in (NEAR, FAR))
-    assert near.converged
-    assert far.converged
     friction = [found.power_force / (LOAD * CELL) for found in (near, far)]
     assert friction == pytest.approx([exact.friction_coefficient] * 2, rel=0.01)
     assert (4 * friction[1] - friction[0]) / 3 == pytest.approx(exact.friction_coefficient, rel=5e-4)

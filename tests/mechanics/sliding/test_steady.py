@@ -40,7 +40,6 @@ def test_full_contact_of_a_wave__is_exact(loss, speed, body):
     assert modulus.imag / modulus.real <= loss * 1.02
     pressure, area = 3 * amplitude * k * abs(modulus), PERIOD * 3 * PERIOD / 21
     found = slid(wave(21, amplitude, 3), material, speed, pressure * area, body, tolerance=1e-7)
-    assert found.converged
     exact = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
     assert found.power_force / (pressure * area) == pytest.approx(exact, rel=1e-5)
     assert mean_traction(wave(21, amplitude, 3), found.pressure) / pressure == pytest.approx(exact, rel=1e-5)
@@ -51,8 +50,7 @@ def test_full_contact_of_a_wave__is_exact(loss, speed, body):
 @pytest.mark.parametrize("profile", ["wave", "rough", "broad"])
 def test_partial_contact__agrees_with_a_dense_solution(profile, ratio, load):
     height, speeds, tolerance = line_profiles(81)[profile], [3e-3, 0.06, 1.0], 1e-3
-    errors, stated, converged, _ = strong_errors(height, ratio, load, speeds, tolerance).T
-    assert converged.all()
+    errors, stated, _ = strong_errors(height, ratio, load, speeds, tolerance).T
     assert errors.max() < 2 * tolerance
     large = errors > tolerance / 50
     assert (stated[large] > 0.8 * errors[large]).all()
@@ -95,7 +93,6 @@ def test_residuals__bound_what_the_iteration_leaves(ratio, speed):
     exact = slid(ROUGH, rubber(ratio), speed, LOAD, tolerance=1e-7)
     for tolerance in (1e-2, 1e-3):
         found = slid(ROUGH, rubber(ratio), speed, LOAD, tolerance=tolerance)
-        assert found.converged
         assert max(found.residual, found.friction_residual) <= tolerance
         assert np.abs(found.pressure - exact.pressure).sum() <= 2 * tolerance * exact.pressure.sum()
         assert found.power_force == pytest.approx(exact.power_force, rel=tolerance)
@@ -128,11 +125,9 @@ def test_units__do_not_matter():
     assert microns.power_force / 1e12 == pytest.approx(metres.power_force, rel=1e-8)
 
 
-def test_not_converged__says_so():
-    found = slid(ROUGH, rubber(100.0), 0.1, LOAD, tolerance=1e-6, max_iterations=3)
-    assert not found.converged
-    assert found.iterations == 3
-    assert max(found.residual, found.friction_residual) > 1e-6
+def test_few_iterations__raise_the_error_that_they_reached():
+    with pytest.raises(rv.ConvergenceError, match="after 3 iterations, expected 1e-06"):
+        slid(ROUGH, rubber(100.0), 0.1, LOAD, tolerance=1e-6, max_iterations=3)
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, math.inf, math.nan])

@@ -89,8 +89,3 @@ def test_temperature__gives_the_reduced_speed_of_a_master_curve(case, tmp_path):
     np.testing.assert_allclose(shifted.reduced_speed, reference.speed, rtol=1e-9)
     np.testing.assert_allclose(shifted.friction_coefficient, reference.friction_coefficient, rtol=1e-6)
     assert case(TEMPERATURES).body == case().body, "at the reference temperature nothing is shifted"
-
-
-def test_unconverged_speed__is_told_by_its_speed(case, tmp_path, stubborn):
-    with pytest.raises(rv.ConvergenceError, match=r"1 of 4 speeds did not converge, first at V = 20 mm/s"):
-        rv.run(case(), tmp_path, progress=False)

@@ -1,6 +1,5 @@
 """One case to one file: what the file says of itself, and what happens when something goes wrong."""
 
-import logging
 from dataclasses import replace
 
 import pytest
@@ -8,7 +7,7 @@ import xarray as xr
 from support import BALL, with_steps
 
 import roughvisc as rv
-from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.errors import InputError
 from roughvisc.study.case import Case, read_study
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import result_folder
@@ -54,17 +53,6 @@ def test_run__equals_simulate(study):
         progress=False,
     )
     xr.testing.assert_equal(with_steps(ds), with_steps(direct))
-
-
-def test_run__keeps_what_did_not_converge_and_says_so(study, stubborn, caplog):
-    with caplog.at_level(logging.WARNING, "roughvisc"), pytest.raises(ConvergenceError) as caught:
-        rv.run(study, progress=False)
-    (path,) = (study.parent / "results" / "ball").iterdir()
-    assert "1 of 3 kept times did not converge, first at t = 100 ms" in str(caught.value)
-    assert str(path) in str(caught.value)
-    assert "did not converge" in caplog.text
-    with open_result(path) as ds:
-        assert list(ds.status.values) == [0, 1, 0]
 
 
 def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):
