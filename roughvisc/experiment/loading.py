@@ -270,8 +270,8 @@ class LoadingRows(Rows):
             "contact_fraction": area / profile.area,
             "mean_gap": mean_gap,
         }
-        if scene.motions:
-            slide = scene.motions[step.segment]
+        slide = scene.motions[step.segment]
+        if slide is not None:
             friction = tangential_force(grid, point.pressure, displaced[0], slide)
             row |= {
                 "sliding_distance": step.state.distance,

@@ -86,7 +86,7 @@ def loading_warnings(
         )
         if scene.time_step is not None:
             tolerance += " The time step is fixed, and not chosen by the tolerance."
-        if scene.motions:
+        if scene.program.slides:
             tolerance += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
 
     if boundary == "periodic":

@@ -15,9 +15,10 @@ controls the length of the pair, and a short additional step gives the pressure 
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,10 +38,9 @@ Guess = tuple[Array, Array | None]
 FIRST_PAIR = 0.005
 #: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
-#: on workflows/benchmarks/accuracy.py.
-STATED, STATED_APPROACH = 0.6, 0.6
-#: The same for bodies with hardly any instantaneous compliance, whose first steps are of first order.
-STATED_SOFT, STATED_APPROACH_SOFT = 1.0, 1.5
+#: on workflows/benchmarks/accuracy.py. Then the same for bodies with hardly any instantaneous compliance, whose first
+#: steps are of first order.
+STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
 #: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
 #: On a sphere it is a fifth, on a cone a third.
 STRAIGHT = 0.25
@@ -133,8 +133,8 @@ class Scene:
         Whether the body has an instantaneous compliance.
     stated : tuple of float
         Stated error over the difference between both solutions: of pressure and force, and of the approach.
-    motions : list of Slide
-        Slide of each segment for the friction: its own, the last one, or the first; empty without slides.
+    motions : list of Slide or None
+        Slide of each segment for the friction: its own, the last one, or the first; None without slides.
     """
 
     grid: Grid
@@ -147,19 +147,14 @@ class Scene:
     present: Array | None = None
     can_jump: bool = field(init=False)
     stated: tuple[float, float] = field(init=False)
-    motions: list[Slide] = field(init=False)
+    motions: list[Slide | None] = field(init=False)
 
     def __post_init__(self) -> None:
-        motion, self.motions = None, []
-        for segment in reversed(self.program.segments):
-            motion = segment.slide or motion
-        for segment in self.program.segments:
-            motion = segment.slide or motion
-            if motion is not None:
-                self.motions.append(motion)
         self.can_jump = self.memory.compliance(0.0) > 0
-        soft = self.is_soft(self.program.duration)
-        self.stated = (STATED_SOFT, STATED_APPROACH_SOFT) if soft else (STATED, STATED_APPROACH)
+        self.stated = STATED_SOFT if self.is_soft(self.program.duration) else STATED
+        slides = [segment.slide for segment in self.program.segments]
+        motion = next(filter(None, slides), None)
+        self.motions = [motion := slide or motion for slide in slides]
 
     def lowest(self, values: Array) -> float:
         """Return the least value over the present cells."""
@@ -175,17 +170,13 @@ class Scene:
 
     def keeps(self, time: float) -> bool:
         """Return whether a time is kept. [s]"""
-        if self.kept is None:
-            return True
-        at = bisect_left(self.kept, time)
-        return at < len(self.kept) and self.kept[at] == time
+        return self.kept is None or self.next_kept(math.nextafter(time, -math.inf)) == time
 
     def next_kept(self, time: float) -> float:
-        """Return the first kept time after a time; infinite if there is none. [s]"""
-        if self.kept is None:
-            return math.inf
-        at = bisect_right(self.kept, time)
-        return self.kept[at] if at < len(self.kept) else math.inf
+        """Return the first kept time after a time; infinite if there is none, or if every step is kept. [s]"""
+        kept = self.kept or ()
+        at = bisect_right(kept, time)
+        return kept[at] if at < len(kept) else math.inf
 
 
 @dataclass(frozen=True)
@@ -257,15 +248,10 @@ class Difference:
     shared: float = 0.0
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
-        """Return the larger error of each kind, of this difference and a part of the other."""
-        return Difference(
-            max(self.pressure, part * other.pressure),
-            max(self.force, part * other.force),
-            max(self.approach, part * other.approach),
-            max(self.inside, part * other.inside),
-            max(self.outside, part * other.outside),
-            max(self.friction, part * other.friction),
-        )
+        """Return the larger error of each kind, of this difference and a part of the other, without shared errors."""
+        theirs = vars(other)
+        larger = {name: max(own, part * theirs[name]) for name, own in vars(self).items()}
+        return Difference(**larger | {"shared": 0.0})
 
 
 @dataclass(frozen=True)
@@ -302,7 +288,7 @@ class State:
     twice: Point | None = None
     segment: int = 0
     length: float = 0.0
-    difference: Difference = field(default_factory=Difference)
+    difference: Difference = Difference()
     largest_force: float = 0.0
     largest_approach: float = 0.0
     work: float = 0.0
@@ -373,6 +359,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         state = State(Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing)))
         if segments and segments[0].duration > 0:
             yield Step(state.fine, state.difference, 0, state)
+    scene.grid.convolutions = state.convolutions
     while state.segment < len(segments):
         number, segment = state.segment, segments[state.segment]
         is_jump, is_start = segment.duration == 0, state.fine.time == 0
@@ -380,8 +367,8 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             state = jump(scene, state, segment)
             steps = [Step(state.fine, state.difference, number, state)]
         else:
-            advance = pair_of_steps if segment.slide is None else pair_of_cells
-            steps = advance(scene, state, segment)
+            slide = segment.slide
+            steps = pair_of_steps(scene, state, segment) if slide is None else pair_of_cells(scene, state, slide)
             state = steps[-1].state
         jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
         if (jumps_next and (scene.can_jump or is_jump)) or (is_jump and not (scene.can_jump or is_start)):
@@ -395,36 +382,32 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 
 def jump(scene: Scene, state: State, segment: Segment) -> State:
     """Return the state after a jump; without instantaneous compliance the next step takes the jump."""
-    fine = state.fine
+    fine, value = state.fine, segment.value(0.0, state.fine.start)
     if scene.can_jump:
         return single_step(scene, state, fine.time).state
-    after, value = entered(scene, state), segment.value(0.0, fine.start)
     if value == (fine.force if segment.control == "load" else fine.approach):
-        return after
+        return entered(scene, state)
     if segment.control == "approach":
         raise InputError(
             f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
             "compliance: expected a ramp (over > 0), or a material that can jump"
         )
-    following = scene.program.segments[after.segment : after.segment + 1]
-    held = bool(following) and following[0].control == "load"
-    fine, coarse = (
-        replace(one, is_late=True, start=value if held else one.start) for one in (after.fine, after.coarse)
-    )
-    return replace(after, fine=fine, twice=None if after.twice is None else coarse)
+    return entered(scene, state, load=value)
 
 
-def entered(scene: Scene, state: State) -> State:
-    """Return the state at the start of the next segment."""
+def entered(scene: Scene, state: State, load: float | None = None) -> State:
+    """Return the state at the start of the next segment, which takes a jump to a load. [N]"""
     segments, index = scene.program.segments, state.segment + 1
     last, following = segments[index - 1], segments[index] if index < len(segments) else None
     changes = following is not None and following.control != last.control
     # without instantaneous compliance a corner of the approach is a jump of the load
     jumps = not scene.can_jump and (changes or last.control == "approach")
-    by_approach = following is not None and following.control == "approach"
     points = []
     for point in (state.fine, state.coarse):
-        start, is_late = point.approach if by_approach else point.force, jumps and point.force > 0
+        start = point.force if load is None or following is None else load
+        if following is not None and following.control == "approach":
+            start = point.approach
+        is_late = load is not None or (jumps and point.force > 0)
         points.append(replace(without_past(point), start=start, is_late=is_late))
     # a corner of the histories without a jump: the pairs may keep their length
     smooth = not changes and last.duration > 0 and last.slide is None and state.fine.force > 0 and not jumps
@@ -441,20 +424,17 @@ def without_past(point: Point) -> Point:
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine, coarse, number = state.fine, state.coarse, state.segment
-    memory, spent = scene.memory, scene.grid.convolutions
-    rule: Rule | None = "linear" if fine.is_open else None  # exact while the surfaces are apart
-    new = other = take_step(scene, fine, time, number, rule=rule)
+    rules: list[Rule | None] = ["linear" if one.is_open else None for one in (fine, coarse)]  # exact without contact
+    new = other = take_step(scene, fine, time, number, rule=rules[0])
     if coarse is not fine:
-        rule = "linear" if coarse.is_open else None
-        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
-    work = work_of_step(scene, fine, new)
-    shared = state.difference.shared * memory.remaining(time - fine.time)
-    apart, reached, coarse = replace(difference(scene, new, other), shared=shared), new, other
+        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rules[1])
+    shared = state.difference.shared * scene.memory.remaining(time - fine.time)
+    apart, work = replace(difference(scene, new, other), shared=shared), work_of_step(scene, fine, new)
+    ends = [new] if other is new else [new, other]
     if fine.is_open and new.force == 0:
-        reached = without_past(new)
-        coarse = reached if other is new else without_past(other)
-    after_step = after_steps(scene, state, [reached], coarse, apart, work, spent)
-    return Step(new, replace(apart, pressure=apart.pressure + shared), number, after_step)
+        ends = [without_past(point) for point in ends]
+    after = after_steps(scene, state, ends[:1], ends[-1], difference=apart, work=state.work + work)
+    return Step(new, replace(apart, pressure=apart.pressure + shared), number, after)
 
 
 def before_closing(scene: Scene, state: State, step: Step) -> Step:
@@ -485,7 +465,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
         return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
 
-    spent, control, memory = scene.grid.convolutions, segment.control, scene.memory
+    control, memory = segment.control, scene.memory
     length = 2 * scene.time_step if scene.time_step is not None else state.length
     length = length or FIRST_PAIR * min(segment.duration, segment.period)
     if segment.amplitude and scene.time_step is None:
@@ -554,19 +534,17 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         del first, second, once, half, whole, other  # frees their memory while the pair is repeated
 
-    works, curved = work_of_pair(scene, fine, first, second)
-    if scene.motions and scene.keeps(last):
-        slide = scene.motions[number]
+    slide = scene.motions[number]
+    if slide is not None and scene.keeps(last):
         apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
+    sums: list[dict[str, Any]] = [
+        {"work": state.work + work, "work_curved": math.hypot(state.work_curved, error)}
+        for work, error in zip(*work_of_pair(scene, fine, first, second), strict=True)
+    ]
     kept = replace(apart, shared=shared)
-    after = after_steps(scene, state, [first, second], once, kept, works[1], spent, length, curved=curved[1])
-    inside = replace(
-        state,
-        work=state.work + works[0],
-        work_apart=max(state.work_apart, after.work_apart, key=abs),
-        work_curved=math.hypot(state.work_curved, curved[0]),
-    )
+    after = after_steps(scene, state, [first, second], once, length=length, difference=kept, **sums[1])
+    inside = replace(state, work_apart=max(state.work_apart, after.work_apart, key=abs), **sums[0])
     unsure += carried * memory.remaining(middle - fine.time)
     return [
         Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
@@ -574,16 +552,15 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     ]
 
 
-def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
+def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     """Return the next steps of a slide by one cell each, in the frame of the profile.
 
     The body moves backwards under the profile by whole cells, without interpolation. The step is then an elastic
     contact problem. The coarse solution moves by two cells per step. Only smaller cells reduce the error.
     """
-    slide, grid, memory, fine, coarse = segment.slide, scene.grid, scene.memory, state.fine, state.coarse
-    assert slide is not None
+    grid, memory, fine, coarse = scene.grid, scene.memory, state.fine, state.coarse
     began, end = scene.program.corners[state.segment : state.segment + 2]
-    cells, side, spent = slide.cells(grid.spacing), grid.spacing[slide.axis], grid.convolutions
+    cells, side = slide.cells(grid.spacing), grid.spacing[slide.axis]
     taken = round((fine.time - began) / (end - began) * cells)
     count = 1 if memory.is_elastic else min(2, cells - taken)
 
@@ -609,7 +586,8 @@ def pair_of_cells(scene: Scene, state: State, segment: Segment) -> list[Step]:
         apart = apart.or_larger(state.difference)
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
         apart = replace(apart, friction=abs(force))
-    after = after_steps(scene, state, points[1:], once, apart, works[-1], spent, distance=count * side)
+    work, distance = state.work + works[-1], state.distance + count * side
+    after = after_steps(scene, state, points[1:], once, difference=apart, work=work, distance=distance)
     inside = replace(state, work=state.work + works[1], distance=state.distance + side)
     ends = Step(last, apart, state.segment, after)
     return [Step(points[1], apart.or_larger(state.difference), state.segment, inside, is_end=False), ends][-count:]
@@ -727,16 +705,7 @@ def entered_force(scene: Scene, before: Point, after: Point) -> float:
 
 
 def after_steps(
-    scene: Scene,
-    state: State,
-    points: list[Point],
-    coarse: Point,
-    apart: Difference,
-    work: float,
-    spent: int,
-    length: float = 0.0,
-    distance: float = 0.0,
-    curved: float = 0.0,
+    scene: Scene, state: State, points: list[Point], coarse: Point, length: float = 0.0, **totals: Any
 ) -> State:
     """Return the state after accepted steps; at the end of a segment, the state at the start of the next one.
 
@@ -748,38 +717,24 @@ def after_steps(
         Fine solution at the end of each step.
     coarse : Point
         Coarse solution at the end of the last step.
-    apart : Difference
-        Difference between both solutions there.
-    work : float
-        Work of the steps. [J]
-    spent : int
-        Number of convolutions of the grid before the steps.
     length : float
         Length of the next pair. [s]
-    distance : float
-        Distance of a slide. [m]
-    curved : float
-        Error of the quadrature of the work. [J]
+    **totals
+        Other attributes of the new state: difference, work and its error, distance.
     """
-    fine, force, approach = points[-1], state.largest_force, state.largest_approach
-    for point in points:
-        force, approach = max(force, point.force), max(approach, abs(point.approach))
-    work_apart = state.work_apart
+    fine, apart = points[-1], 0.0
     if coarse is not fine:
-        work_apart += work_of_step(scene, state.coarse, coarse) - work_of_step(scene, state.fine, fine)
-    reached = State(
-        fine,
-        None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
-        state.segment,
-        length,
-        apart,
-        force,
-        approach,
-        state.work + work,
-        work_apart,
-        math.hypot(state.work_curved, curved),
-        state.distance + distance,
-        state.convolutions + scene.grid.convolutions - spent,
+        apart = work_of_step(scene, state.coarse, coarse) - work_of_step(scene, state.fine, fine)
+    reached = replace(
+        state,
+        fine=fine,
+        twice=None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
+        length=length,
+        largest_force=max(state.largest_force, *(point.force for point in points)),
+        largest_approach=max(state.largest_approach, *(abs(point.approach) for point in points)),
+        work_apart=state.work_apart + apart,
+        convolutions=scene.grid.convolutions,
+        **totals,
     )
     return entered(scene, reached) if fine.time == scene.program.corners[state.segment + 1] else reached
 
@@ -936,18 +891,10 @@ def take_step(
     pressure, unit = found.pressure, found.displacement
     pressure /= alpha
     unit /= alpha
-    return Point(
-        time,
-        pressure,
-        value if by_load else found.load / alpha * area,
-        found.approach if by_load else value,
-        memory.advance(here.history, prediction, unit, pressure),
-        before,
-        here.start,
-        False,
-        found.error,
-        found.approach_error,
-    )
+    force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
+    history = memory.advance(here.history, prediction, unit, pressure)
+    errors = found.error, found.approach_error
+    return Point(time, pressure, force, approach, history, before, here.start, False, *errors)
 
 
 def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
@@ -978,23 +925,22 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to its undeformed shape
         return event
 
-    def touching(time: float) -> float:
-        return scene.lowest(scene.gap + scene.memory.after_rest(here.history, time - now))
+    def touching(left: float, right: float) -> float | None:
+        """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
+        level = scene.lowest(scene.gap + scene.memory.after_rest(here.history, right - now))
+        ends = [scene.prescribed(state.segment, time, here) for time in (left, right)]
+        if max(ends) <= level or (right - left <= shortest and ends[1] <= level):
+            return None
+        if right - left <= shortest:
+            return left
+        middle = 0.5 * (left + right)
+        first = touching(left, middle)
+        return touching(middle, right) if first is None else first
 
+    shortest = max(CLOSING * (event - now), math.ulp(event))
     turns = [began + time for time in segment.turns(now - began, event - began)]
-    first, shortest = now, max(CLOSING * (event - now), math.ulp(event))
-    for last in (*turns, event):  # in between the approach is monotone, and the surface only rises
-        pending = [(first, last)]
-        while pending:
-            left, right = pending.pop()
-            level = touching(right)
-            if max(scene.prescribed(state.segment, end, here) for end in (left, right)) <= level:
-                continue
-            if right - left <= shortest:
-                if scene.prescribed(state.segment, right, here) > level:
-                    return left if left - now > AT_ONCE * (event - now) else now
-                continue
-            middle = 0.5 * (left + right)
-            pending += [(middle, right), (left, middle)]
-        first = last
+    for left, right in pairwise((now, *turns, event)):  # the approach is monotone, and the surface only rises
+        closes = touching(left, right)
+        if closes is not None:
+            return closes if closes - now > AT_ONCE * (event - now) else now
     return event
