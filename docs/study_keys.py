@@ -17,8 +17,7 @@ from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
-from roughvisc.study.si_tables import unit_of
-from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF
+from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.surrogates import surrogate
 from roughvisc.topography.synthesis import RECIPES

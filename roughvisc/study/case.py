@@ -20,8 +20,7 @@ from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Settings
 from roughvisc.study.case_text import value_text
-from roughvisc.study.si_tables import in_si
-from roughvisc.study.study_file import body_of, parts_of, shift_factor, with_files
+from roughvisc.study.study_file import in_si, parts_of, shift_factor, with_files
 from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.readers import sha256
@@ -75,8 +74,6 @@ class Case:
         A loading program or steady sliding.
     settings : Settings
         Settings of the solve, with the boundary that ``auto`` resolves to.
-    late_times : tuple of float
-        Listed times after the end of the program, which are not kept. [s]
     """
 
     tables: Mapping[str, Any]
@@ -86,7 +83,6 @@ class Case:
     body: Body = field(compare=False)
     experiment: Experiment = field(compare=False)
     settings: Settings = field(compare=False)
-    late_times: tuple[float, ...] = field(compare=False)
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -104,13 +100,6 @@ class Case:
     def material(self) -> Material:
         """The material."""
         return self.body.material
-
-    @property
-    def materials(self) -> list[Material]:
-        """Materials of both bodies of a pair, otherwise the material."""
-        table = self.tables["material"]
-        parts = ("a", "b") if table["model"] == "pair" else ()
-        return [body_of(table[part]).material for part in parts] or [self.material]
 
     @property
     def shift_factor(self) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from roughvisc.study.si_tables import unit_of
+from roughvisc.study.study_file import unit_of
 from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.

@@ -49,7 +49,6 @@ from roughvisc.study.storage.folder import existing_part
 from roughvisc.study.storage.sweep_data import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import unit_for
 from roughvisc.variables import STEPPED
 
 #: Numbers of a plan -> unit; texts of a plan.
@@ -396,9 +395,6 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     model = f"{settings.boundary}, {model}"
     if part < 1:
         model += ", solved on {} x {} cells".format(*height.shape)
-    if late := case.late_times:
-        texts, end = ", ".join(unit_for(late, "s").text(one) for one in late), case.program.duration
-        note += f" {texts} left out: the program ends at {unit_for([end], 's').text(end)}."
     seconds += run.seconds * height.size / run.cells
     if own.problem.settings.grid_error:
         seconds *= 1 + _GRID_ERROR

@@ -1,18 +1,31 @@
-"""Parts of a case from the tables of a study file: surface, body, experiment and settings.
+"""Parts of a case from the tables of a study file: surface, body, experiment and settings; units of its keys.
 
 A table contains the arguments of one function, which checks them; see :mod:`roughvisc.arguments`.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from roughvisc.arguments import a_table, call, check, located, one_key, one_of, refuse_unknown, split
+from roughvisc.arguments import (
+    a_table,
+    call,
+    check,
+    located,
+    one_key,
+    one_of,
+    refuse_unknown,
+    split,
+    suits,
+    units_of,
+)
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -29,7 +42,10 @@ from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.audit import audit
 from roughvisc.study.machine_history import read_history
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
-from roughvisc.topography.scans import check_surface, surface_boundary
+from roughvisc.topography.conditioning import STEPS
+from roughvisc.topography.framing import combine
+from roughvisc.topography.scans import check_surface, open_scan, surface_boundary
+from roughvisc.topography.synthesis import RECIPES
 from roughvisc.units import number
 
 #: Tables of a study, without its sweep.
@@ -70,6 +86,93 @@ COLUMNS: dict[str, dict[str, Wanted]] = {
 }
 
 # ----------------------------------------------------------------------------------------------------------------
+# units
+
+_TAKING = (open_scan, combine, *RECIPES.values(), *(step.function for step in STEPS.values()), *MODELS.values(), wlf)
+_TAKING += (arrhenius, sheet, SteadySliding, Settings, *OBSERVABLES.values(), audit)
+#: Unit of each key, from the functions that take the arguments; ``"1"`` for a pure number.
+_UNITS = {name: unit for function in _TAKING for name, unit in units_of(function).items()}
+_UNITS |= {name: units_of(step.function).get(step.argument, "") for name, step in STEPS.items()}
+_UNITS |= {"wlf_c2": "K", "shift_factor": "1", "modulus_factor": "1", "from": "m/s", "to": "m/s", "time_step": "s"}
+_UNITS |= UNITS | {"over": "s", "hold": "s", "period": "s", "times": "s", "slide": "m", "speed": "m/s", "cycles": "1"}
+
+
+def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
+    """Return a value of a study in SI.
+
+    Parameters
+    ----------
+    value : object
+        A value, or a list or a table of values.
+    key : str
+        Dotted key of the value.
+    tables : mapping
+        Tables of the case, for units that depend on another key.
+
+    Returns
+    -------
+    object
+        The value, in which numbers replace texts with a unit. Other texts are unchanged.
+
+    Raises
+    ------
+    InputError
+        If an integer exceeds the largest number of double precision.
+    """
+    if isinstance(value, Mapping):
+        return {name: in_si(one, f"{key}.{name}" if key else name, tables) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [in_si(one, f"{key}.{number}", tables) for number, one in enumerate(value)]
+    if isinstance(value, float | bool) or value is None:
+        return value
+    unit = _unit(key, tables)
+    if unit and isinstance(value, str):
+        with suppress(InputError):
+            return number(value, unit, difference=key.endswith("wlf_c2"))
+    if isinstance(value, int):
+        if abs(value) > sys.float_info.max:
+            raise InputError(key=key, found=value, expected="a number with fewer digits")
+        return float(value) if unit not in ("", "1") else value
+    return value
+
+
+def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
+    """Return the unit of the value at a dotted key of a study; empty if it has none.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key, such as ``"program.0.load"``.
+    case : mapping, optional
+        The case as JSON, for units that depend on another key.
+
+    Examples
+    --------
+    >>> unit_of("program.0.load"), unit_of("surface.seed"), unit_of("program.1.cycle.mean")
+    ('N', '', '')
+    >>> unit_of("program.0.cycle.amplitude", {"program": [{"cycle": {}, "control": "approach"}]})
+    'm'
+    """
+    unit = _unit(key, case or {})
+    return "" if unit == "1" else unit
+
+
+def _unit(key: str, tables: Mapping[str, Any]) -> str:
+    """Return the unit of the value at a dotted key; ``"1"`` for a pure number."""
+    table, *path = key.split(".")
+    names = [part for part in path if not part.isdecimal()]
+    if not names or key == "keep.times":  # a number in keep.times is a number of times
+        return ""
+    if table == "program" and not path[0].isdecimal():
+        return ""
+    if table == "program" and names[-1] in ("mean", "amplitude", "values"):
+        segments = tables.get("program") or []
+        here = segments[int(path[0])] if int(path[0]) < len(segments) else None
+        return UNITS.get(str(here.get("control", "load")), "") if isinstance(here, Mapping) else ""
+    return _UNITS.get(names[-1], "")
+
+
+# ----------------------------------------------------------------------------------------------------------------
 # files
 
 
@@ -92,42 +195,38 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     for name in ("surface", "material"):
         if name not in data:
             raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
-    tables = dict(data)
-    tables["surface"] = with_scan("surface", data["surface"], folder)
-    tables["material"] = with_columns("material", data["material"], folder)
-    if isinstance(segments := data.get("program"), list):
-        tables["program"] = [with_rows(f"program.{place}", one, folder) for place, one in enumerate(segments)]
-    if isinstance(friction := data.get("friction"), Mapping) and "speeds" in friction:
+    tables = {name: with_paths(name, table, folder) for name, table in data.items()}
+    tables["material"] = with_columns("material", tables["material"])
+    if isinstance(segments := tables.get("program"), list):
+        tables["program"] = [with_rows(f"program.{place}", one) for place, one in enumerate(segments)]
+    if isinstance(friction := tables.get("friction"), Mapping) and "speeds" in friction:
         tables["friction"] = {**friction, "speeds": speeds_of("friction.speeds", friction["speeds"])}
     return tables
 
 
-def with_scan(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
-    """Return a table of a surface with the absolute paths of its scan and of the scan of its second face."""
-    table = a_table(where, stated)
-    if "second" in table:
-        table["second"] = with_scan(f"{where}.second", table["second"], folder)
+def with_paths(where: str, stated: Any, folder: Path | None) -> Any:
+    """Return a value of a study in which every ``file`` of a table is the absolute path of an existing file."""
+    if isinstance(stated, list):
+        return [with_paths(f"{where}.{place}", one, folder) for place, one in enumerate(stated)]
+    if not isinstance(stated, Mapping):
+        return stated
+    table = {key: with_paths(f"{where}.{key}", one, folder) for key, one in stated.items()}
     if "file" in table:
-        table["file"] = existing_file(f"{where}.file", table["file"], folder)
+        file, key = table["file"], f"{where}.file"
+        if not isinstance(file, str) or not file:
+            raise InputError(key=key, found=file, expected="the path of a file")
+        if folder is not None:  # otherwise the case is a stored one, whose file may have been moved
+            path = (folder / Path(file).expanduser()).resolve()
+            if not path.is_file():
+                raise InputError(key=key, found=file, expected=f"an existing file, but there is none at {path}")
+            table["file"] = str(path)
     return table
 
 
-def existing_file(where: str, file: Any, folder: Path | None) -> str:
-    """Return the absolute path of a file that a study names relative to its folder."""
-    if not isinstance(file, str | Path) or not str(file):
-        raise InputError(key=where, found=file, expected="the path of a file")
-    if folder is None:  # a stored case, whose file may have been moved
-        return str(file)
-    path = (folder / Path(file).expanduser()).resolve()
-    if not path.is_file():
-        raise InputError(key=where, found=file, expected=f"an existing file, but there is none at {path}")
-    return str(path)
-
-
-def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]:
+def with_columns(where: str, stated: Any) -> dict[str, Any]:
     """Return a table of a material with the columns of its CSV file, without the name of the file."""
     table = a_table(where, stated)
-    table |= {key: with_columns(f"{where}.{key}", table[key], folder) for key in ("a", "b", "on") if key in table}
+    table |= {key: with_columns(f"{where}.{key}", table[key]) for key in ("a", "b", "on") if key in table}
     columns = COLUMNS.get(str(table.get("model")), {})
     if not columns or "file" not in table:
         return table
@@ -137,26 +236,23 @@ def with_columns(where: str, stated: Any, folder: Path | None) -> dict[str, Any]
     if "frequencies" in columns:
         unit = one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
         columns = columns | {"frequencies": columns["frequencies"]._replace(unit=unit)}
-    path = existing_file(f"{where}.file", file, folder)
     try:
-        found, _ = read_table(path, columns)
+        found, _ = read_table(file, columns)
     except InputError as error:
         raise located(error, f"{where}.file") from error
     return table | {key: values.tolist() for key, values in found.items()}
 
 
-def with_rows(where: str, stated: Any, folder: Path | None) -> Any:
+def with_rows(where: str, stated: Any) -> Any:
     """Return a segment of a program with the rows of its file, without the name of the file."""
     table = stated.get("table") if isinstance(stated, Mapping) else None
     if not isinstance(table, Mapping) or "file" not in table:
         return stated
-    where, columns = f"{where}.table", dict(table)
-    file = columns.pop("file")
     if "control" in stated:
         expected = "the name of a column in its place, such as approach = 'Displacement'"
-        raise InputError(key=f"{where}.control", found=stated["control"], expected=expected)
-    path = existing_file(f"{where}.file", file, folder)
-    control, times, values, note = call(read_history, where, columns, path)
+        raise InputError(key=f"{where}.table.control", found=stated["control"], expected=expected)
+    file, columns = split(table, "file")
+    control, times, values, note = call(read_history, f"{where}.table", columns, file["file"])
     return {**stated, "table": {"times": times, "values": values, "note": note}, "control": control}
 
 
@@ -165,14 +261,13 @@ def speeds_of(where: str, stated: Any) -> list[float]:
     if not isinstance(stated, Mapping):
         listed = stated if isinstance(stated, list) else [stated]
         return sorted({number(one, "m/s", where) for one in listed})
-    table = dict(stated)
-    refuse_unknown(where, table, ("from", "to", "count"))
-    first, last = (number(table.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
-    count = table.get("count")
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= _MOST_SPEEDS:
+    refuse_unknown(where, stated, ("from", "to", "count"))
+    first, last = (number(stated.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
+    count = stated.get("count")
+    if not suits(count, int) or not 2 <= count <= _MOST_SPEEDS:
         raise InputError(key=f"{where}.count", found=count, expected=f"a whole number from 2 to {_MOST_SPEEDS}")
     if not first < last:
-        raise InputError(key=f"{where}.from", found=table["from"], expected=f"a speed below {last:g} m/s")
+        raise InputError(key=f"{where}.from", found=stated["from"], expected=f"a speed below {last:g} m/s")
     return [float(f"{speed:.12g}") for speed in np.geomspace(first, last, count)]
 
 
@@ -201,16 +296,10 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
         experiment: Experiment = Loading(program_of(tables["program"]))
     else:
         experiment = call(SteadySliding, "friction", a_table("friction", tables["friction"]))
-    settings, late_times = settings_of(tables, experiment)
+    settings = settings_of(tables, experiment)
     check_observed(a_table("observe", tables.get("observe", {})), settings)
     check(audit, "audit", a_table("audit", tables.get("audit", {})))
-    return {
-        "title": title,
-        "body": body,
-        "experiment": experiment,
-        "settings": settings,
-        "late_times": late_times,
-    }
+    return {"title": title, "body": body, "experiment": experiment, "settings": settings}
 
 
 def body_of(table: Mapping[str, Any], where: str = "material") -> Body:
@@ -245,13 +334,10 @@ def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
         return 1.0
     key = "shift_factor" if "shift_factor" in stated else "temperature"
     if key == "temperature":
-        is_thermal = "activation_energy" in stated and not {"wlf_c1", "wlf_c2"} & stated.keys()
-        factor = call(arrhenius if is_thermal else wlf, where, stated)
-    elif len(stated) == 1:
-        factor = number(stated[key], "1", f"{where}.{key}")
+        factor = call(arrhenius if "activation_energy" in stated else wlf, where, stated)
     else:
-        other = next(one for one in stated if one != key)
-        raise InputError(key=f"{where}.{key}", found=stated[key], expected=f"either this or {other}")
+        refuse_unknown(where, stated, (key,))
+        factor = number(stated[key], "1", f"{where}.{key}")
     if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
         expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
         raise InputError(key=f"{where}.{key}", found=stated[key], expected=expected)
@@ -285,11 +371,8 @@ def program_of(segments: Any) -> Program:
     return program
 
 
-def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Settings, tuple[float, ...]]:
-    """Return the settings of a case, and the listed times after the end of the program, which are not kept. [s]
-
-    The settings have the boundary that ``auto`` resolves to.
-    """
+def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
+    """Return the settings of a case, with the boundary that ``auto`` resolves to."""
     stated = split(tables["surface"], "missing")[0]
     for table in ("solve", "keep"):
         here = a_table(table, tables.get(table, {}))
@@ -304,18 +387,16 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> tuple[Sett
     boundary = known_boundary(settings, experiment.boundary, lambda: surface_boundary(tables["surface"]))
     if boundary is None:
         raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
-    times, late = settings.times, ()
-    if isinstance(experiment, Loading) and isinstance(times, tuple):
-        end = experiment.program.duration * (1 + _ROUNDING)
-        late = tuple(time for time in times if time > end)
-        times = times[: len(times) - len(late)]
-        if late and not times:
-            raise InputError(key="keep.times", found=list(late), expected="a time up to the end of the program")
-    settings = replace(settings, boundary=boundary, times=times)
+    settings = replace(settings, boundary=boundary)
+    if isinstance(experiment, Loading) and isinstance(settings.times, tuple):
+        end = experiment.program.duration
+        for time in [time for time in settings.times if time > end * (1 + _ROUNDING)]:
+            expected = f"a time up to the end of the program, {end:g} s"
+            raise InputError(key="keep.times", found=time, expected=expected)
     for name, value, why in experiment.unsupported(settings):
         key = f"{TABLE_OF[name]}.{name}"
         raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)
-    return settings, late
+    return settings
 
 
 def check_observed(observe: Mapping[str, Any], settings: Settings) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import xarray as xr
 
-from roughvisc.arguments import NoData, call, check, check_keys, dotted, one_key, one_of, split
+from roughvisc.arguments import NoData, a_table, call, check, check_keys, dotted, one_key, one_of, split
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
@@ -208,6 +208,7 @@ def _face_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
 
 def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     """Check a table of a surface without its heights."""
+    table = a_table(where, table)
     source_key = one_key(where, table, ("file", "generate"))
     is_second = where != "surface"
     steps, rest = split(table, *(FACE_STEPS if is_second else STEPS))

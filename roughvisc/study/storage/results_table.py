@@ -14,10 +14,10 @@ from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.observables.frames import expect_result
 from roughvisc.study.realisations import over_realisations
-from roughvisc.study.si_tables import unit_of
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
+from roughvisc.study.study_file import unit_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ERRORS, GRID_ERROR, VARIABLES, axis_of, variables_in_table
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.study.case import Case
-from roughvisc.study.si_tables import default_of, unit_of
 from roughvisc.study.storage.folder import DAMAGED, no_results, read_json
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import lazy, read_variable
+from roughvisc.study.study_file import unit_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION, value_at
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
@@ -73,15 +73,12 @@ def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
 
 
 def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Return the varied parameters of cases in JSON; a case that does not vary one states it, or has its default."""
+    """Return the varied parameters of cases in JSON; a case that does not vary one may state it, or lacks it."""
     keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
-    return {key: _column([_value_of(key, case) for case in cases]) for key in keys}
-
-
-def _value_of(key: str, case: Mapping[str, Any]) -> Any:
-    varied = case.get("varied", {})
-    stated = varied[key] if key in varied else value_at(case, key, None)
-    return default_of(key, case) if stated is None else stated
+    return {
+        key: _column([{key: value_at(case, key, None), **case.get("varied", {})}[key] for case in cases])
+        for key in keys
+    }
 
 
 def _column(values: Sequence[Any]) -> NDArray[Any]:

@@ -88,22 +88,6 @@ def test_own_times__have_observables_as_each_result(own_times):
                     assert found[variable][count:].isnull().all(), variable
 
 
-def test_listed_times__after_the_end_of_a_program_are_left_out(study, tmp_path):
-    text = SMALL.replace('[0, "0.1 s", "200 ms"]', '[0, "0.1 s", 1, 5]')
-    cases = study(text + '[sweep]\n"program.1.hold" = ["0.2 s", "1 s", "20 s"]\n')
-    assert rv.plan(cases, tmp_path / "out").note.values.tolist() == [
-        "1 s, 5 s left out: the program ends at 200 ms.",
-        "5 s left out: the program ends at 1 s.",
-        "",
-    ]
-    ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
-    nan = np.nan
-    np.testing.assert_array_equal(ds.time, [[0, 0.1, nan, nan], [0, 0.1, 1, nan], [0, 0.1, 1, 5]])
-    np.testing.assert_allclose(ds.contact_area[0, :2], ds.contact_area[2, :2], rtol=2e-2)
-    with refused("keep.times"):
-        vary(cases[0], {"keep.times": [1.0, 5.0]})
-
-
 def test_own_speeds__are_rows(tmp_path):
     (tmp_path / "slide.toml").write_text("""
 [surface]
@@ -301,13 +285,12 @@ def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path)
     text = (
         BALL
         + '[[sweep]]\n"surface.radius" = ["10 mm", "12 mm"]\n'
-        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n"material.shift_factor" = [2.0]\n'
+        + '[[sweep]]\n"solve.edge" = "accept"\n"material.poisson" = [0.4]\n'
     )
     ds = sweep(study(text), tmp_path / "out", workers=0, progress=False)
     assert list(ds["surface_radius"].values) == [10e-3, 12e-3, 10e-3]
-    assert list(ds["solve_edge"].values) == ["error", "error", "accept"]
-    np.testing.assert_array_equal(ds["material_poisson"], [0.5, 0.5, 0.4], "the default of the others")
-    np.testing.assert_array_equal(ds["material_shift_factor"], [np.nan, np.nan, 2.0], "the others do not state it")
+    assert list(ds["solve_edge"].values) == ["", "", "accept"], "the others do not state it"
+    np.testing.assert_array_equal(ds["material_poisson"], [np.nan, np.nan, 0.4])
     assert ds.height.dims == ("case", "x", "y")
 
 

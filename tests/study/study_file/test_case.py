@@ -11,7 +11,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.program import Program
 from roughvisc.study.case import Case, read_study, vary
-from roughvisc.study.si_tables import unit_of
+from roughvisc.study.study_file import unit_of
 
 WAVES = {"generate": "wavy", "amplitude": "1 um", "wavelength": "0.5 mm", "size": "1 mm", "shape": 16}
 LEAKAGE = {"leakage": {"viscosity": "2 mPa s", "pressure_drop": "3 bar", "along": "y"}}
