@@ -8,11 +8,11 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from scipy import ndimage, sparse
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
+from roughvisc.mechanics.transport.clusters import label_clusters
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import in_si
@@ -64,62 +64,20 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the result contains neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
     """
-    touching = contact(dataset)
     periodic = dataset.attrs.get("boundary") == "periodic"
 
     def measure(frame: np.ndarray) -> tuple[float, float, float]:
-        sizes = cluster_sizes(frame, periodic)
-        return (len(sizes), sizes.mean(), sizes[0]) if len(sizes) else (0.0, np.nan, np.nan)
+        sizes = np.bincount(label_clusters(frame, (periodic, periodic))[0].ravel())[1:]
+        return (sizes.size, sizes.mean(), sizes.max()) if sizes.size else (0.0, np.nan, np.nan)
 
     cell = math.prod(spacing(dataset, "clusters"))
-    count, mean, largest = frame_by_frame(measure, touching, outputs=[(), (), ()])
+    count, mean, largest = frame_by_frame(measure, contact(dataset), outputs=[(), (), ()])
     found = {
         "cluster_count": count.astype("int64"),
         "cluster_area_mean": mean * cell,
         "cluster_area_largest": largest * cell,
     }
     return label(xr.Dataset(found))
-
-
-def label_clusters(mask: np.ndarray, periodic: bool = False) -> tuple[np.ndarray, int]:
-    """Number the connected clusters of one map. Cells that share only a corner are not connected.
-
-    Parameters
-    ----------
-    mask : array_like of bool, shape (nx, ny)
-        Cells that belong to any cluster.
-    periodic : bool
-        Whether a cluster continues across opposite borders.
-
-    Returns
-    -------
-    labels : ndarray of int, shape (nx, ny)
-        From 1 on; 0 outside the clusters.
-    count : int
-        Number of clusters.
-
-    Examples
-    --------
-    >>> ends = [[True], [False], [True]]
-    >>> label_clusters(ends)[1], label_clusters(ends, periodic=True)[1]
-    (2, 1)
-    """
-    labels, count = ndimage.label(np.asarray(mask, dtype=bool))
-    if not periodic or count < 2:
-        return labels, count
-    borders = np.concatenate(
-        [np.stack([labels[-1], labels[0]], axis=1), np.stack([labels[:, -1], labels[:, 0]], axis=1)]
-    )
-    links = np.unique(borders[(borders > 0).all(axis=1)], axis=0) - 1
-    graph = sparse.coo_array((np.ones(len(links)), links.T), shape=(count, count))
-    merged = sparse.csgraph.connected_components(graph, directed=False)[1]
-    return np.append(0, merged + 1).astype(labels.dtype)[labels], int(merged.max()) + 1
-
-
-def cluster_sizes(mask: np.ndarray, periodic: bool = False) -> np.ndarray:
-    """Return the number of cells of each cluster of one map, largest first; see :func:`label_clusters`."""
-    labels, count = label_clusters(mask, periodic)
-    return np.sort(np.bincount(labels.ravel(), minlength=count + 1)[1:])[::-1]
 
 
 def distribution(

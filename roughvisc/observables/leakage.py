@@ -11,7 +11,6 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.mechanics.transport.flow import flow as flow_through
-from roughvisc.mechanics.transport.flow import fluxes
 from roughvisc.observables.frames import frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, quantities
@@ -89,8 +88,7 @@ def leakage(
                 "flow through these cells is unknown: expected a surface that is cropped, or filled"
             )
         found = flow_through(field, sides_of_cell, wrap=wrap)
-        fields = fluxes(field, sides_of_cell, found.pressure, wrap=wrap) if flow else ()
-        return found.conductance, found.error, *fields
+        return (found.conductance, found.error, found.along, found.across)[: len(outputs)]
 
     outputs = [[], []] + [[along, across]] * (2 * flow)
     conductance, error, *fields = frame_by_frame(measure, gap, outputs=outputs, over=(along, across))
