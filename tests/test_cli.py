@@ -41,7 +41,7 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
     figures = {p.name.rpartition("-")[2] for p in result.parent.glob(f"{result.stem}-*.png")}
     assert figures == {"history.png", "maps.png"}
     assert f"Result: results/ball/{result.name}\n" in out
-    assert out.endswith("For all figures, run: roughvisc plot --all results/ball\n")
+    assert out.endswith("2 figures: results/ball\n")
     for words in ("24 x 21 cells, free", "5 mN", "stated error", "convolutions"):
         assert words in out
     before = result.stat().st_mtime_ns

@@ -8,11 +8,9 @@ import logging
 import os
 import signal
 import sys
-import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,11 +35,6 @@ def number_or_text(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
-
-
-def options(*them: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return a decorator that adds several options to a command."""
-    return lambda command: reduce(lambda decorated, one: one(decorated), reversed(them), command)
 
 
 def quantity(name: str, metavar: str, meaning: str, **settings: Any) -> Any:
@@ -84,13 +77,8 @@ def say(console: Console, line: str) -> None:
 
 def say_path(console: Console, what: str, path: Path) -> None:
     """Write a line with a path, relative to this folder if it is below it."""
-    say(console, f"{what}: {near(path)}")
-
-
-def near(path: Path) -> str:
-    """Return a path relative to this folder if it is below it."""
     relative = os.path.relpath(path)
-    return str(path) if relative.startswith("..") else relative
+    say(console, f"{what}: {path if relative.startswith('..') else relative}")
 
 
 def say_figures(console: Console, written: Sequence[Path]) -> None:
@@ -124,41 +112,35 @@ def _terminate(number: int, _: Any) -> None:
 
 @contextmanager
 def _settings_of_process() -> Iterator[None]:
-    """Show warnings as messages and treat SIGTERM as an interrupt, unless other handlers are set up."""
-    otherwise, shown = logging.lastResort, warnings.showwarning
+    """Show warnings as messages and treat SIGTERM as an interrupt."""
+    usual = logging.lastResort, warnings.showwarning, signal.signal(signal.SIGTERM, _terminate)
     logging.lastResort, warnings.showwarning = _Screen(), lambda warning, *_: complain(f"warning: {warning}")
-    main_thread = threading.current_thread() is threading.main_thread()
-    usual = main_thread and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
-    if usual:
-        signal.signal(signal.SIGTERM, _terminate)
     try:
         yield
     finally:
-        logging.lastResort, warnings.showwarning = otherwise, shown
-        if usual:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        logging.lastResort, warnings.showwarning, on_term = usual
+        signal.signal(signal.SIGTERM, on_term)
 
 
-def _failure(error: BaseException) -> Failure | None:
+def _failure(error: BaseException) -> tuple[str, int] | None:
     """Return the message and the exit status of a known error of a command; None for any other error."""
     match error:
         case RoughviscError():
-            return Failure(str(error), 2 if isinstance(error, InputError) else 1)
+            return str(error), 2 if isinstance(error, InputError) else 1
         case OSError() if error.errno != errno.EPIPE:  # the reader of the output has closed it: click ends quietly
             place = f"{error.filename}: " if error.filename else ""
-            return Failure(f"{place}{error.strerror or error}", 1)
+            return f"{place}{error.strerror or error}", 1
         case MemoryError():
-            return Failure("not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1)
+            return "not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1
         case RecursionError():
-            return Failure("the input is nested too deeply: expected a few levels of tables", 2)
+            return "the input is nested too deeply: expected a few levels of tables", 2
         case OverflowError():
-            return Failure(f"a number in the input is too large ({error}): expected one below 1e308", 2)
+            return f"a number in the input is too large ({error}): expected one below 1e308", 2
         case RuntimeError() if str(error).startswith("NetCDF: "):
-            advice = "a file is damaged; run `roughvisc verify FOLDER` to find it"
-            return Failure(f"a result cannot be read ({error}): {advice}", 1)
+            return f"a result cannot be read ({error}): run `roughvisc verify FOLDER` to find a damaged file", 1
         case KeyboardInterrupt():
             text = "interrupted; finished work is kept; repeat the command to resume"
-            return Failure(text, 143 if isinstance(error, Terminated) else 130)
+            return text, 143 if isinstance(error, Terminated) else 130
     return None
 
 
@@ -179,8 +161,8 @@ class Commands(click.Group):
             with _settings_of_process():
                 return super().invoke(ctx)
         except BaseException as error:
-            if failure := _failure(error):
-                raise failure from error
+            if known := _failure(error):
+                raise Failure(*known) from error
             raise
 
 

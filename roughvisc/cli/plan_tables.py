@@ -2,37 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from rich.console import Group
-from rich.table import Table
 from rich.text import Text
 
 from roughvisc.cli.group import counted
-from roughvisc.cli.tables import readable, two_columns
+from roughvisc.cli.tables import columns, readable, two_columns
 from roughvisc.experiment.resources import amount
+from roughvisc.study.case_text import names_of, value_text
 
-#: Columns of the table of the cases of a sweep.
+#: Columns of the table of the cases.
 _COLUMNS = ("contact_fraction", "steps", "convolutions", "wall_time", "memory", "disk")
 #: Largest number of cases that a plan lists one by one.
 _LISTED = 20
 
 
 def plan_tables(costs: xr.Dataset) -> Group:
-    """Return a summary of all cases, and a row for each case of a sweep.
+    """Return a summary of all cases, and a row for each case.
 
     Parameters
     ----------
     costs : xarray.Dataset
         Result of :func:`roughvisc.plan`.
     """
-    for name in (*_COLUMNS, "nominal_pressure"):
-        costs[name].values = [float(f"{value:.2g}") for value in costs[name].values]
-    total, attrs, first = costs.sizes["case"], costs.attrs, costs.isel(case=0)
-    seconds = float(f"{attrs['wall_time']:.2g}")
+    total, attrs = costs.sizes["case"], costs.attrs
     threads = f"{counted(attrs['threads'], 'thread')} on large grids"
     grids = [f"{x} x {y} cells" for x, y in zip(costs.cells_x.values, costs.cells_y.values, strict=True)]
     rows = [
@@ -40,27 +36,17 @@ def plan_tables(costs: xr.Dataset) -> Group:
         ("Model", _distinct(costs["model"].values)),
         ("Program", _distinct(costs["note"].values)),
         ("Grid", _distinct(grids)),
-    ]
-    if total == 1:
-        rows += [
-            ("Largest nominal pressure", f"about {_text(first['nominal_pressure'])}"),
-            ("Contact", f"about {100 * float(first['contact_fraction']):.2g} % of the area"),
-            ("Steps or speeds", f"about {_text(first['steps'])}"),
-            ("Convolutions", f"about {_text(first['convolutions'])}"),
-        ]
-    rows += [
-        ("Wall time", f"about {readable(seconds, 's')}"),
+        ("Wall time", f"about {_number(attrs['wall_time'], 's')}"),
         ("Memory", f"{amount(attrs['memory'])} of {amount(attrs['free_memory'])} free"),
         ("Disk", f"{amount(attrs['disk'])} of {amount(attrs['free_disk'])} free"),
     ]
-    parts: list[Any] = [two_columns([row for row in rows if row[1]], attrs.get("title"))]
-    for text in dict.fromkeys(costs["warning"].values):
-        if text:
-            warned = int((costs["warning"] == text).sum())
-            several = f" ({warned} of {total} cases)" if total > 1 else ""
-            parts.append(Text(f"Warning: {text}{several}", style="bold red"))
-    if total > 1:
-        parts += [Text(), _case_table(costs.isel(case=slice(_LISTED)), total)]
+    parts: list[Any] = [two_columns(rows, attrs.get("title"))]
+    for text in filter(None, dict.fromkeys(costs["warning"].values)):
+        warned = int((costs["warning"] == text).sum())
+        parts.append(Text(f"Warning: {text} ({warned} of {counted(total, 'case')})", style="bold red"))
+    parts += [Text(), _case_table(costs.isel(case=slice(_LISTED)))]
+    if total > _LISTED:
+        parts.append(Text(f"and {total - _LISTED} more"))
     if not costs["marched"].all():
         parts.append(Text("~ Estimated from the coarse run of the most similar case.", style="italic"))
     return Group(*parts)
@@ -68,43 +54,25 @@ def plan_tables(costs: xr.Dataset) -> Group:
 
 def _distinct(texts: Any) -> str:
     """Return the first three distinct texts, and the number of further texts."""
-    found = [one for one in dict.fromkeys(str(text).rstrip(".") for text in texts) if one]
+    found = list(filter(None, dict.fromkeys(str(text).rstrip(".") for text in texts)))
     return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
 
 
-def _case_table(costs: xr.Dataset, total: int) -> Table:
-    """Return the settings and costs of each case.
-
-    Parameters
-    ----------
-    costs : xarray.Dataset
-        Listed cases.
-    total : int
-        Number of all cases.
-    """
+def _case_table(costs: xr.Dataset) -> Any:
+    """Return the settings and costs of each case."""
     varied = [str(name) for name in costs.coords if name != "case_key"]
-    last = [key.rpartition(".")[2] for key in varied]
-    table = Table(box=None, pad_edge=False)
-    for name, short in zip([*varied, *_COLUMNS], [*last, *_COLUMNS], strict=True):
-        heading = short if last.count(short) <= 1 else name
-        table.add_column(Text(heading.replace("_", " ")), justify="right", overflow="fold")
+    rows = []
     for i in range(costs.sizes["case"]):
         row = costs.isel(case=i)
         mark = "" if row["marched"] else "~"
-        known = [mark + text if (text := _text(row[name])) else "" for name in _COLUMNS]
-        cells = ["cannot run"] if row["refusal"] != "" else known
-        table.add_row(*(Text(_text(row[key])) for key in varied), *cells)
-    if total > _LISTED:
-        table.add_row(f"and {total - _LISTED} more")
-    return table
+        known = [_number(float(row[name]), str(row[name].attrs.get("units", ""))) for name in _COLUMNS]
+        numbers = ["cannot run"] if row["refusal"] != "" else [text and mark + text for text in known]
+        rows.append([*(value_text(key, row[key].item()) for key in varied), *numbers])
+    return columns([*names_of(varied).values(), *(name.replace("_", " ") for name in _COLUMNS)], rows)
 
 
-def _text(value: xr.DataArray) -> str:
-    """Return a value with a suitable unit, or a text; empty if it is not known."""
-    if value.dtype.kind not in "iuf":
-        return str(value.values)
-    if value.attrs.get("units") == "byte":
-        return amount(float(value))
-    if np.isnan(value):
-        return ""
-    return "half-space" if value == math.inf else readable(float(value), str(value.attrs.get("units", "")))
+def _number(value: float, unit: str) -> str:
+    """Return an estimate with two digits in a suitable unit; empty if it is not known."""
+    if unit == "byte":
+        return amount(value)
+    return "" if np.isnan(value) else readable(float(f"{value:.2g}"), unit)

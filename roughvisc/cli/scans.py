@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, number_or_text, options, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, number_or_text, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,17 +22,24 @@ def _sides(text: str) -> Any:
     return sides[0] if len(sides) == 1 else sides
 
 
-#: Options of :func:`roughvisc.open_scan`.
-_READING = options(
-    click.option("--unit", help="Unit of length, if the file states none: um."),
-    click.option("--height-unit", help="Unit of the heights, if it differs."),
-    click.option("--spacing", type=_sides, metavar="LENGTH", help="Distance between points: 1um, or 1um,2um."),
-    quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
-    click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
-    click.option("--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."),
-    click.option("--channel", help="Name or number of the channel. [default: the height]"),
-    click.option("--format", help="Format, if the suffix is ambiguous; auto: detect it."),
-)
+def _reading(command: Any) -> Any:
+    """Add the options of :func:`roughvisc.open_scan` to a command."""
+    for option in (
+        click.option("--format", help="Format, if the suffix is ambiguous; auto: detect it."),
+        click.option("--channel", help="Name or number of the channel. [default: the height]"),
+        click.option(
+            "--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."
+        ),
+        click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
+        quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
+        click.option("--spacing", type=_sides, metavar="LENGTH", help="Distance between points: 1um, or 1um,2um."),
+        click.option("--height-unit", help="Unit of the heights, if it differs."),
+        click.option("--unit", help="Unit of length, if the file states none: um."),
+    ):
+        command = option(command)
+    return command
+
+
 #: Question for an argument that a file lacks, and the type of the answer.
 _QUESTIONS: dict[str, tuple[str, Any]] = {
     "unit": ("Unit of x, y and heights (such as um)", str),
@@ -67,7 +74,7 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
 @click.option("--plot", type=PATH, help="Picture to save. [default: FILE's name.png, here]")
 @click.option("--to", type=PATH, help="Convert the heights to a .nc, .x3p or .sdf file.")
 @click.option("--card", type=PATH, help="Write a surface card with these recommendations, a .toml file.")
-@_READING
+@_reading
 def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **options: Any) -> None:
     """Summarise a scan and recommend preprocessing.
 
@@ -100,11 +107,9 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     )
     say(console, surface_table(file, Path(), options, found.steps))
     picture = plot or Path(f"{file.stem}.png")
-    if plot or not picture.exists():
+    if not picture.exists():
         write_figure(rv.plot.surface(levelled), picture)
-        say_path(console, "Picture", picture)
-    else:
-        say_path(console, "Existing picture kept (--plot writes another one)", picture)
+    say_path(console, "Picture", picture)
     if to:
         with atomic_write(to) as temporary:
             rv.save_scan(height, temporary)
@@ -116,14 +121,8 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
 @click.command()
 @click.argument("file", type=PATH, required=False)
 @click.option("-o", "--out", type=PATH, help="Study file to write. [default: FILE's name-study.toml, here]")
-@quantity(
-    "--contact",
-    "PART",
-    "Part of the area in contact at the end, which sets the pressure.",
-    default="5 %",
-    show_default=True,
-)
-@_READING
+@quantity("--contact", "PART", "Final contact fraction, which sets the pressure.", default="5 %", show_default=True)
+@_reading
 def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> None:
     """Write a first study for a scan, or for an example.
 
@@ -147,17 +146,14 @@ def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> No
     part = number(contact, "1", "contact", above=0, below=1)
     source = file or Path(EXAMPLE)
     out = out or Path(f"{source.stem}-study.toml")
-    if out.suffix.lower() != ".toml":
-        raise InputError(f"{out}: has the suffix {out.suffix!r}: expected a study file, .toml")
-    if out.exists():
-        raise InputError(f"{out}: already exists: expected another name (--out)")
+    if out.suffix.lower() != ".toml" or out.exists():
+        raise InputError(f"{out}: already exists, or is not a .toml file: expected another name (--out)")
     if file is None:
         for option in (name for name, value in options.items() if value is not None):
             raise InputError(key=option, found=options[option], expected="FILE, which it belongs to")
         shipped = rv.example_scan().read_bytes()
         if source.exists() and source.read_bytes() != shipped:
-            expected = "an empty folder, or your own FILE"
-            raise InputError(f"{source}: already exists and differs from the example: expected {expected}")
+            raise InputError(f"{source}: already exists and differs from the example: expected your own FILE")
         source.write_bytes(shipped)
     height = _opened(source, options)
     found = rv.inspect(height)

@@ -17,7 +17,6 @@ from roughvisc.cli.group import (
     WORKERS,
     Failure,
     complain,
-    near,
     quantity,
     say,
     say_figures,
@@ -114,27 +113,32 @@ def run(
     folder, console = result_folder(cases[0], out), screen(quiet)
     remote = [settings.pop(name) for name in ("scheduler", "scheduler_file")]
     with connect(*remote) if any(remote) else nullcontext() as client:
-        if len(cases) > 1 or (client is not None and not targets):
+        if targets:
+            computing = {"client": client, "workers": settings["workers"] or 0, "threads": settings["threads"]}
+            cases = [_chosen(cases[0], targets, folder, console, not no_plots, **computing)]
+        elif client is not None or len(cases) > 1:
             _run_all(cases, folder, console, client=client, **settings)
             return
-        case, budgets, threads = cases[0], {}, settings["threads"]
-        if targets:
-            from roughvisc.study.target import choose, parse_targets
-
-            tell = partial(say, console)
-            computing = {"progress": not quiet, "client": client, "workers": settings["workers"] or 0}
-            computing["threads"] = threads
-            case, reasons, budgets = choose(case, parse_targets(targets), folder, tell, **computing)
-            tell("\n  ".join(["Chosen", *reasons]))
-        problem = _run_one(case, folder, study.stem, console, not no_plots, threads)
-        for name, one in budgets.items():
-            _show_budget(console, one, folder / "budget", name, not no_plots)
-        if problem:
-            raise Failure(f"{study.stem}: {problem}", 1)
+        _run_one(cases[0], folder, console, not no_plots, settings["threads"])
 
 
-def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool, threads: int | None) -> str:
-    """Compute, store, draw and summarise one case; return its problem, empty if there is none."""
+def _chosen(
+    case: Case, targets: tuple[str, ...], folder: Path, console: Console, plots: bool, **computing: Any
+) -> Case:
+    """Return the case with grid and tolerance for some target errors, and show the budget of each target."""
+    from roughvisc.study.target import choose, parse_targets
+
+    tell = partial(say, console)
+    want = parse_targets(targets)
+    chosen, reasons, budgets = choose(case, want, folder, tell, progress=not console.quiet, **computing)
+    tell("\n  ".join(["Chosen", *reasons]))
+    for name, budget in budgets.items():
+        _show_budget(console, budget, folder / "budget", name, plots)
+    return chosen
+
+
+def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: int | None) -> None:
+    """Compute, store, draw and summarise one case."""
     from roughvisc.cli.tables import result_table
     from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
@@ -142,20 +146,17 @@ def _run_one(case: Case, folder: Path, label: str, console: Console, plots: bool
     from roughvisc.study.execution.run import is_result_of, run_case
     from roughvisc.study.storage.folder import result_path
 
-    path = result_path(folder, case.key)
-    if not is_result_of(case, path):
-        with reporting(label, case.experiment.progress, console) as report:
-            run_case(case, folder, progress=report, threads=threads or threads_each(1))
-    else:
+    if is_result_of(case, result_path(folder, case.key)):
         say(console, "Already finished: nothing to compute")
-    missed = _observe([case], folder, console)
+    with reporting(case.title, case.experiment.progress, console) as report:
+        path = run_case(case, folder, progress=report, threads=threads or threads_each(1))
+    with console.status("observing"):
+        rv.observe([case], folder)
     with rv.open_result(path) as dataset:
         console.print(result_table(dataset))
         say_path(console, "Result", path)
         if plots:
             say_figures(console, save_figures(dataset, folder, case.key, names=DEFAULT))
-            say(console, f"For all figures, run: roughvisc plot --all {near(folder)}")
-        return missed
 
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
@@ -170,38 +171,21 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
 
     found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
-    with client.as_current() if client is not None else nullcontext():
-        missed = _observe(cases, folder, console)
+    with client.as_current() if client is not None else nullcontext(), console.status("observing"):
+        rv.observe(cases, folder)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
     if len(drawn := realisations_table(rv.to_table(folder))):
         console.print(realisations_tables(drawn))
-    say_path(console, "Results", folder)
-    for what, name in (("Table of cases", CASES), ("Log", LOG)):
-        if (folder / name).exists():
-            say_path(console, what, folder / name)
+    for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
+        say_path(console, what, path)
     bad = [outcome for outcome in outcomes if outcome.kind != "done"]
     for outcome in bad[:_SHOWN]:
         again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
         complain(f"case {numbers[outcome.key]}{again}: {outcome.message}")
     if all(outcome.error in REFUSED for outcome in outcomes):
         raise Failure("no case could be computed: the input is invalid", 2)
-    if missed:
-        complain(missed)
-    if bad or missed:
-        failed = f"{len(bad)} of {len(outcomes)} cases failed or are in use by another run"
-        raise Failure(failed if bad else "some observables could not be computed", 1)
-
-
-def _observe(cases: list[Case], folder: Path, console: Console) -> str:
-    """Add the observables of the study to the results; return the problem, empty if there is none."""
-    if not any(case.observed for case in cases):
-        return ""
-    with console.status("observing") as status:
-        try:
-            rv.observe(cases, folder, progress=lambda done, of: status.update(f"observing: {done} of {of} cases done"))
-        except InputError as error:
-            return str(error)
-    return ""
+    if bad:
+        raise Failure(f"{len(bad)} of {len(outcomes)} cases failed or are in use by another run", 1)
 
 
 @click.command()
@@ -267,9 +251,8 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
     from roughvisc.study.neighbours import FOLDER
 
     names = list(known.pop("quantity")) or ["contact_area"]
-    is_result = study.suffix == ".nc"
-    case: Any = rv.open_result(study) if is_result else rv.read_study(study)
-    folder = out or (study.parent if is_result else result_folder(case)) / FOLDER
+    case: Any = rv.open_result(study) if study.suffix == ".nc" else rv.read_study(study)
+    folder = out or (study.parent if study.suffix == ".nc" else result_folder(case)) / FOLDER
     found = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
     for name in names:
         _show_budget(screen(quiet), found.sel(quantity=name), folder, name)

@@ -111,7 +111,7 @@ def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_
     path = study("")
     path.write_text(punch + LEAKAGE)
     status, _, complaint = invoke("run", path, "--out", "out", "--no-plots")
-    assert status == 1
+    assert status == 2
     assert "where the surface is absent" in complaint
     (file,) = (tmp_path / "out").glob("*.nc")
     with rv.open_result(file) as ds:
