@@ -13,10 +13,12 @@ from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.layer import layer as layer
+from roughvisc.mechanics.materials.creep import arrhenius as arrhenius
 from roughvisc.mechanics.materials.creep import creep as creep
 from roughvisc.mechanics.materials.creep import pair as pair
 from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.creep import shift as shift
+from roughvisc.mechanics.materials.creep import wlf as wlf
 from roughvisc.mechanics.materials.models import elastic as elastic
 from roughvisc.mechanics.materials.models import kelvin_voigt as kelvin_voigt
 from roughvisc.mechanics.materials.models import maxwell as maxwell
@@ -26,8 +28,6 @@ from roughvisc.mechanics.materials.relaxation import from_relaxation as from_rel
 from roughvisc.mechanics.materials.tables import creep_table as creep_table
 from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
-from roughvisc.mechanics.materials.temperature import arrhenius as arrhenius
-from roughvisc.mechanics.materials.temperature import wlf as wlf
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
 from roughvisc.observables.deformed import deformed as deformed

@@ -22,8 +22,8 @@ from scipy import fft
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.materials.creep import Creep, Material
-from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.series import complex_compliance, over_frequencies
 
 Array = NDArray[np.float64]
 

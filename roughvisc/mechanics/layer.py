@@ -24,11 +24,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
-from roughvisc.mechanics.half_space import cell_mean, corner_sum, love_kernel
+from roughvisc.mechanics.half_space import corner_sum, love_kernel
 from roughvisc.mechanics.materials.creep import Material, check_material
-from roughvisc.mechanics.materials.frequency import complex_compliance, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.series import lattice, nonnegative
+from roughvisc.mechanics.materials.series import (
+    complex_compliance,
+    laplace_compliance,
+    lattice,
+    nonnegative,
+    over_frequencies,
+)
+from roughvisc.mechanics.quadrature import cell_mean
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
@@ -209,7 +215,8 @@ class Layers:
         ``tau``. The limits represent all times beyond them.
         """
         place = lattice(shortest, longest, _SIGNS)
-        signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
+        with np.errstate(divide="ignore"):  # at a retardation time of the material
+            signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
         apart = (signs != signs[0]).any(axis=0)
         apart[1:] |= apart[:-1].copy()
         apart[:-1] |= apart[1:].copy()
@@ -218,15 +225,6 @@ class Layers:
         for first, end in zip(place[ends[::2]], place[ends[1::2] - 1], strict=True):
             found |= {float(first), float(end)} if per_decade == 0 else set(lattice(first, end, per_decade).tolist())
         return np.array(sorted(found))
-
-
-def laplace_compliance(material: Prony, s: NDArray[Any]) -> NDArray[Any]:
-    """Return the shear compliance of a series under a pressure that grows as ``exp(s t)``. [1/Pa], [1/s]"""
-    found = material.glassy + material.fluidity / s
-    for compliance, time in zip(material.compliances, material.times, strict=True):
-        with np.errstate(divide="ignore"):  # at a retardation time of the material
-            found = found + compliance / (1 + s * time)
-    return np.asarray(found)
 
 
 # ------------------------------------------------------------------------------------------------- kernels and series

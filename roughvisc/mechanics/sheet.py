@@ -18,8 +18,9 @@ from scipy import fft
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel
-from roughvisc.mechanics.half_space import cell_mean, love_kernel
+from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.quadrature import cell_mean, panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
@@ -239,14 +240,6 @@ def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
 def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
     """Return ``k``, and the rest of the denominator next to ``k cosh 2x``."""
     return 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
-
-
-def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
-    """Return Gauss nodes and weights on equal parts of an interval from zero."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    side = end / count
-    at = (np.arange(count)[:, None] + (nodes + 1) / 2) * side
-    return at.ravel(), np.tile(weights * side / 2, count)
 
 
 @lru_cache(maxsize=8)

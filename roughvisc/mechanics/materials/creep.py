@@ -13,20 +13,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.constants import R as GAS_CONSTANT
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import check_poisson
-from roughvisc.mechanics.materials.prony import Prony, known_times
+from roughvisc.mechanics.materials.prony import Prony, check_poisson
+from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
 
-#: Panels and points of the quadrature of :meth:`Creep.contact_integral` over ``y = log(t / s)``, and its upper limit.
-_PANELS, _POINTS, _LIMIT = 80, 8, 40.0
 #: Largest relative decrease of a creep function that counts as rounding.
 _ROUNDING = 1e-9
 #: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
+#: Decimal logarithm of the largest factor of WLF and Arrhenius.
+_LARGEST = 300.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,8 +42,6 @@ class Creep:
         Numbers of the function.
     poisson : float
         Poisson ratio, constant in time.
-    longest : float
-        Longest time at which the function is known. [s]
     time_factor, modulus_factor : float
         Factors of all times and of all moduli. [-]
     note : str
@@ -58,7 +57,6 @@ class Creep:
     function: Callable[..., Any]
     parameters: tuple[Any, ...] = ()
     poisson: float = 0.5
-    longest: float = math.inf
     time_factor: float = 1.0
     modulus_factor: float = 1.0
     note: str = field(default="", compare=False)
@@ -70,9 +68,8 @@ class Creep:
         return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
 
     def creep_compliance(self, t: ArrayLike) -> Array:
-        """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
-        t = known_times(t, self.longest * self.time_factor)
-        found = self.function(t / self.time_factor, *self.parameters)
+        """Return the shear creep compliance ``J(t)`` [1/Pa] at some times. [s]"""
+        found = self.function(np.asarray(t, dtype=float) / self.time_factor, *self.parameters)
         return np.asarray(found, dtype=float) / self.modulus_factor
 
     def contact_compliance(self, t: ArrayLike) -> Array:
@@ -80,20 +77,26 @@ class Creep:
         return 0.5 * (1 - self.poisson) * self.creep_compliance(t)
 
     def contact_integral(self, t: ArrayLike) -> Array:
-        """Return ``int_0^t C``, [s/Pa], by Gauss quadrature over the logarithm of time: 1e-13 for smooth creep."""
-        nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
-        width = _LIMIT / _PANELS
-        y = (width * (np.arange(_PANELS)[:, None] + (nodes + 1) / 2)).ravel()
-        weights = np.tile(weights * width / 2, _PANELS) * np.exp(-y)
+        """Return ``int_0^t C``, [s/Pa], by Gauss quadrature over ``y = log(t / s)``: 1e-13 for smooth creep."""
+        y, weights = panels(80, 40.0, 8)
         t = np.asarray(t, dtype=float)
-        return np.asarray(t * (self.contact_compliance(t[..., None] * np.exp(-y)) @ weights))
+        return np.asarray(t * (self.contact_compliance(t[..., None] * np.exp(-y)) @ (weights * np.exp(-y))))
+
+    def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Material:
+        """Return the material with all times multiplied by one factor and all moduli by another."""
+        note = "; ".join(filter(None, (self.note, note)))
+        if self.function is pair_creep:
+            a, b = (one.scaled(time_factor, modulus_factor) for one in self.parameters)
+            return replace(pair(a, b), note=note)
+        factors = time_factor * self.time_factor, modulus_factor * self.modulus_factor
+        return replace(self, time_factor=factors[0], modulus_factor=factors[1], note=note)
 
 
 #: The two kinds of materials.
 Material = Prony | Creep
 
 
-def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: float = math.inf) -> Creep:
+def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     """Material by its shear creep compliance.
 
     Parameters
@@ -102,8 +105,6 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: fl
         ``J(t)``, [1/Pa], for an array of times from zero on [s]. It must not decrease.
     poisson : float
         Poisson ratio, constant in time.
-    longest : float
-        Longest time at which the function is known; longer programs are refused. [s]
 
     Returns
     -------
@@ -123,12 +124,9 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5, *, longest: fl
     2.5e-07
     """
     if not callable(function):
-        found = type(function).__name__
-        raise InputError(key="function", found=found, expected="a function of time, the creep compliance [1/Pa]")
+        raise InputError(key="function", found=function, expected="a function of time, the creep compliance [1/Pa]")
     check_poisson(poisson)
-    if not longest > 0:
-        number(longest, "s", "longest", above=0)
-    return Creep(function, (), poisson, longest)
+    return Creep(function, (), poisson)
 
 
 @quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", time_scale="s > 0")
@@ -216,8 +214,97 @@ def pair(a: Material, b: Material) -> Material:
         fluidity += share * body.fluidity
         for compliance, time in zip(body.compliances, body.times, strict=True):
             compliances[time] = compliances.get(time, 0.0) + share * compliance
-    longest = min(a.longest, b.longest)
-    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), longest=longest, **about)
+    about["longest"] = min(a.longest, b.longest)
+    return Prony(glassy, fluidity, tuple(compliances.values()), tuple(compliances), **about)
+
+
+@quantities(temperature="K > 0", reference_temperature="K > 0", wlf_c1="1 > 0")
+def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, wlf_c2: float | str) -> float:
+    r"""Shift factor of Williams, Landel and Ferry, for polymers from the glass transition to about 100 K above it.
+
+    Parameters
+    ----------
+    temperature : float or str
+        Temperature ``T`` of the contact. [K]
+    reference_temperature : float or str
+        Temperature ``T_r`` at which the compliance was measured. [K]
+    wlf_c1 : float
+        First constant, with the decimal logarithm. [-]
+    wlf_c2 : float or str
+        Second constant, a difference of temperatures. [K]
+
+    Returns
+    -------
+    float
+        ``a_T``, the factor for all times of the material. [-]
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite, or the temperature is not above ``T_r - c2``, where the formula is not
+        defined.
+
+    Notes
+    -----
+    .. math:: \log_{10} a_T = -\frac{c_1 (T - T_r)}{c_2 + T - T_r}
+
+    References
+    ----------
+    .. [1] M. L. Williams, R. F. Landel and J. D. Ferry, J. Am. Chem. Soc. 77 (1955) 3701-3707.
+
+    Examples
+    --------
+    >>> wlf(298.15, 298.15, 17.44, 51.6)  # at the reference temperature nothing is shifted
+    1.0
+    """
+    c2 = number(wlf_c2, "K", "wlf_c2", above=0, difference=True)
+    above = temperature - reference_temperature
+    if not c2 + above > 0:
+        pole = (
+            f"{reference_temperature - c2:g} K, the reference temperature less wlf_c2, where the WLF shift has its pole"
+        )
+        raise InputError(key="temperature", found=temperature, expected=f"a temperature above {pole}")
+    return 10.0 ** min(-wlf_c1 * above / (c2 + above), _LARGEST)
+
+
+@quantities(temperature="K > 0", reference_temperature="K > 0", activation_energy="J/mol > 0")
+def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation_energy: Quantity) -> float:
+    r"""Shift factor of a thermally activated process, after Arrhenius.
+
+    Parameters
+    ----------
+    temperature : float or str
+        Temperature ``T`` of the contact. [K]
+    reference_temperature : float or str
+        Temperature ``T_r`` at which the compliance was measured. [K]
+    activation_energy : float or str
+        ``E_a``. [J/mol]
+
+    Returns
+    -------
+    float
+        ``a_T``, the factor for all times of the material. [-]
+
+    Raises
+    ------
+    InputError
+        If a number is not positive and finite.
+
+    Notes
+    -----
+    .. math:: \ln a_T = \frac{E_a}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
+
+    References
+    ----------
+    .. [1] J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed., Wiley, 1980, chapter 11.
+
+    Examples
+    --------
+    >>> round(arrhenius(283.15, 293.15, 80e3), 3)  # 10 K colder
+    3.187
+    """
+    power = activation_energy / GAS_CONSTANT * (1 / temperature - 1 / reference_temperature)
+    return math.exp(min(power, math.log(10) * _LARGEST))
 
 
 def shift(material: Material, factor: float) -> Material:
@@ -257,7 +344,7 @@ def shift(material: Material, factor: float) -> Material:
     if not (isinstance(factor, int | float | np.number) and 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT):
         raise InputError(key="factor", found=factor, expected="a number from 1e-30 to 1e30")
     note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
-    return _scaled(check_material(material), float(factor), 1.0, note)
+    return check_material(material).scaled(float(factor), 1.0, note)
 
 
 def stiffened(material: Material, factor: float) -> Material:
@@ -287,17 +374,7 @@ def stiffened(material: Material, factor: float) -> Material:
     5e-07
     """
     factor = number(factor, "1", "modulus_factor", above=0)
-    return _scaled(check_material(material), 1.0, factor, f"all moduli multiplied by {factor:.6g}")
-
-
-def _scaled(material: Material, time_factor: float, modulus_factor: float, note: str) -> Material:
-    if isinstance(material, Prony):
-        return material.scaled(time_factor, modulus_factor, note)
-    note = "; ".join(filter(None, (material.note, note)))
-    if material.function is pair_creep:
-        return replace(pair(*(_scaled(one, time_factor, modulus_factor, "") for one in material.parameters)), note=note)
-    factors = time_factor * material.time_factor, modulus_factor * material.modulus_factor
-    return replace(material, time_factor=factors[0], modulus_factor=factors[1], note=note)
+    return check_material(material).scaled(1.0, factor, f"all moduli multiplied by {factor:.6g}")
 
 
 def check_material(material: Any) -> Material:

@@ -7,17 +7,17 @@ The half-space enters the contact through one function, the contact compliance
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import tensile_to_shear
 from roughvisc.mechanics.materials.creep import Material, pair, power_law
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.prony import Prony, tensile_to_shear
 from roughvisc.mechanics.materials.relaxation import from_relaxation
 from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, quantities
 
 
-@quantities(shear_modulus="Pa", young_modulus="Pa")
+@quantities(shear_modulus="Pa > 0", young_modulus="Pa > 0")
 def elastic(
     shear_modulus: Quantity | None = None, poisson: float = 0.5, *, young_modulus: Quantity | None = None
 ) -> Prony:
@@ -47,10 +47,8 @@ def elastic(
     if (shear_modulus is None) == (young_modulus is None):
         key = "shear_modulus" if young_modulus is None else "young_modulus"
         raise InputError(key=key, found=young_modulus, expected="either shear_modulus or young_modulus")
-    if shear_modulus is not None:
-        return Prony(1 / number(shear_modulus, "Pa", "shear_modulus", above=0), poisson=poisson)
-    young_modulus = number(young_modulus, "Pa", "young_modulus", above=0)
-    return Prony(1 / (young_modulus / tensile_to_shear("tensile", poisson)), poisson=poisson)
+    modulus: Any = shear_modulus if young_modulus is None else young_modulus / tensile_to_shear("tensile", poisson)
+    return Prony(1 / modulus, poisson=poisson)
 
 
 @quantities(shear_modulus="Pa > 0", viscosity="Pa s > 0")
@@ -137,17 +135,7 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     return Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,), poisson)
 
 
+_SPRINGS_AND_DASHPOTS = (elastic, maxwell, kelvin_voigt, zener, from_relaxation, Prony)
+_OTHERS = (power_law, creep_table, relaxation_table, dynamic_table, pair)
 #: Function of each model of a material that a study may name; its arguments are the keys of the table.
-MODELS: dict[str, Callable[..., Material]] = {
-    "elastic": elastic,
-    "maxwell": maxwell,
-    "kelvin_voigt": kelvin_voigt,
-    "zener": zener,
-    "from_relaxation": from_relaxation,
-    "prony": Prony,
-    "power_law": power_law,
-    "creep_table": creep_table,
-    "relaxation_table": relaxation_table,
-    "dynamic_table": dynamic_table,
-    "pair": pair,
-}
+MODELS: dict[str, Callable[..., Material]] = {one.__name__.lower(): one for one in (*_SPRINGS_AND_DASHPOTS, *_OTHERS)}

@@ -5,21 +5,26 @@ With an elastic bulk modulus the Poisson ratio changes in time: viscoelastic in 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import Kind, tensile_to_shear
-from roughvisc.mechanics.materials.prony import Prony, merged, secular_roots
+from roughvisc.mechanics.materials.prony import Kind, Prony, tensile_to_shear
 from roughvisc.units import Quantity, number, quantities
+
+Array = NDArray[np.float64]
 
 #: A sum of ratios that differs from one by at most this counts as one: a fluid.
 _ONE = 1e-9
 #: Sum of the moduli over the equilibrium modulus below which moduli of at most one are dimensionless ratios.
 _RATIOS = 1e-3
+#: Largest ratio of the distances of a zero from the poles next to it, and number of bisections.
+_LARGEST_RATIO, _BISECTIONS = 1e250, 70
 
 
 @quantities(equilibrium="Pa", moduli="Pa", times="s", instantaneous="Pa > 0", bulk_modulus="Pa > 0")
@@ -96,22 +101,23 @@ def from_relaxation(
         raise InputError(key="moduli", found=moduli, expected=expected)
     if bulk_modulus is not None and poisson is not None:
         raise InputError(key="bulk_modulus", found=bulk_modulus, expected="either poisson or bulk_modulus")
-    factor = tensile_to_shear(kind, 0.5 if poisson is None else poisson)
+    constant = 0.5 if poisson is None else poisson
+    factor = tensile_to_shear(kind, constant)
     if bulk_modulus is None:
-        moduli = [modulus / factor for modulus in moduli]
-        shear = relaxation_series(equilibrium / factor, moduli, times)
-        return shear if poisson is None else dataclasses.replace(shear, poisson=poisson)
+        return relaxation_series(equilibrium / factor, [one / factor for one in moduli], times, constant)
     found = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
         shear = found.scaled(1.0, 1 / 3)  # 1/G = 3/E - 1/(3K)
         if shear.glassy <= 1 / (3 * bulk_modulus):
             expected = f"more than a ninth of the instantaneous Young's modulus, {1 / found.glassy:g} Pa"
             raise InputError(key="bulk_modulus", found=bulk_modulus, expected=expected)
-        found = dataclasses.replace(shear, glassy=shear.glassy - 1 / (3 * bulk_modulus))
+        found = replace(shear, glassy=shear.glassy - 1 / (3 * bulk_modulus))
     return with_elastic_bulk(found, bulk_modulus)
 
 
-def relaxation_series(equilibrium: float, moduli: Sequence[float], times: Sequence[float]) -> Prony:
+def relaxation_series(
+    equilibrium: float, moduli: Sequence[float], times: Sequence[float], poisson: float = 0.5, **about: Any
+) -> Prony:
     """Return the creep compliance of the relaxation modulus ``G_e + sum G_i exp(-t / theta_i)``, [Pa], [s]; exact.
 
     Notes
@@ -119,21 +125,19 @@ def relaxation_series(equilibrium: float, moduli: Sequence[float], times: Sequen
     The retardation rates are the zeros of ``G_e - sum G_i lambda / (r_i - lambda)``, found between
     consecutive rates ``r_i = 1/theta_i``.
     """
-    weights, rates = merged(moduli, times)
-    glassy_modulus = equilibrium + float(np.sum(weights))
+    strengths, poles = _merged(moduli, times)
+    glassy_modulus = equilibrium + float(np.sum(strengths))
     if glassy_modulus == 0:
         raise InputError(key="moduli", found=moduli, expected="a positive modulus, or a positive equilibrium modulus")
-    # dividing G~(s) = G_e + sum G_i s/(s + r_i) by s makes the equilibrium modulus a pole at zero like the others:
-    # G~(-m)/(-m) = -G_e/m + sum G_i/(r_i - m), one zero between each two poles and none above the last
-    poles = np.append(0.0, rates) if equilibrium else rates
-    strengths = np.append(equilibrium, weights) if equilibrium else weights
-    compliances, retardations = [], []
-    for rate, offset in secular_roots(strengths, poles, 0.0):
-        # 1/G~ has the residue J_k rate there, and d(G~)/ds is rate * sum strengths / offset^2
-        compliances.append(1 / (rate * rate * float(np.sum(strengths / offset**2))))
-        retardations.append(1 / rate)
-    fluidity = 0.0 if equilibrium else 1 / float(np.sum(weights / rates))
-    return Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(retardations))
+    fluidity = 0.0 if equilibrium else 1 / float(np.sum(strengths / poles))
+    if equilibrium:
+        # dividing G~(s) = G_e + sum G_i s/(s + r_i) by s makes the equilibrium modulus a pole at zero like the others:
+        # G~(-m)/(-m) = -G_e/m + sum G_i/(r_i - m), one zero between each two poles and none above the last
+        strengths, poles = np.append(equilibrium, strengths), np.append(0.0, poles)
+    rates, offsets = _secular_roots(strengths, poles, 0.0)
+    # 1/G~ has the residue J_k rate there, and d(G~)/ds is rate * sum strengths / offset^2
+    compliances = 1 / (rates * rates * np.sum(strengths / offsets**2, axis=1))
+    return Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(1 / rates), poisson, **about)
 
 
 def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
@@ -158,18 +162,63 @@ def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
     With ``J^ = s J~``, ``B^ = J^/(1 + 3K J^) = 1/(3K) - 1/((3K)^2 (1/(3K) + J^))``: the rates of ``B`` are the zeros
     of ``1/(3K) + J_0 - phi/m + sum J_i r_i / (r_i - m)``.
     """
-    strengths, poles = shear.poles()
+    weights, poles = _merged(shear.compliances, shear.times)
+    strengths = weights * poles
+    if shear.fluidity:
+        strengths, poles = np.append(shear.fluidity, strengths), np.append(0.0, poles)
     volume = 1 / (3 * bulk_modulus)
-    compliances, times = list(shear.compliances), list(shear.times)
-    for rate, offsets in secular_roots(strengths, poles, volume + shear.glassy):
-        compliances.append(3 * volume**2 / (rate * float(np.sum(strengths / offsets**2))))
-        times.append(1 / rate)
-    glassy = shear.glassy + 3 * volume * shear.glassy / (volume + shear.glassy)
+    rates, offsets = _secular_roots(strengths, poles, volume + shear.glassy)
+    added = 3 * volume**2 / (rates * np.sum(strengths / offsets**2, axis=1))
     return Prony(
-        glassy,
+        shear.glassy + 3 * volume * shear.glassy / (volume + shear.glassy),
         shear.fluidity,
-        tuple(compliances),
-        tuple(times),
+        (*shear.compliances, *added),
+        (*shear.times, *(1 / rates)),
         note=f"effective compliance J + 3B for an elastic bulk modulus of {bulk_modulus:g} Pa",
         stands_for="a body with an elastic bulk modulus, whose Poisson ratio changes in time",
     )
+
+
+def _merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Array]:
+    """Return positive weights and rates ``1/time``, with ascending rates and equal rates merged."""
+    positive = np.asarray(weights, dtype=float) > 0
+    rates, place = np.unique(1 / np.asarray(times, dtype=float)[positive], return_inverse=True)
+    return np.bincount(place, np.asarray(weights, dtype=float)[positive], rates.size).astype(float), rates
+
+
+def _secular_roots(strengths: Array, poles: Array, constant: float) -> tuple[Array, Array]:
+    """Return the zeros ``mu`` of ``constant + sum strengths / (poles - mu)``, and their offsets ``poles - mu``.
+
+    Parameters
+    ----------
+    strengths, poles : ndarray, shape (n,)
+        Positive strengths, and ascending poles.
+    constant : float
+        Not negative.
+
+    Returns
+    -------
+    zeros : ndarray, shape (m,)
+        One zero lies between each two poles, and one above the last pole if ``constant > 0``.
+    offsets : ndarray, shape (m, n)
+        Distances of the poles from each zero.
+
+    Notes
+    -----
+    With the distances ``a`` and ``b`` from the poles below and above, the ratio ``a / b`` of a zero is bisected on a
+    logarithmic scale, so that the offset of a zero close to a pole is accurate. The equivalent eigenproblem loses the
+    slow modes over many decades of rates (24 decades: a negative eigenvalue).
+    """
+    gaps, inner = np.diff(poles), np.arange(poles.size - 1)
+    if constant > 0:  # above the last pole: less than half of this gap
+        gaps = np.append(gaps, 2 * np.sum(strengths) / constant)
+    below = poles[: gaps.size]
+    low, high = np.full(gaps.size, 1 / _LARGEST_RATIO), np.full(gaps.size, _LARGEST_RATIO)
+    for _ in range(_BISECTIONS):
+        ratio = np.sqrt(low) * np.sqrt(high)
+        from_below = gaps / (1 + 1 / ratio)
+        offsets = (poles - below[:, None]) - from_below[:, None]
+        offsets[inner, inner + 1] = (gaps / (1 + ratio))[inner]
+        is_beyond = constant + np.sum(strengths / offsets, axis=1) > 0  # the function rises between two poles
+        low, high = np.where(is_beyond, low, ratio), np.where(is_beyond, ratio, high)
+    return below + from_below, offsets

@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import (
@@ -23,10 +24,12 @@ from roughvisc.mechanics.materials.creep import (
     check_material,
     pair,
     pair_creep,
+    power_creep,
 )
 from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: Number of times per decade at which a series is fitted, and at which its error is measured.
 _FITTED, _MEASURED = 30, 100
@@ -41,6 +44,9 @@ _LEVELLINGS = 6
 _IDLE = 3
 #: Terms whose part of the target is below this in all rows are left out.
 _UNSEEN = 1e-10
+#: Factor by which the times of a series must extend beyond the times of the frequencies, shorter and longer: a term
+#: whose time is a hundred times off contributes a hundredth of its loss.
+_BEYOND = 100.0
 #: Number of rows above which they are first reduced to a triangular factor.
 _MANY = 1000
 
@@ -70,8 +76,7 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     Raises
     ------
     InputError
-        If the range or the tolerance is not positive, the material is not known over the range, or its creep
-        compliance decreases.
+        If the material is not known over the range, or its creep compliance decreases.
 
     Notes
     -----
@@ -82,18 +87,12 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
     ----------
     .. [1] C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems*, Prentice-Hall, 1974, chapter 23.
     """
-    if not 0 < shortest <= longest < math.inf:
-        raise InputError(f"times are {shortest!r} to {longest!r} s: expected positive times in order")
-    if not 0 < tolerance < math.inf:
-        raise InputError(f"tolerance is {tolerance!r}: expected a positive number")
-    material = check_material(material)
     if isinstance(material, Prony) and material.longest == math.inf:
         return material, 0.0
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
     if isinstance(material, Creep) and material.function is pair_creep:
-        joined = pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters))
-        assert isinstance(joined, Prony)
+        joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
         return joined, _error(joined, instants, compliance)
     fits = _fits(material, instants, compliance, tolerance)
     error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
@@ -103,10 +102,9 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
 
 
 def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
-    """Yield series and their errors, from ever denser lattices of retardation times."""
-    shortest, longest = float(instants[0]), float(instants[-1])
-    glassy = float(material.creep_compliance(0.0))
-    t = _instants(shortest, longest, _FITTED)
+    """Yield errors and series, from ever denser lattices of retardation times."""
+    shortest, longest = instants[0], instants[-1]
+    glassy, t = float(material.creep_compliance(0.0)), _instants(shortest, longest, _FITTED)
     exact = material.creep_compliance(t)
     for faster in _FASTER:
         idle, reached = 0, math.inf
@@ -118,9 +116,9 @@ def _fits(material: Material, instants: Array, compliance: Array, tolerance: flo
             before, importance = reached, np.ones(t.size)
             for _ in range(_LEVELLINGS):
                 weights = nonnegative(columns, exact - glassy, exact / importance)
-                used = np.flatnonzero(weights[1:])
-                terms = tuple(weights[1:][used].tolist()), tuple(times[used].tolist())
-                found = Prony(glassy, float(weights[0]) / longest, *terms, material.poisson)
+                used = weights[1:] > 0
+                terms = tuple(weights[1:][used]), tuple(times[used])
+                found = Prony(glassy, float(weights[0] / longest), *terms, material.poisson)
                 error = _error(found, instants, compliance)
                 yield error, found
                 reached = min(reached, error)
@@ -167,3 +165,114 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
     seen = np.abs(scaled / norms).max(axis=0) * weights
     return np.where(seen > _UNSEEN, weights / norms, 0.0)
+
+
+def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
+    r"""Return the complex contact compliance: displacement over pressure if both oscillate as ``exp(i w t)``.
+
+    Parameters
+    ----------
+    material : Material
+        Series, power laws and pairs of these have closed forms. Any other material is replaced by a series, see
+        :func:`over_frequencies`.
+    frequency : array_like
+        Angular frequencies ``w``, of either sign. [1/s]
+
+    Returns
+    -------
+    ndarray of complex
+        ``C*(w)``, conjugate for frequencies of opposite sign, with a negative or zero imaginary part at positive
+        frequencies. At zero frequency the compliance after endless creep: real, or infinite if the material flows.
+        [1/Pa]
+
+    Raises
+    ------
+    InputError
+        If all frequencies are zero for a material without closed form, or a table ends before the times that the
+        frequencies need.
+
+    Notes
+    -----
+    With :math:`C(t) = \tfrac{1 - \nu}{2} J(t)`,
+
+    .. math:: C^*(\omega) = \frac{1-\nu}{2} \left[ J_0 + \sum_i \frac{J_i}{1 + i \omega \tau_i}
+              + \frac{\varphi}{i \omega} \right], \qquad
+              J^*(\omega) = J_0 + c\, \Gamma(1 + \alpha)\, (i \omega T)^{-\alpha}.
+
+    References
+    ----------
+    .. [1] J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed., Wiley, 1980, chapter 3.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.materials.models import zener
+    >>> found = complex_compliance(zener(1.0, 1.0, 1.0), [0.0, 1.0])  # C = 1/4 (1 + 1 / (1 + i w))
+    >>> found.real.tolist(), found.imag.tolist()
+    ([0.5, 0.375], [0.0, -0.125])
+    """
+    w = np.asarray(frequency, dtype=float)
+    material = over_frequencies(material, w)
+    if isinstance(material, Creep) and material.function is pair_creep:
+        return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
+    with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
+        found = 0.5 * (1 - material.poisson) * laplace_compliance(material, 1j * w)
+    return np.where(np.isfinite(found), found, complex(math.inf, 0.0))
+
+
+def laplace_compliance(material: Material, s: NDArray[Any]) -> NDArray[Any]:
+    """Return the shear compliance of a series or a power law under a pressure that grows as ``exp(s t)``.
+
+    Parameters
+    ----------
+    material : Material
+        Series, or power law.
+    s : ndarray
+        Real or complex rates. [1/s]
+
+    Returns
+    -------
+    ndarray
+        Shear compliance: ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
+    """
+    if isinstance(material, Creep):
+        glassy, coefficient, exponent, time_scale = material.parameters
+        crept = coefficient * math.gamma(1 + exponent) * (s * (material.time_factor * time_scale)) ** -exponent
+        return np.asarray((glassy + crept) / material.modulus_factor)
+    found = material.glassy + (material.fluidity / s if material.fluidity else 0 * s)
+    for compliance, time in zip(material.compliances, material.times, strict=True):
+        found = found + compliance / (1 + s * time)
+    return np.asarray(found)
+
+
+def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
+    """Return a material with a closed form of the complex compliance that replaces a material at some frequencies.
+
+    Parameters
+    ----------
+    material : Material
+        Series, power laws and pairs of these are returned unchanged. Measured creep is replaced by the series fitted
+        to it, any other material by a certified series.
+    frequency : array_like
+        Angular frequencies, of either sign. [1/s]
+    tolerance : float
+        Relative error of a series that replaces the material.
+
+    Raises
+    ------
+    InputError
+        See :func:`complex_compliance`.
+    """
+    material = check_material(material)
+    if isinstance(material, Creep) and material.function is pair_creep:
+        return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
+    if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
+        return material
+    size = np.abs(np.asarray(frequency, dtype=float))
+    size = size[size > 0]
+    if not size.size:
+        raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
+    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
+    if isinstance(material, Creep):
+        return series(material, shortest, longest, tolerance)[0]
+    material.creep_compliance(longest)  # refuses a table that ends earlier
+    return replace(material, longest=math.inf)

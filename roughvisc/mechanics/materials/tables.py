@@ -5,19 +5,17 @@ Each table is fitted by a positive series of exponentials (non-negative least sq
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.checks import Kind, checked_rows, tensile_to_shear
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.prony import Kind, Prony, tensile_to_shear
 from roughvisc.mechanics.materials.relaxation import relaxation_series
 from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, number, quantities
@@ -88,7 +86,7 @@ def creep_table(
     to a tenth of the first row at least.
     """
     factor = tensile_to_shear(kind, poisson)
-    t, values = checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
+    t, values = _checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
     number(noise, "1", "noise", least=0)
     for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
         raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
@@ -107,14 +105,16 @@ def creep_table(
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau, misfit = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
-    note = _note(tau.size, t.size, misfit, f"times {t[0]:g} to {t[-1]:g} s")
+    weights, tau, misfit, note = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
+    note += f", times {t[0]:g} to {t[-1]:g} s"
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
-    largest = float(np.abs(misfit).max())
-    fluidity, terms = float(weights[0] / rows[-1]), (tuple(weights[1:].tolist()), tuple(tau.tolist()))
-    found = Prony(glassy, fluidity, *terms, poisson, note, longest=float(t[-1]), warning=_gap("creep", rows))
-    return dataclasses.replace(found, misfit=largest) if largest > noise else found
+    about: dict[str, Any] = {
+        "longest": float(t[-1]),
+        "warning": _gap("creep", rows),
+        "misfit": misfit if misfit > noise else 0.0,
+    }
+    return Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau), poisson, note, **about)
 
 
 @quantities(times="s", moduli="Pa")
@@ -150,7 +150,7 @@ def relaxation_table(
     ``theta``; then :func:`~roughvisc.mechanics.materials.relaxation.relaxation_series`, which is exact. Outside the
     measured times its slowest and its fastest terms determine the series.
     """
-    t, values = checked_rows(("time", "modulus"), times, moduli)
+    t, values = _checked_rows(("time", "modulus"), times, moduli)
     for row in np.flatnonzero(values == 0)[:1]:
         raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
     shear = values / tensile_to_shear(kind, poisson)
@@ -160,7 +160,7 @@ def relaxation_table(
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
     fit = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
-    return _relaxing(fit, poisson, t.size, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
+    return _relaxing(fit, poisson, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -170,7 +170,7 @@ def dynamic_table(
     loss: Sequence[Quantity],
     *,
     frequency_unit: Literal["rad/s", "Hz"],
-    shift_factors: float | Sequence[float] | None = None,
+    shift_factors: float | Sequence[float] = 1.0,
     kind: Kind = "shear",
     poisson: float = 0.5,
 ) -> Prony:
@@ -185,8 +185,8 @@ def dynamic_table(
     frequency_unit : {"rad/s", "Hz"}
         Angular frequency, or cycles per second. It has no default, because the wrong unit changes all times by the
         factor 2 pi.
-    shift_factors : sequence of float, optional
-        ``a_T`` of each row (or one for all), the factor for its frequency.
+    shift_factors : float or sequence of float
+        ``a_T`` of each row, or one for all: the factor for its frequency.
     kind : {"shear", "tensile"}
         Which moduli; ``G = E / (2 (1 + nu))``.
     poisson : float
@@ -209,18 +209,17 @@ def dynamic_table(
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
     """
     one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
-    given = np.atleast_1d(np.asarray(frequencies, dtype=float))
-    factors = np.asarray(1.0 if shift_factors is None else shift_factors, dtype=float)
-    factors = np.full(given.size, factors) if factors.ndim == 0 else factors
+    factors = shift_factors if np.ndim(shift_factors) else np.full(np.size(frequencies), shift_factors)
     names = ("frequency", "storage modulus", "loss modulus", "shift factor")
-    given, elastic, viscous, factors = checked_rows(names, given, storage, loss, factors, ascending=False)
-    omega = given * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
+    omega, elastic, viscous, factors = _checked_rows(names, frequencies, storage, loss, factors, ascending=False)
+    omega = omega * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
     for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
     factor = tensile_to_shear(kind, poisson)
     elastic, viscous = elastic / factor, viscous / factor
-    size, order = np.hypot(elastic, viscous), np.argsort(omega, kind="stable")
-    again = np.diff(np.log(omega[order])) < _SAME_FREQUENCY
+    size, at = np.hypot(elastic, viscous), 1 / omega
+    order = np.argsort(at, kind="stable")
+    again = np.diff(np.log(at[order])) < _SAME_FREQUENCY
     apart = np.abs(np.diff(np.log(size[order]))) > np.log(_ONE_TEMPERATURE)
     for row in order[1:][again & apart][:1]:
         raise InputError(
@@ -235,22 +234,59 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    fit = _fitted(columns, 1 / omega, size, target, scale, _MODULI)
+    fit = _fitted(columns, at[order], size[order], target, scale, _MODULI)
     span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return _relaxing(fit, poisson, omega.size, span, _gap("dynamic", np.unique(1 / omega)))
+    return _relaxing(fit, poisson, span, _gap("dynamic", at[order]))
+
+
+def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
+    """Return the columns of a table of measurements as arrays.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the columns, for the messages; the first is the time or the frequency.
+    columns : array_like
+        Columns of equal length.
+    ascending : bool
+        Whether the first column must ascend.
+
+    Returns
+    -------
+    tuple of ndarray
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, there are fewer than two rows, a number is negative or not finite, or the first
+        column does not ascend; the message names the row, counted from 0.
+    """
+    arrays = tuple(np.asarray(column, dtype=float) for column in columns)
+    sizes = [array.size for array in arrays]
+    if any(array.ndim != 1 for array in arrays) or len(set(sizes)) > 1 or sizes[0] < 2:
+        found = ", ".join(f"{size} of {name}" for size, name in zip(sizes, names, strict=True))
+        raise InputError(f"table has {found}: expected as many, at least two")
+    for name, array in zip(names, arrays, strict=True):
+        for row in np.flatnonzero(~(np.isfinite(array) & (array >= 0)))[:1]:
+            raise InputError(f"table row {row}: {name} is {array[row]:g}: expected a finite number, not negative")
+    for row in np.flatnonzero(np.diff(arrays[0]) <= 0)[:1] + 1 if ascending else ():
+        again = f"{names[0]} {arrays[0][row]:g} after {arrays[0][row - 1]:g}"
+        expected = f"expected ascending {names[0]}; several temperatures? expected one, or a master curve"
+        raise InputError(f"table row {row}: {again}: {expected}")
+    return arrays
 
 
 def _fitted(
     columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, most: tuple[float, float]
-) -> tuple[Array, Array, Array]:
-    """Return the non-negative weights of a series, its times [s], and its relative misfit at the rows of a table.
+) -> tuple[Array, Array, float, str]:
+    """Return the non-negative weights of a series, its times [s], its largest relative misfit, and these in words.
 
     Parameters
     ----------
     columns : callable
         Function of the times of the terms; the first of its columns has no time.
     at, course : ndarray
-        Times of the measurements [s] and their values, by which the size of a term is judged.
+        Ascending times of the measurements [s] and their values, by which the size of a term is judged.
     target, scale : ndarray
         Target of the sum of the columns, and scale of the misfit of each row.
     most : tuple of float
@@ -261,8 +297,6 @@ def _fitted(
     The fit with the fewest terms among those with about the smallest misfit. If the rows are too few to determine the
     spectrum, neighbouring terms are fitted to differ little.
     """
-    order = np.argsort(at)
-    at, course = at[order], course[order]
     fits = []
     sparse = target.size - 1 < _FEW * np.log10(at[-1] / at[0])
     for per_decade in (_SMOOTH,) if sparse else _OFFERED:
@@ -274,28 +308,20 @@ def _fitted(
             smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
             rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
         weights = nonnegative(rows, wanted, np.ones(len(rows)))
-        misfit = (terms @ weights - target) / scale
-        used = np.flatnonzero(weights[1:])
-        fits.append((_rms(misfit), np.append(weights[0], weights[1:][used]), times[used], misfit))
+        misfit, used = np.abs((terms @ weights - target) / scale), np.append(True, weights[1:] > 0)
+        rms = float(np.sqrt(np.mean(misfit**2)))
+        fits.append((rms, float(misfit.max()), weights[used], times[used[1:]]))
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
-    return min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[1].size)[1:]
+    rms, largest, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[3].size)
+    count, misfits = np.count_nonzero(weights), f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
+    return weights, times, largest, f"{count} terms fitted to {target.size} values, {misfits}"
 
 
-def _relaxing(fit: tuple[Array, Array, Array], poisson: float, rows: int, span: str, warning: str) -> Prony:
+def _relaxing(fit: tuple[Array, Array, float, str], poisson: float, span: str, warning: str) -> Prony:
     """Return the material of a fit to a table of moduli."""
-    weights, theta, misfit = fit
-    found = relaxation_series(float(weights[0]), weights[1:].tolist(), theta.tolist())
-    note = _note(theta.size + 1, rows, misfit, span)
-    return dataclasses.replace(found, poisson=poisson, note=note, warning=warning)
-
-
-def _rms(misfit: Array) -> float:
-    return float(np.sqrt(np.mean(misfit**2)))
-
-
-def _note(terms: int, rows: int, misfit: Array, span: str) -> str:
-    misfits = f"largest misfit {np.abs(misfit).max():.2g}, rms {_rms(misfit):.2g} (relative)"
-    return f"{terms} terms fitted to {rows} rows, {misfits}, {span}"
+    weights, theta, _, note = fit
+    about = {"note": f"{note}, {span}", "warning": warning}
+    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
 
 
 def _gap(kind: str, times: Array) -> str:
@@ -304,12 +330,12 @@ def _gap(kind: str, times: Array) -> str:
     Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones.
     """
     ratios = times[1:] / times[:-1]
-    if not ratios.max(initial=1.0) > _DECADE:
+    if ratios.max(initial=1.0) <= _DECADE:
         return ""
-    before, after = (format_quantity(float(times[ratios.argmax() + i]), "s") for i in (0, 1))
-    why = "the material between is a guess, and stated errors do not include it"
+    before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
     return (
-        f"The {kind} table has no row between {before} and {after}, more than a decade: {why}. Use one row per decade."
+        f"The {kind} table has no row between {before} and {after}, more than a decade: the material between is a "
+        "guess, and stated errors do not include it. Use one row per decade."
     )
 
 

@@ -160,7 +160,7 @@ def test_relaxation_table__finds_the_creep(first):
     material = rv.relaxation_table(t, relaxation(t), poisson=0.4)
     assert distance(material) < 5e-3
     assert stated_misfit(material) < 0.01
-    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to {t.size} rows")
+    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to {t.size} values")
     assert material.note.endswith(f"times {t[0]:g} to 100 s")
     # the misfit stated is that of the rows
     misfit = np.abs(modulus(material, t) / relaxation(t) - 1).max()
@@ -200,7 +200,7 @@ def test_dynamic_table__finds_the_creep(unit, factor):
     material = rv.dynamic_table(omega / factor, *dynamic(omega), frequency_unit=unit, poisson=0.4)
     assert distance(material) < 0.01
     assert stated_misfit(material) < 0.02
-    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to 60 rows")
+    assert material.note.startswith(f"{len(material.times) + 1} terms fitted to 120 values")
     assert material.note.endswith("frequencies 0.01 to 10000 rad/s")
 
 

@@ -109,12 +109,3 @@ def test_series__of_a_pair_is_the_sum(factors):
     _, alone = series(bodies[0], 1e-3, 1e3, 1e-2)
     _, hidden = series(rv.pair(bodies[0], rv.elastic(1e-6)), 1e-3, 1e3, 1e-2)
     assert hidden < 1e-3 * alone
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [(0.0, 1.0, 1e-3), (2.0, 1.0, 1e-3), (1.0, np.inf, 1e-3), (1.0, 2.0, 0.0), (1.0, 2.0, np.nan), (1.0, 2e3, 1e-3)],
-)
-def test_series__refuses_a_range_that_is_none(wrong):
-    with pytest.raises(rv.InputError):
-        series(table(), *wrong)
