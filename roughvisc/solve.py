@@ -150,7 +150,7 @@ def solve(
                 report = bar.enter_context(reporting(doing, experiment.progress))
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         for subject, text in warnings_of(dataset.attrs).items():
-            if subject not in (*ISSUED, "accuracy"):
+            if subject not in ISSUED:
                 log.warning("%s", text)
         if settings.grid_error and isinstance(experiment, Loading):
             # coarser grids may have another area: convert nominal pressures to loads on the given area

@@ -25,7 +25,7 @@ from roughvisc.experiment.rows import (
     meets_tolerance,
     memory_of,
 )
-from roughvisc.experiment.warnings import loading_warnings
+from roughvisc.experiment.warnings import loading_warnings, table_warning
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.neighbours import contact_area
@@ -305,9 +305,8 @@ class LoadingRows(Rows):
         """Return the result with its attributes: the memory model, numbers for an audit, and warnings."""
         scene, choice, body = self.scene, self.choice, self.problem.body
         loaded = self._profile.height[self.domain.cells]
-        warnings = loading_warnings(
-            scene, self._profile, dataset, choice, body.materials, loaded=loaded, border=self._border
-        )
+        warnings = loading_warnings(scene, self._profile, dataset, choice, loaded=loaded, border=self._border)
+        warnings["material"] = table_warning(body.materials)
         attributes = Loading(scene.program).facts(body, self.problem.height)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
         if cycles := scene.program.cycles:  # for the work in each cycle

@@ -293,10 +293,10 @@ class SlidingRows(Rows):
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         warnings = {
             "slope": slope_warning(height, "periodic", np.inf),
-            "border": border_warning(height, xr.Dataset()),
+            "border": border_warning(height),
             "wake": wake_warning(left, self._grids[0].period),
+            "material": table_warning(self._body.materials),
         }
-        warnings["material"] = table_warning(self._body.materials)
         attributes = self._curve.facts(self.problem.body, height) | {"direction": self._curve.direction}
         if text := warnings_text(warnings):
             attributes["warnings"] = text

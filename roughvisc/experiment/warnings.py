@@ -23,27 +23,16 @@ Array = NDArray[np.float64]
 #: a period of 6 to 11 contact radii, with a retarded compliance of 1 and 9 times the instantaneous one: 0.4 to 0.6 % if
 #: 1e-6 of the creep is left, 5 to 6 % if 1 to 2 % are left, 26 % if 7 to 12 % are left.
 _LEFT = 0.01
-#: A result warns if the distance of a slide differs from the requested distance by more than this fraction.
-_SAME_DISTANCE = 1e-9
 #: A contact is a single one if a gap without contact spans at least this part of the period along the motion.
 _FREE = 0.25
 #: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat. The error
 #: is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, here 4.5 % (K. L. Johnson,
 #: Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
 LARGEST_SLOPE = 0.3
-#: A result warns about the accuracy of the pressure if less than this part of the compliance is instantaneous.
-_AT_ONCE = 0.1
 
 
 def loading_warnings(
-    scene: Scene,
-    profile: Profile,
-    dataset: xr.Dataset,
-    choice: Choice,
-    materials: Sequence[Material],
-    *,
-    loaded: xr.DataArray,
-    border: float | None,
+    scene: Scene, profile: Profile, dataset: xr.Dataset, choice: Choice, *, loaded: xr.DataArray, border: float | None
 ) -> dict[str, str]:
     """Return the warnings about a loading by subject; a text is empty if it does not apply.
 
@@ -55,28 +44,13 @@ def loading_warnings(
         The result.
     choice : Choice
         Memory of the body.
-    materials : sequence of Material
-        Materials of the body.
     loaded : DataArray
         Heights of the domain, the part of the surface on which the contact was solved. [m]
     border : float or None
         End of the first step in which contact reached the border of a free surface. [s]
     """
     boundary, end, limit = scene.grid.boundary, scene.program.duration, scene.tolerance
-    at_once, final = scene.memory.compliance(0.0), scene.memory.compliance(end)
-    jump = tolerance = seam = edge = series = ""
-    if at_once == 0:
-        jump = "The material has no instantaneous compliance: pressure, and force under a given approach, jump"
-    elif at_once < _AT_ONCE * final:
-        jump = (
-            f"Only {100 * at_once / final:.2g} % of the compliance is instantaneous: pressure, and force under a given "
-            "approach, nearly jump"
-        )
-    accuracy = (
-        f"{jump} in each cell that makes contact. The approach meets the tolerance; each row states its own error of "
-        "pressure, force and work."
-    )
-
+    tolerance = edge = series = ""
     errors = dataset["stated_error"].values
     missed = errors[errors > limit]
     if missed.size:
@@ -88,9 +62,6 @@ def loading_warnings(
             tolerance += " The time step is fixed, and not chosen by the tolerance."
         if scene.program.slides:
             tolerance += " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
-
-    if boundary == "periodic":
-        seam = border_warning(profile.height, dataset)
     if border is not None:
         edge = (
             f"Contact reached the border of the surface, first in the step to {border:.3g} s: there the surface acts "
@@ -104,35 +75,26 @@ def loading_warnings(
             f"{limit:g} (memory): no passive material comes nearer to it."
         )
 
-    slides, wakes, strokes = [], [], dict[int, list[tuple[float, float]]]()
-    for number, segment in enumerate(scene.program.segments):
-        if segment.slide is not None:
-            slide, cells = segment.slide, segment.slide.cells(profile.spacing)
-            strokes.setdefault(slide.axis, []).append((slide.distance, slide.distance / segment.duration))
-            real = cells * profile.spacing[slide.axis]
-            if abs(real - slide.distance) > _SAME_DISTANCE * slide.distance:
-                done, wanted = format_quantity(real, "m"), format_quantity(slide.distance, "m")
-                slides.append(f"program.{number} slides {done}, {cells} whole cells, of {wanted}")
-    for axis, runs in sorted(strokes.items()):
+    wakes, pressure = [], dataset["pressure"][-1].values if "pressure" in dataset else None
+    for axis in (0, 1):
         period = profile.height.shape[axis] * profile.spacing[axis]
-        if sum(distance for distance, _ in runs) < period / 2:  # the contact does not reach the next wake
-            continue
-        pressure = dataset["pressure"][-1].values if "pressure" in dataset else None
-        if stands_alone(profile.height, pressure, axis):
-            left = {speed: unrecovered(scene.memory.compliance(min(period / speed, end)), final) for _, speed in runs}
+        strokes = [one for one in scene.program.segments if one.slide is not None and one.slide.axis == axis]
+        distances = [one.slide.distance for one in strokes if one.slide is not None]
+        # on a shorter path the contact does not reach the next wake
+        if sum(distances) >= period / 2 and stands_alone(profile.height, pressure, axis):
+            speeds = [distance / one.duration for distance, one in zip(distances, strokes, strict=True)]
+            creep, final = scene.memory.compliance, scene.memory.compliance(end)
+            left = {speed: unrecovered(creep(min(period / speed, end)), final) for speed in speeds}
             wakes.append(wake_warning(left, period))
 
     approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
     return {
-        "accuracy": accuracy if jump else "",
         "tolerance": tolerance,
         "slope": slope_warning(loaded, boundary, approach),
-        "border": seam,
+        "border": border_warning(profile.height) if boundary == "periodic" else "",
         "edge": edge,
         "wake": " ".join(filter(None, wakes)),
-        "slide": "; ".join(slides),
         "series": series,
-        "material": table_warning(materials),
     }
 
 
@@ -141,27 +103,15 @@ def table_warning(materials: Sequence[Material]) -> str:
     return " ".join(dict.fromkeys(filter(None, (one.warning for one in materials))))
 
 
-def border_warning(height: xr.DataArray, dataset: xr.Dataset) -> str:
-    """Return a warning if opposite borders of a periodic surface do not meet, else ''.
-
-    Parameters
-    ----------
-    height : DataArray, dims (x, y)
-        The rigid profile. [m]
-    dataset : Dataset
-        The result. If it has the pressure, the warning gives the pressure of the outermost cells.
-    """
+def border_warning(height: xr.DataArray) -> str:
+    """Return a warning if opposite borders of a periodic surface [m] do not meet, else ''."""
     x, y = border_mismatch(height)
     if max(x, y) <= JUMP:
         return ""
-    note = f"The surface repeats with a step: opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as "
-    note += "neighbouring rows."
-    if "pressure" in dataset and float(dataset["force"][-1]) > 0:
-        last = dataset["pressure"].isel(time=-1)
-        sides = [last.isel({axis: [0, -1]}) for axis, jump in zip(("x", "y"), (x, y), strict=True) if jump > JUMP]
-        ratio = max(float(side.mean()) for side in sides) / float(last.mean())
-        note += f" The cells at the seam carry {ratio:.2g} times the mean pressure in the end."
-    return note + " Use boundary = 'mirror'."
+    return (
+        f"The surface repeats with a step: opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as "
+        "neighbouring rows. Use boundary = 'mirror'."
+    )
 
 
 def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:

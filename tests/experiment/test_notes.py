@@ -22,11 +22,6 @@ def test_accuracy__is_no_warning_if_every_row_keeps_the_tolerance():
     assert "warnings" not in ds.attrs
 
 
-@pytest.mark.parametrize("material", [rv.kelvin_voigt(1e6, 1e5), rv.zener(1e8, 1e6, 1e5)])
-def test_accuracy__warns_of_materials_with_little_instantaneous_compliance(material):
-    assert "instantaneous" in warnings_of(press(material).attrs)["accuracy"]
-
-
 @pytest.mark.filterwarnings("ignore:.*table:UserWarning")
 def test_series__warns_of_a_table_far_from_any_passive_material():
     """Creep that gathers speed; noise within the stated noise is no reason."""
@@ -54,8 +49,7 @@ def test_border__is_a_warning_for_periodic_surfaces_that_repeat_with_a_step(capl
     ds = pressed(part)
     warning = warnings_of(ds.attrs)["border"]
     assert warning in caplog.text
-    seam = [ds.pressure[-1].isel({axis: [0, -1]}).mean() for axis in ("x", "y")]
-    assert f"{float(max(seam) / ds.pressure[-1].mean()):.2g} times the mean pressure" in warning
+    assert "opposite borders" in warning
     for height, boundary in ((ROUGH, "periodic"), (rv.mirror(part), "periodic"), (part, "free")):
         assert "border" not in warnings_of(pressed(height, boundary).attrs)
 

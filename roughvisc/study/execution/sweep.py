@@ -171,7 +171,7 @@ def run_cases(
                     _record(outcome, distinct[outcome.key], folder)
                     display.ended(outcome)
                     for subject, text in warnings_of(outcome.entry.attributes).items() if outcome.entry else ():
-                        if subject not in ("accuracy", *warned):
+                        if subject not in warned:
                             warned.add(subject)
                             display.say(f"{text} (The log names all cases with a warning.)", outcome.key)
                     if outcome.error in FULL:  # further cases would also fail
