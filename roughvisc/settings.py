@@ -7,7 +7,7 @@ experiment follow from the fields.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -126,10 +126,7 @@ class Settings(Numerics):
                 times = tuple(np.unique(np.asarray(in_si(times, "s", "times"), dtype=float)).tolist())
             except (TypeError, ValueError) as error:  # an InputError is a ValueError
                 raise InputError(key="times", found=self.times, expected=expected) from error
-        try:
-            names = tuple(self.fields)
-        except TypeError:
-            names = (self.fields,)
+        names = tuple(self.fields) if isinstance(self.fields, Iterable) else (self.fields,)
         if not set(names) <= set(FIELDS):
             raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")
         grid_error = self.grid_error if self.grid_error == "auto" else bool(self.grid_error)

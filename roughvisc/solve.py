@@ -21,7 +21,6 @@ from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
-from roughvisc.mechanics.grid import on_threads, threads_of
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
 from roughvisc.variables import STEP, STEPPED, VARIABLES
@@ -85,14 +84,7 @@ class Recorder:
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""
-        frames = np.empty((len(rows), *shape))
-
-        def copy(part: slice) -> None:
-            for frame, row in zip(frames[part], rows[part], strict=True):
-                frame[...] = self._arrays[row][name]
-
-        on_threads(copy, len(rows), 1, threads_of(shape[0] * shape[1]))
-        return frames
+        return np.stack([self._arrays[row][name] for row in rows])
 
     def restart(self) -> None:
         """Delete all rows, because the solve starts again."""
@@ -192,7 +184,7 @@ def solve_on_grid(
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")
             recorder.restart()
-            reached, state, count = recorder.latest, outgrown.state, 0
+            reached, state, count = recorder.latest, outgrown.args[0], 0
 
 
 def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dataset:

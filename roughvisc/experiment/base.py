@@ -136,17 +136,7 @@ class Row:
 
 
 class Outgrown(Exception):
-    """Contact has outgrown the domain of a solve; the solve must restart on a larger domain.
-
-    Parameters
-    ----------
-    state : Any
-        State from which the rows restart.
-    """
-
-    def __init__(self, state: Any) -> None:
-        super().__init__("contact has outgrown the domain")
-        self.state = state
+    """Contact has outgrown the domain of a solve; the argument is the state from which the rows restart."""
 
 
 class Rows(ABC):

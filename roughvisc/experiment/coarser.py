@@ -37,8 +37,7 @@ def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> t
 def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataArray:
     """Return a surface on cells longer by about a factor. [m]
 
-    An indenter is generated again. Any other surface keeps the waves that the new cells can resolve, see
-    :func:`on_fewer_cells`.
+    An indenter is generated again. Any other surface keeps the waves that the new cells can resolve.
 
     Parameters
     ----------
@@ -51,12 +50,8 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
     """
     shape = (height.sizes["x"], height.sizes["y"])
     few = remade(height, coarser_shape(shape, factor, True))
-    return on_fewer_cells(height, coarser_shape(shape, factor, False), boundary) if few is None else few
-
-
-def on_fewer_cells(height: xr.DataArray, shape: tuple[int, int], boundary: Boundary) -> xr.DataArray:
-    """Return a surface with the waves that a coarser grid can resolve. [m]"""
-    return resample(height, shape, periodic={"periodic": True, "mirror": False}.get(boundary))
+    periodic = {"periodic": True, "mirror": False}.get(boundary)
+    return resample(height, coarser_shape(shape, factor, False), periodic=periodic) if few is None else few
 
 
 def _shares(cells: Array, onto: Array) -> Array:

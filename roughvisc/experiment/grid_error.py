@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import xarray as xr
@@ -27,6 +26,7 @@ from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.indenters import is_indenter
 from roughvisc.variables import GRID_ERROR, axis_of
 
+log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 #: Orders of convergence in the cell side: lowest accepted order and expected order. They are measured; for the pressure
 #: in the L1 norm. The mean gap converges like the displacements, but more slowly in free space. The counted area
@@ -100,30 +100,6 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
     return np.asarray(factor * difference / (ratio**order - 1))
 
 
-def grid_uncertainties(
-    runs: Sequence[Mapping[str, ArrayLike]], ratio: float, *, moving: bool = False
-) -> dict[str, Array]:
-    """Return the errors of several quantities due to the grid, relative to the largest value of the first run.
-
-    Parameters
-    ----------
-    runs : sequence of mapping
-        Quantity -> values over the rows, on two or three grids, the finest first.
-    ratio, moving
-        See :func:`grid_uncertainty`.
-    """
-    found = {}
-    for name, first in runs[0].items():
-        unit = float(np.fmax.reduce(np.abs(np.atleast_1d(first)), initial=1e-300))
-        values = [np.asarray(run[name], dtype=float) for run in runs]
-        near, *more = (np.abs(other - one) / unit for one, other in pairwise(values))
-        found[name] = grid_uncertainty(
-            name, near, more[0] if more else np.full_like(near, math.nan), ratio, moving=moving
-        )
-    return found
-
-
-log = logging.getLogger("roughvisc")
 Mask = NDArray[np.bool_]
 #: Largest error of the pressure (L1) per unit force on cells at the edge of the contact. The first is for edges on the
 #: material (measured 0.2 in the median, 0.5 in 5 % of the cases), the second for edges of the material, where the

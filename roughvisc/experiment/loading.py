@@ -22,7 +22,6 @@ from roughvisc.experiment.rows import (
     error_columns,
     kept_times,
     length_of,
-    meets_tolerance,
     memory_of,
 )
 from roughvisc.experiment.warnings import loading_warnings, table_warning
@@ -143,24 +142,20 @@ class LoadingRows(Rows):
         height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
         xp = arrays_of(settings.device)
         require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory=in_memory)
-        profile = Profile(height, settings.missing, body.kernel)
-        program = program.on_area(profile.area)
-        check_program(profile, body, program, settings)
+        given = Profile(height, settings.missing, body.kernel)
+        program = program.on_area(given.area)
+        check_program(given, body, program, settings)
 
-        enlarged, outgrown = (None, 0) if state is None else (state.enlarged, state.outgrown)
-        surface = choose_surface(profile, problem, program, enlarged, outgrown)
-        self.area, self._profile, self.domain = profile.area, surface.profile, surface.domain
-        self.reaches_border = surface.reaches_border
-        self.problem = replace(problem, height=surface.profile.height)
-        self._start = on_device(state, xp) if state else LoadingState(enlarged=surface.enlarged)
+        before = (None, 0) if state is None else (state.enlarged, state.outgrown)
+        profile, self.domain, enlarged, self.reaches_border = choose_surface(given, problem, program, *before)
+        self.area, self._profile, self.problem = given.area, profile, replace(problem, height=profile.height)
+        self._start = on_device(state, xp) if state else LoadingState(enlarged=enlarged)
         self._border = self._start.border
 
-        profile, cells = surface.profile, surface.domain.cells
-        gap = np.ascontiguousarray(profile.gap[cells])
-        present = None if profile.all_present else profile.present[cells]
+        gap = np.ascontiguousarray(profile.gap[self.domain.cells])
+        present = None if profile.all_present else profile.present[self.domain.cells]
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
-        keeps_pressure = not surface.domain.is_whole
-        self.choice = memory_of(body, program, settings, grid=grid, keeps_pressure=keeps_pressure)
+        self.choice = memory_of(body, program, settings, grid=grid, keeps_pressure=not self.domain.is_whole)
         log.info("memory: %s", self.choice.note)
         self.scene = Scene(
             grid=grid,
@@ -197,8 +192,9 @@ class LoadingRows(Rows):
             so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
             stated = error_columns(step, scene, self.choice.series_error, so_far)
             kept = scene.keeps(point.time)
-            if every:
-                kept = point.time in ends or meets_tolerance(step, scene, stated["stated_error"])
+            if every:  # the length of fixed steps and of steps in a slide cannot be reduced
+                is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
+                kept = point.time in ends or is_given or stated["stated_error"] <= scene.tolerance
             largest = so_far if kept else largest
             state, values, fields = None, {}, {}
             if step.is_end:
@@ -355,18 +351,12 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
                 f"{least:.2g} s, which the resolution of the time allows, and an end by {LARGEST:g} s"
             )
         if segment.slide is not None:
-            if boundary == "mirror":
-                raise InputError(
-                    key="boundary",
-                    found="mirror",
-                    expected="'periodic' for a program that slides, on the unfolded surface rv.mirror(height): mirror "
-                    "images would slide towards each other",
-                )
             if boundary != "periodic":
-                raise InputError(
-                    "boundary is 'free' and the program slides: in free space the wake of the profile leaves the grid "
-                    "at its back; expected boundary = 'periodic'"
-                )
+                why = "in free space the wake of the profile would leave the grid"
+                if boundary == "mirror":
+                    why = "mirror images would slide towards each other, unfold the surface by rv.mirror"
+                expected = f"'periodic' for a program that slides: {why}"
+                raise InputError(key="boundary", found=boundary, expected=expected)
             if number == 0:
                 raise InputError(f"{where} slides before there is a load: expected load, pressure or approach before")
             try:

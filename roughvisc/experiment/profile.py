@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -179,30 +178,9 @@ def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> D
     return whole if inside.mean() > LARGEST_PART else replace(whole, cells=cells, outside=float(gap[~inside].min()))
 
 
-class Surface(NamedTuple):
-    """Surface and domain of a run.
-
-    Attributes
-    ----------
-    profile : Profile
-        The surface; an indenter is enlarged until the expected contact does not reach its border.
-    domain : Domain
-        Part of the surface on which the contact is solved.
-    enlarged : int
-        Number of times that the surface was enlarged.
-    reaches_border : bool
-        Whether contact is expected at the border of a free surface.
-    """
-
-    profile: Profile
-    domain: Domain
-    enlarged: int = 0
-    reaches_border: bool = False
-
-
 def choose_surface(
     profile: Profile, problem: Problem, program: Program, enlarged: int | None = None, outgrown: int = 0
-) -> Surface:
+) -> tuple[Profile, Domain, int, bool]:
     """Return the surface of a run, enlarged if necessary, and its domain.
 
     Parameters
@@ -217,6 +195,17 @@ def choose_surface(
         Number of times to enlarge the surface. Default: as often as the estimate requires.
     outgrown : int
         Number of times that contact has outgrown the domain.
+
+    Returns
+    -------
+    profile : Profile
+        The surface; an indenter is enlarged until the expected contact does not reach its border.
+    domain : Domain
+        Part of the surface on which the contact is solved.
+    enlarged : int
+        Number of times that the surface was enlarged.
+    reaches_border : bool
+        Whether contact is expected at the border of a free surface.
     """
     body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
     times = enlarged or 0
@@ -229,7 +218,7 @@ def choose_surface(
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             approach, at_border = estimated(profile, compliance, program)
     domain = choose_domain(profile, body, approach * GROWTH**outgrown)
-    return Surface(profile, domain, times, at_border)
+    return profile, domain, times, at_border
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:

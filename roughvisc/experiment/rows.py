@@ -207,23 +207,17 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
     work = scene.stated[0] * abs(state.work_apart) + state.work_curved
     work += (OF_WORK * solved + series_error) * loaded * reached
-    time_error, pressure, force, approach = 0.0, solved, 0.0, 0.0
+    force = approach = 0.0
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + of_approach
         approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
-    relative = 0.0
-    if largest_force > 0:
-        time_error = max(apart.pressure, apart.force) / largest_force
-        pressure = (apart.pressure + solved * point.force + of_force) / largest_force
-        relative = force / largest_force
-    if largest_approach > 0:
-        time_error = max(time_error, apart.approach / largest_approach)
-        relative = max(relative, approach / largest_approach)
+    pressure = (apart.pressure + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
+    per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
     return {
-        "time_error": time_error,
-        "stated_error": max(pressure, relative),
+        "time_error": max(apart.pressure / per_force, apart.force / per_force, apart.approach / per_approach),
+        "stated_error": max(pressure, force / per_force, approach / per_approach),
         "residual": point.solver_error,
         "approach_error": approach,
         "work_error": work,
@@ -258,12 +252,3 @@ def area_error(step: Step, scene: Scene, pressure: Any, gap: Any, counted: float
         outside += scene.grid.cell_area * int(xp.count_nonzero(closing))
     lower, upper = area_bounds(counted, area, inside, outside)
     return float(max(area - lower, upper - area))
-
-
-def meets_tolerance(step: Step, scene: Scene, stated: float) -> bool:
-    """Return whether a step is a row if every step is kept: its stated error is within the tolerance.
-
-    Steps of a fixed length and steps of a slide are always rows, because their length cannot be reduced.
-    """
-    is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
-    return is_given or stated <= scene.tolerance

@@ -17,7 +17,7 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.grid_error import counting_error, grid_errors, grid_uncertainties, hidden_opening
+from roughvisc.experiment.grid_error import counting_error, grid_errors, grid_uncertainty, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.warnings import (
@@ -324,8 +324,12 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
     runs = []
     for cells, state in zip(grids, states, strict=True):
         area, gap = cells.areas(state.pressure > 0)[1], float(cells.opening(state).mean())
-        runs.append(dict(zip(_QUANTITIES, (state.power_force, area, state.approach, gap), strict=True)))
+        runs.append((state.power_force, area, state.approach, gap))
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
+    errors = {}
+    for name, values in zip(_QUANTITIES, np.transpose(runs), strict=True):
+        near, far = np.append(np.abs(np.diff(values)) / max(abs(values[0]), 1e-300), math.nan)[:2]
+        errors[name] = grid_uncertainty(name, near, far, ratio, moving=True)
 
     contact = found.pressure > 0
     hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
@@ -337,7 +341,6 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
     least = {
         "friction_force": apart if apart <= _MEANINGFUL else 0.0,
         "contact_area": max(hidden_area, counting),
-        "mean_gap": hidden_gap / (max(runs[0]["mean_gap"], hidden_gap) or 1.0),
+        "mean_gap": hidden_gap / (max(runs[0][-1], hidden_gap) or 1.0),
     }
-    errors = grid_errors(grid_uncertainties(runs, ratio, moving=True), least)
-    return {name: float(error) for name, error in errors.items()}
+    return {name: float(error) for name, error in grid_errors(errors, least).items()}
