@@ -287,15 +287,13 @@ class LoadingRows(Rows):
             if "gap" in names:
                 kept_fields["gap"] = np.where(profile.present, kept_fields["gap"], np.nan)
             return row, kept_fields
+        whole = {"pressure": np.zeros(domain.shape)}
         if "displacement" in names or "gap" in names:
-            whole = domain.displacement(effective)
-            whole[domain.cells] = to_host(displacement)
-            opening = np.maximum(profile.gap + whole - point.approach, 0.0)
-            opening[domain.cells] = to_host(gap)
-            kept_fields |= {"displacement": whole, "gap": opening}
-        if "pressure" in names:
-            kept_fields["pressure"] = domain.padded(kept_fields["pressure"])
-        return row, {name: kept_fields[name] for name in names}
+            whole["displacement"] = domain.displacement(effective)
+            whole["gap"] = np.maximum(profile.gap + whole["displacement"] - point.approach, 0.0)
+        for name, field in kept_fields.items():
+            whole[name][domain.cells] = field
+        return row, {name: whole[name] for name in names}
 
     def finish(self, dataset: xr.Dataset) -> xr.Dataset:
         """Return the result with its attributes: the memory model, numbers for an audit, and warnings."""

@@ -127,15 +127,11 @@ class Domain:
         """Whether the rectangle is the whole surface."""
         return math.isinf(self.outside)
 
-    def padded(self, field: Array) -> Array:
-        """Return a field of the rectangle on the whole surface, zero beyond it."""
-        whole = np.zeros(self.shape)
-        whole[self.cells] = field
-        return whole
-
     def displacement(self, effective: Array) -> Array:
         """Return the displacement of the whole surface under an effective pressure [-] on the rectangle. [m]"""
-        return self._whole.displacement(self.padded(effective))
+        whole = np.zeros(self.shape)
+        whole[self.cells] = effective
+        return self._whole.displacement(whole)
 
     def mean_displacement(self, effective: Array) -> float:
         """Return the mean displacement of the whole surface. [m]"""

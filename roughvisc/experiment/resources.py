@@ -50,10 +50,6 @@ class Available:
     size: float
     words: str
 
-    def fits(self, needed: float) -> bool:
-        """Return whether a case fits that needs a size of memory. [byte]"""
-        return needed <= PART * self.size
-
 
 def memory_available(device: str = "cpu") -> Available:
     """Return the memory of a device that is available to this process, and the origin of the limit."""
@@ -181,12 +177,6 @@ def march_bytes(
     return 8.0 * cells * (surface + frames + max(part * solved, frames))
 
 
-def least_rows(settings: Settings, program: Program) -> float:
-    """Return the least number of kept times."""
-    times = len(program.segments) if settings.times is None else settings.times
-    return float(times if isinstance(times, int) else len(times))
-
-
 def curve_bytes(settings: Settings, cells: float) -> float:
     """Return the memory of a friction curve at its peak, without interpreter and libraries. [byte]"""
     unfolded = 4 if settings.boundary == "mirror" else 1
@@ -208,7 +198,9 @@ def require_loading(
     """
     if math.prod(shape) < WORTH_ASKING:
         return
-    memory, rows = memory_of(body, program, settings).memory, least_rows(settings, program)
+    memory = memory_of(body, program, settings).memory
+    times = program.segments if settings.times is None else settings.times  # one row for each segment, or more
+    rows = times if isinstance(times, int) else len(times)
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
     in_memory = in_memory and settings.device == "cpu"  # kept fields are on the host
@@ -245,13 +237,13 @@ def too_large(shape: tuple[int, int], needed: Callable[[float], float], there: A
     there : Available
         Available memory.
     """
-    size = needed(math.prod(shape))
-    if there.fits(size):
+    size, fits = needed(math.prod(shape)), PART * there.size
+    if size <= fits:
         return ""
     fitting = "expected more memory, or a coarser grid"
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
         few = [math.ceil(count / stride) for count in shape]
-        if there.fits(needed(math.prod(few))):
+        if needed(math.prod(few)) <= fits:
             less = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(needed(math.prod(few)))}"
             fitting = f"what would fit: {less} (resample = {few} under [surface], rv.resample in Python)"
             break

@@ -52,17 +52,15 @@ LEAST_CHANGE = 0.1
 BUDGET, PLANNED = 0.7, 0.9
 #: Tolerance of the contact solver, as a part of the tolerance.
 SOLVER_SHARE = 0.2
-#: Least part of an error that counts as remaining after relaxation: other errors do not fade.
-LEAST_REMAINING = 0.02
-#: The same if cells leave the contact.
-RECEDING = 0.5
+#: Least part of an error that counts as remaining after relaxation, because other errors do not fade: usually, and if
+#: cells leave the contact.
+LEAST_REMAINING, RECEDING = 0.02, 0.5
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
 ORDER = 1.5
-#: A pair is rejected if the error that it adds exceeds the allowed error by this factor.
-REJECTED = 2.0
-#: A rejected pair is tried again in shorter steps. If that leaves more than this part of its error, the shorter pair is
-#: accepted: a cell that enters the contact makes the pressure jump, however short the pair is.
-REDUCED = 0.93
+#: A pair is rejected if the error that it adds exceeds the allowed error by the first factor. Shorter steps are tried.
+#: If they leave more than the second part of its error, the shorter pair is accepted: a cell that enters the contact
+#: makes the pressure jump, however short the pair is.
+REJECTED, REDUCED = 2.0, 0.93
 #: Shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
 #: the segment began.
 LANDING_PAIR = 0.01
@@ -101,10 +99,9 @@ UNCERTAIN = 0.1
 ENTERING = 2.5
 #: Rounding of displacements, relative to the largest displacement that the mean pressure could cause.
 ROUNDING = 1e-11
-#: Error of the time at which an open contact closes, as a part of the time to the next event.
-CLOSING = 1e-9
-#: Surfaces that are apart for less than this part of the time to the next event touch immediately.
-AT_ONCE = 1e-6
+#: Error of the time at which an open contact closes, as a part of the time to the next event. Surfaces that are apart
+#: for less than the second part of this time touch immediately.
+CLOSING, AT_ONCE = 1e-9, 1e-6
 
 
 @dataclass
@@ -398,22 +395,20 @@ def jump(scene: Scene, state: State, segment: Segment) -> State:
 def entered(scene: Scene, state: State, load: float | None = None) -> State:
     """Return the state at the start of the next segment, which takes a jump to a load. [N]"""
     segments, index = scene.program.segments, state.segment + 1
-    last, following = segments[index - 1], segments[index] if index < len(segments) else None
-    changes = following is not None and following.control != last.control
+    last, following = segments[index - 1], segments[min(index, len(segments) - 1)]
+    changes = following.control != last.control
     # without instantaneous compliance a corner of the approach is a jump of the load
     jumps = not scene.can_jump and (changes or last.control == "approach")
     points = []
     for point in (state.fine, state.coarse):
-        start = point.force if load is None or following is None else load
-        if following is not None and following.control == "approach":
-            start = point.approach
+        start = point.approach if following.control == "approach" else point.force if load is None else load
         is_late = load is not None or (jumps and point.force > 0)
         points.append(replace(without_past(point), start=start, is_late=is_late))
     # a corner of the histories without a jump: the pairs may keep their length
-    smooth = not changes and last.duration > 0 and last.slide is None and state.fine.force > 0 and not jumps
-    smooth = smooth and (following is None or (following.duration > 0 and following.slide is None))
+    lasting = all(segment.duration > 0 and segment.slide is None for segment in (last, following))
+    length = state.length if lasting and not changes and not jumps and state.fine.force > 0 else 0.0
     twice = points[1] if state.twice else None
-    return replace(state, fine=points[0], twice=twice, segment=index, length=state.length if smooth else 0.0)
+    return replace(state, fine=points[0], twice=twice, segment=index, length=length)
 
 
 def without_past(point: Point) -> Point:
@@ -437,18 +432,18 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     return Step(new, replace(apart, pressure=apart.pressure + shared), number, after)
 
 
-def before_closing(scene: Scene, state: State, step: Step) -> Step:
-    """Return a step between open surfaces, whose stated error is the largest force if they may already have closed.
+def step_apart(scene: Scene, state: State, closes: float) -> Step:
+    """Return a step between open surfaces, to the time at which they touch. [s]
 
     Without instantaneous compliance the force jumps when a surface closes on its former imprint. The time of the jump
-    is uncertain if the remaining gap is within the tolerance of the approach.
+    is uncertain if the remaining gap is within the tolerance of the approach. The stated error is then the largest
+    force.
     """
-    if scene.can_jump:
-        return step
+    step, largest = single_step(scene, state, closes), state.largest_force
     before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
-    if not left < min(before, scene.tolerance * state.largest_approach):
+    if scene.can_jump or left >= min(before, scene.tolerance * state.largest_approach):
         return step
-    return step._replace(difference=replace(step.difference, pressure=state.largest_force, force=state.largest_force))
+    return step._replace(difference=replace(step.difference, pressure=largest, force=largest))
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
@@ -459,7 +454,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     if fine.is_open:
         closes = closing_time(scene, state, segment, event)
         if closes > fine.time:
-            return [before_closing(scene, state, single_step(scene, state, closes))]
+            return [step_apart(scene, state, closes)]
     if scene.memory.is_elastic:
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
@@ -478,14 +473,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         middle, last = pair_ends(fine.time, length, event, next_event)
         taken = last - fine.time
         is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
-        first = take_step(scene, fine, middle, number, share=MAGNIFIED if is_soft and scene.keeps(middle) else 1.0)
-        share = MAGNIFIED if is_soft and scene.keeps(last) else 1.0
-        second = take_step(scene, first, last, number, share=share)
-        once = take_step(scene, coarse, last, number, guess=moved(scene, second, coarse, fine), share=share)
-        half, whole, other = first, second, once
-        if is_soft:
-            half, whole = end_value(scene, fine, first, number), end_value(scene, first, second, number)
-            other = end_value(scene, coarse, once, number)
+        first, half = step_of_pair(scene, fine, middle, number, is_soft)
+        second, whole = step_of_pair(scene, first, last, number, is_soft)
+        once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(scene, second, coarse, fine))
 
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
         apart = error_at(scene, fine, second, once, whole, other)
@@ -645,18 +635,23 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
     return ratio
 
 
-def end_value(scene: Scene, here: Point, point: Point, number: int) -> Point:
-    """Return the end of a step of a soft pair; at a kept time with the pressure at that time.
+def step_of_pair(
+    scene: Scene, here: Point, time: float, number: int, is_soft: bool, guess: Guess | None = None
+) -> tuple[Point, Point]:
+    """Return the point a step ahead, and the same point with the pressure at its time if it is kept.
 
-    A short additional step gives this pressure. The load is constant in it, or the approach changes as before.
+    The pressure of a soft step belongs to the step. A short additional step gives the pressure at its end. The load is
+    constant in it, or the approach changes as before. The other parameters are those of :func:`take_step`.
     """
-    if not (scene.keeps(point.time) and point.force > 0):
-        return point
-    ahead, value = END_STEP * (point.time - here.time), point.force
+    is_soft = is_soft and scene.keeps(time)
+    point = take_step(scene, here, time, number, guess=guess, share=MAGNIFIED if is_soft else 1.0)
+    if not (is_soft and point.force > 0):
+        return point, point
+    ahead, value = END_STEP * (time - here.time), point.force
     if scene.program.segments[number].control == "approach":
-        value = 2 * point.approach - scene.prescribed(number, point.time - ahead, point)
-    found = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
-    return replace(found, time=point.time, approach=point.approach, before=point.before)
+        value = 2 * point.approach - scene.prescribed(number, time - ahead, point)
+    found = take_step(scene, without_past(point), time + ahead, number, value, rule="constant")
+    return point, replace(found, time=time, approach=point.approach, before=point.before)
 
 
 def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:
