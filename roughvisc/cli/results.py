@@ -91,7 +91,6 @@ def table(results: Path, out: Path | None) -> None:
 @quantity("--thickness", "H", 'Actual thickness of the body modelled as a half-space: "5 mm".')
 @click.option("--base", help="How that body rests on its base: bonded or slipping. [default: bonded]")
 @quantity("--density", "RHO", 'Density of the body: "1100 kg/m^3".')
-@quantity("--linear-strain", "STRAIN", 'Strain limit of linear behaviour: 0.05, or "5 %".')
 @quantity("--heat-conductivity", "K", 'Heat conductivity of the body: "0.2 W/m/K".')
 @quantity("--volumetric-heat-capacity", "C", 'Heat capacity of the body: "1.8 MJ/m^3/K".')
 def audit(result: Path, **properties: Any) -> None:

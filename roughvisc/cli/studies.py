@@ -102,7 +102,7 @@ def run(
       roughvisc run focus_variation-study.toml --for "5 % mean_gap"
       roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
-    from roughvisc.study.execution.cluster import connect
+    from roughvisc.cli.study_options import connect
     from roughvisc.study.execution.run import result_folder
 
     cases = rv.read_cases(study)
@@ -126,7 +126,8 @@ def _chosen(
     case: Case, targets: tuple[str, ...], folder: Path, console: Console, plots: bool, **computing: Any
 ) -> Case:
     """Return the case with grid and tolerance for some target errors, and show the budget of each target."""
-    from roughvisc.study.target import choose, parse_targets
+    from roughvisc.cli.study_options import parse_targets
+    from roughvisc.study.target import choose
 
     tell = partial(say, console)
     want = parse_targets(targets)

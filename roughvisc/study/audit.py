@@ -120,25 +120,25 @@ class Scene:
         return [count * side for count, side in zip(self.period.shape, self.cells, strict=True)]
 
     @cached_property
-    def waves(self) -> tuple[float, float, float]:
-        """``sum |q| |h_q|^2`` [m], part of the rms slope from the last octave [-], and its longest wavelength [m].
+    def waves(self) -> tuple[float, float]:
+        """Part of the rms slope from the last octave of wavelengths [-], and the longest wavelength of this octave [m].
 
         In free space a cosine window is applied to the heights. NaN if the surface is flat or points are missing.
         """
         z = self.period.values - self.period.values.mean()
         if not np.ptp(z) > 0:
-            return math.nan, math.nan, math.nan
+            return math.nan, math.nan
         q_x, q_y, power, count = modes(hann(z) if self.boundary == "free" else z, self.cells)
         q = np.hypot(q_x, q_y)
         squares = count * q**2 * power
         begins = last_octave(q, squares)
         kept = float(squares[q <= begins].sum()) / float(squares.sum())
-        return float((count * q * power).sum()), 1 - math.sqrt(kept), 2 * np.pi / begins if begins else 0.0
+        return 1 - math.sqrt(kept), 2 * np.pi / begins if begins else 0.0
 
     @property
     def is_smooth(self) -> bool:
         """Whether the surface has no roughness: a smooth recipe, or wavelengths above a quarter of the shorter side."""
-        return is_analytic(self.period) or self.waves[2] > min(self.sides) / 2
+        return is_analytic(self.period) or self.waves[1] > min(self.sides) / 2
 
     @cached_property
     def loaded_slope(self) -> float:
@@ -266,7 +266,7 @@ def adhesion(scene: Scene) -> Found:
     """
     force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
     if scene.boundary != "free" and fraction > _MERGED:
-        raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots: see stickiness.")
+        raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots.")
     if not curvature * _FLAT * scene.half_width > 1:
         raise NotKnown("The contact is flat: its pull-off force is not estimated.")
     [w] = scene.need("work_of_adhesion")
@@ -274,21 +274,6 @@ def adhesion(scene: Scene) -> Found:
     pull = spots * 1.5 * math.pi * w / curvature
     held = f"{_counted(spots)} of mean radius {as_text(1 / curvature, 'm')} would hold {as_text(pull, 'N')} when"
     return pull / force, f"{held} pulled off."
-
-
-def stickiness(scene: Scene) -> Found:
-    r"""Work of adhesion over the elastic energy of full contact.
-
-    The energy per area is :math:`E^* \sum |q| |h_q|^2 / 4` over all waves of the surface. A softer surface stays
-    in full contact without a load.
-    """
-    if scene.boundary == "free" and scene.is_smooth:
-        return None
-    energy = scene.waves[0] / (4 * scene.late)
-    if math.isnan(energy):
-        raise NotKnown("Points are missing, or the surface is flat: the energy of full contact is not known.")
-    [w] = scene.need("work_of_adhesion")
-    return w / energy, f"Full contact stores {as_text(energy, 'J/m^2')} of elastic energy."
 
 
 def yielding(scene: Scene) -> Found:
@@ -321,12 +306,6 @@ def slope(scene: Scene) -> Found:
     """Rms slope of the loaded surface."""
     more = percent(scene.loaded_slope**2 / 2)
     return scene.loaded_slope, f"The loaded surface has {more} more area than its projection."
-
-
-def strain(scene: Scene) -> Found:
-    """Rms slope of the loaded surface over the largest strain at which the material is linear."""
-    largest, [linear] = scene.loaded_slope, scene.need("linear_strain")
-    return largest / linear, f"Strains are at most about {percent(largest)}, and on average {percent(0.2 * largest)}."
 
 
 def inertia(scene: Scene) -> Found:
@@ -370,7 +349,7 @@ def heating(scene: Scene) -> Found:
 
 def resolution(scene: Scene) -> Found:
     """Part of the rms slope from the last octave of wavelengths, about the part of the area that it removes."""
-    _, last, longest = scene.waves
+    last, longest = scene.waves
     complete = is_analytic(scene.period)
     if recipe_name(scene.period) == "self_affine":
         made = json.loads(scene.height.attrs["recipe"])["parameters"]
@@ -437,11 +416,9 @@ def percent(share: float) -> str:
 #: makes an assumption doubtful, and an effect of the size of the computed quantity breaks the assumption.
 _TABLE = (
     Limit(adhesion, 0.005, 0.3, "contact area 10 % larger; twice as large: Johnson, Kendall, Roberts (1971)"),
-    Limit(stickiness, 0.1, 1, "contact area 10 % larger; sticks without a load: Persson, Tosatti (2001)"),
     Limit(yielding, 1.6, 3, "first yield under a sphere; full plasticity: Johnson (1985), sections 6.1 and 6.3"),
     Limit(thickness, 0.1, 0.5, "10 % off; twice the true approach: Johnson (1985), section 5.8"),
     Limit(slope, 0.3, 1, "true area 4.5 % larger than projected; 50 % larger: Johnson (1985), section 4.1"),
-    Limit(strain, 1, 5, "largest strains exceed the linear range; the representative strain does: Tabor (1951)"),
     Limit(inertia, 0.1, 1, "10 % off the quasi-static value; 100 % off: Lysmer, Richart (1966); Cole, Huth (1958)"),
     Limit(heating, 1, 10, "retardation times a fifth shorter; six times shorter: Williams, Landel, Ferry (1955)"),
     Limit(resolution, 0.1, 0.5, "10 % of the area; half of it, and as much again for the next octave: Persson (2001)"),
@@ -526,7 +503,6 @@ class Audit:
     yield_strength="Pa > 0",
     thickness="m > 0",
     density="kg/m^3 > 0",
-    linear_strain="1 > 0",
     heat_conductivity="W/m/K > 0",
     volumetric_heat_capacity="J/m^3/K > 0",
 )
@@ -538,7 +514,6 @@ def audit(
     thickness: Quantity | None = None,
     base: Base | None = None,
     density: Quantity | None = None,
-    linear_strain: Quantity | None = None,
     heat_conductivity: Quantity | None = None,
     volumetric_heat_capacity: Quantity | None = None,
 ) -> Audit:
@@ -558,8 +533,6 @@ def audit(
         Contact of this body with its base; default: bonded.
     density : float or str, optional
         Density of the body. [kg/m3]
-    linear_strain : float, optional
-        Largest strain at which the material is linear. [-]
     heat_conductivity : float or str, optional
         Heat conductivity of the body. [W/(m K)]
     volumetric_heat_capacity : float or str, optional

@@ -27,7 +27,7 @@ from roughvisc.study.quantities import QUANTITIES, quantity_of
 from roughvisc.study.storage.folder import atomic_write, require_writable, result_path
 from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.topography.grid import spacing
-from roughvisc.units import is_quantity, number
+from roughvisc.units import number
 
 log = logging.getLogger("roughvisc")
 #: First and smallest tolerance over the target; largest and smallest tolerance of all.
@@ -65,29 +65,6 @@ def targets_of(want: Mapping[str, Any]) -> dict[str, float]:
     if not targets:
         raise InputError(key="want", found=dict(want), expected="a target such as {'contact_area': '1 %'}")
     return targets
-
-
-def parse_targets(texts: Sequence[str]) -> dict[str, str]:
-    """Return number -> wanted error from targets of ``--for`` such as ``1 % friction_coefficient``.
-
-    Raises
-    ------
-    InputError
-        If a text is not a target.
-
-    Examples
-    --------
-    >>> parse_targets(["1 % mean_gap"])
-    {'mean_gap': '1 %'}
-    """
-    found: dict[str, str] = {}
-    for text in texts:
-        amount, _, name = text.strip().rpartition(" ")
-        if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
-            expected = f"a target such as '1 % contact_area', once for each number, of {', '.join(QUANTITIES)}"
-            raise InputError(key="for", found=text, expected=expected)
-        found[name] = amount
-    return found
 
 
 def run(

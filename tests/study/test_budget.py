@@ -6,8 +6,8 @@ import xarray as xr
 from support import STUDY, case_of, refused
 
 import roughvisc as rv
+from roughvisc.cli.study_options import parse_targets
 from roughvisc.study.case import Case
-from roughvisc.study.target import parse_targets
 
 BALL = {
     "surface": {"generate": "sphere", "radius": 1e-3, "size": 2e-4, "shape": [45, 43]},

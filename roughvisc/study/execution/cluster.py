@@ -6,12 +6,9 @@ import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
-from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from roughvisc.errors import InputError, RoughviscError
+from roughvisc.errors import RoughviscError
 from roughvisc.experiment.resources import PART, PROCESS, cores
 
 if TYPE_CHECKING:
@@ -57,39 +54,6 @@ def local_client(processes: int) -> Iterator[Client]:
             yield client
 
 
-@contextmanager
-def connect(address: str | None = None, file: Path | None = None) -> Iterator[Client]:
-    """Yield a client of a running scheduler.
-
-    Parameters
-    ----------
-    address : str, optional
-        Address of the scheduler, such as ``tcp://host:8786``.
-    file : path, optional
-        File of ``dask scheduler --scheduler-file``, instead of the address.
-
-    Raises
-    ------
-    InputError
-        If the scheduler does not answer.
-    """
-    from distributed import Client
-    from distributed.utils import silence_logging_cmgr
-
-    if (address is None) == (file is None):
-        raise InputError("found both an address and a file of the scheduler: expected only one")
-    if file is not None and not file.is_file():
-        raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
-    try:
-        where = {"address": address} if file is None else {"scheduler_file": str(file)}
-        client = Client(**where, set_as_default=False, timeout="20s")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
-    quiet = partial(silence_logging_cmgr, logging.CRITICAL)  # the sweep reports a lost scheduler
-    with quiet("distributed"), quiet("distributed.client"), client:
-        yield client
-
-
 def default_client() -> Client | None:
     """Return the user's default client; None within a Dask task, whose cases run in its own process."""
     distributed = sys.modules.get("distributed")
@@ -101,21 +65,6 @@ def default_client() -> Client | None:
     with suppress(ValueError):
         return distributed.default_client()
     return None
-
-
-def require_same_version(client: Client) -> None:
-    """Refuse a cluster in which a worker has another version of roughvisc, or none.
-
-    Raises
-    ------
-    InputError
-        If a version differs; the message states the address of the worker and both versions.
-    """
-    here = metadata.version("roughvisc")
-    for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
-        version = found["packages"].get("roughvisc")
-        if version != here:
-            raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 
 
 def processes_that_fit(largest: float, most: int, free: float) -> int:

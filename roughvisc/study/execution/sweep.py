@@ -15,7 +15,7 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.labels import warnings_of
 from roughvisc.study.case import Case, program, read_cases
-from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each
+from roughvisc.study.execution.cluster import default_client, local_client, threads_each
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import (
@@ -209,7 +209,6 @@ def _computed(
 
     texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:
-        require_same_version(client)
         log.info("dashboard: %s", client.dashboard_link)
         yield from distribute(texts, folder, display, client, threads)
         return

@@ -8,8 +8,8 @@ import time
 import pytest
 from support import BALL, LOADS
 
+from roughvisc.cli.study_options import connect
 from roughvisc.study.case import read_cases
-from roughvisc.study.execution.cluster import connect
 
 
 @pytest.fixture

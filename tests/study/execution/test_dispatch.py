@@ -17,10 +17,11 @@ from distributed import Client, LocalCluster
 from support import BALL, LOADS, LONG, assert_same, numbers, refused
 
 import roughvisc as rv
+from roughvisc.cli.study_options import connect
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution import sweep as sweep_module
-from roughvisc.study.execution.cluster import connect, default_client
+from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.folder import record_path

@@ -14,10 +14,10 @@ import pytest
 import xarray as xr
 from support import BALL, LONG, assert_same, numbers, refused
 
+from roughvisc.cli.study_options import connect
 from roughvisc.errors import InputError, RoughviscError, TooLargeError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import sweep as sweep_module
-from roughvisc.study.execution.cluster import connect
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
 from roughvisc.study.storage.folder import record_path
