@@ -50,7 +50,7 @@ FIGURES = {
     },
     "friction": {
         "curve": lambda ds: rv.plot.friction(
-            ds.merge(rv.observables.persson(ds, Case.of_result(ds).body))
+            ds.merge(rv.observables.persson(ds, Case.from_json(ds.attrs["case"]).body))
         ),
         "maps": rv.plot.maps,
     },

@@ -61,11 +61,8 @@ def test_run__sweep_goes_on_after_a_case_that_fails(invoke, tmp_path):
     assert "Results: results/ball\nTable of cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
 
     before = record.stat().st_mtime_ns
-    status, out, err = invoke("run", "ball.toml", "--workers", 0, "-q")
-    assert (status, out, "--retry-failed" in err) == (1, "", True)
-    assert record.stat().st_mtime_ns == before
-    assert "--retry-failed" not in invoke("run", "ball.toml", "--workers", 0, "--retry-failed")[2]
-    assert record.stat().st_mtime_ns > before
+    assert invoke("run", "ball.toml", "--workers", 0, "-q")[:2] == (1, "")
+    assert record.stat().st_mtime_ns > before, "a failed case is tried again"
 
 
 def test_run__sweep_in_which_all_is_wrong_is_status_2(invoke):

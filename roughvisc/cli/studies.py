@@ -75,7 +75,6 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
 @click.option("--device", type=click.Choice(["cpu", "gpu"]), help="Where fields are computed. [default: as stated]")
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a Dask scheduler: tcp://host:8786.")
 @click.option("--scheduler-file", type=PATH, help="Scheduler file written by a Dask scheduler.")
-@click.option("--retry-failed", is_flag=True, help="Repeat cases that failed before.")
 @QUIET
 def run(
     study: Path,
@@ -90,8 +89,7 @@ def run(
 
     Writes one NetCDF file per case, named by the key of the case. A single case also gets two figures. The cases of a
     [sweep] run in parallel, on all cores of this machine or on the workers of a Dask scheduler. If a case fails, the
-    others continue. Repeat the command to resume an interrupted run: finished cases are not computed again, failed
-    ones only with --retry-failed.
+    others continue. Repeat the command to resume an interrupted run: finished cases are not computed again.
 
     With --for, the command chooses the grid and the tolerance: coarse to fine, until the total error of the result
     reaches the target. If no grid can reach it, the command names the sources of the error.
@@ -162,12 +160,12 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
     """Compute and summarise a sweep; raise its failure, if there is one."""
-    from roughvisc.cli.tables import realisations_tables, sweep_table
+    from roughvisc.cli.tables import sweep_table
     from roughvisc.study.execution.display import Display
     from roughvisc.study.execution.run import REFUSED
     from roughvisc.study.execution.sweep import run_cases
     from roughvisc.study.storage.folder import LOG
-    from roughvisc.study.storage.results_table import CASES, realisations_table
+    from roughvisc.study.storage.results_table import CASES
     from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
 
     found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
@@ -175,14 +173,11 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     with client.as_current() if client is not None else nullcontext(), console.status("observing"):
         rv.observe(cases, folder)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
-    if len(drawn := realisations_table(rv.to_table(folder))):
-        console.print(realisations_tables(drawn))
     for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
         say_path(console, what, path)
     bad = [outcome for outcome in outcomes if outcome.kind != "done"]
     for outcome in bad[:_SHOWN]:
-        again = ", as before (use --retry-failed to try again)" if outcome.reused and outcome.kind == "failed" else ""
-        complain(f"case {numbers[outcome.key]}{again}: {outcome.message}")
+        complain(f"case {numbers[outcome.key]}: {outcome.message}")
     if all(outcome.error in REFUSED for outcome in outcomes):
         raise Failure("no case could be computed: the input is invalid", 2)
     if bad:
@@ -221,7 +216,7 @@ def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, qu
 
 
 @click.command()
-@click.argument("study", metavar="STUDY|RESULT", type=PATH)
+@click.argument("study", type=PATH)
 @click.option(
     "--quantity", multiple=True, metavar="NAME", help="Quantity of the budget; may be repeated. [default: contact_area]"
 )
@@ -252,8 +247,8 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
     from roughvisc.study.neighbours import FOLDER
 
     names = list(known.pop("quantity")) or ["contact_area"]
-    case: Any = rv.open_result(study) if study.suffix == ".nc" else rv.read_study(study)
-    folder = out or (study.parent if study.suffix == ".nc" else result_folder(case)) / FOLDER
+    case = rv.read_study(study)
+    folder = out or result_folder(case) / FOLDER
     found = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
     for name in names:
         _show_budget(screen(quiet), found.sel(quantity=name), folder, name)

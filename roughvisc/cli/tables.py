@@ -15,14 +15,11 @@ from rich.text import Text
 
 from roughvisc.errors import printable
 from roughvisc.labels import cost_of
-from roughvisc.reports.realisations import realisation_rows
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, ERRORS, VARIABLES, axis_of, variables_in_table
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from roughvisc.study.execution.run import Outcome
     from roughvisc.topography.inspection import Inspection
 
@@ -114,18 +111,6 @@ def sweep_table(outcomes: Sequence[Outcome], total: int, title: str) -> Group:
         ("Cost: total wall time", readable(sum(one.seconds for one in outcomes if not one.reused), "s")),
     ]
     return two_columns(rows, title)
-
-
-def realisations_tables(table: pd.DataFrame) -> Group:
-    """Return the scatter of the realisations of a sweep; empty without realisations.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Result of :func:`roughvisc.study.storage.results_table.realisations_table`.
-    """
-    headings, rows, notes = realisation_rows(table)
-    return Group("", columns(headings, rows, ["quantity"]), *map(Text, notes)) if rows else Group()
 
 
 def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:

@@ -24,12 +24,10 @@ from roughvisc.plot import style
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
 from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
-from roughvisc.reports.realisations import realisation_rows
 from roughvisc.study.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import realisations_table, to_table
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
@@ -70,7 +68,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     InputError
         If there are zero results, or a Dataset comes without `out`.
     """
-    page: dict[str, Any] = {"failures": [], "figures": [], "realisations": ([], [], [])}
+    page: dict[str, Any] = {"failures": [], "figures": []}
     numbers: dict[str, int] = {}
     sources: list[Any] = [results]
     if isinstance(results, xr.Dataset):
@@ -84,7 +82,6 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             raise no_results(folder)
         numbers = numbers_of(cases)
         sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
-        page["realisations"] = realisation_rows(realisations_table(to_table(folder)))
         if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
     else:

@@ -189,13 +189,6 @@ class Case:
         return json.dumps({**self.tables, **{name: value for name, value in about.items() if value}})
 
     @classmethod
-    def of_result(cls, dataset: xr.Dataset) -> Case:
-        """Return the case of a result from its attribute ``case``."""
-        if "case" not in dataset.attrs:
-            raise InputError("the result does not record its case: expected a result of a study", key="case")
-        return cls.from_json(dataset.attrs["case"])
-
-    @classmethod
     def from_json(cls, text: str) -> Case:
         """Make a case from the JSON of :meth:`to_json`, which is also the attribute ``case`` of a result."""
         try:

@@ -273,7 +273,6 @@ def solve(
         client=client,
         workers=workers if client is None else None,
         threads=threads,
-        retry_failed=True,
     )
     for key, outcome in outcomes.items():
         if outcome.entry is None:
@@ -384,7 +383,7 @@ def together(table: xr.Dataset, side: int) -> Array:
 
 @quantities(modulus_error="1", time_scale_error="1", cutoff="m")
 def budget(
-    case: Case | str | Path | xr.Dataset,
+    case: Case | str | Path,
     quantity: str | Sequence[str] = "contact_area",
     *,
     modulus_error: Quantity | None = None,
@@ -400,8 +399,8 @@ def budget(
 
     Parameters
     ----------
-    case : Case, path or xarray.Dataset
-        A case, its study file, or a result, whose attribute ``case`` contains the case.
+    case : Case or path
+        A case, or its study file.
     quantity : str or sequence of str
         ``contact_area``, ``mean_gap``, ``approach``, ``force``, ``friction_coefficient``, ``leak_rate`` or
         ``thermal_conductance``. The table ``observe`` of the study states the fluid or the conductivities.
@@ -431,7 +430,7 @@ def budget(
     Raises
     ------
     InputError
-        If the input is invalid, the result contains no case, or its case has no such quantity.
+        If the input is invalid, or the results of the case have no such quantity.
     RoughviscError
         If a solve fails.
 
@@ -450,12 +449,9 @@ def budget(
     names = [quantity] if isinstance(quantity, str) else list(quantity)
     if not names:
         raise InputError(key="quantity", found=names, expected="at least one")
-    path = None
-    if isinstance(case, xr.Dataset):
-        path, case = case.encoding.get("source"), Case.of_result(case)
-    elif not isinstance(case, Case):
+    if not isinstance(case, Case):
         case = read_study(case)
-    finished = Path(path or result_path(result_folder(case), case.key))
+    finished = result_path(result_folder(case), case.key)
     folder = Path(out).expanduser() if out is not None else finished.parent / FOLDER
     observed = [quantity_of(case, name) for name in names]
     base, own = with_kept(case, [field for one in observed for field in one.fields]), None

@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.observables import study_observables
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.storage.folder import lock_case, lock_path, require_writable, result_path
+from roughvisc.study.storage.folder import lock_case, lock_path, result_path
 from roughvisc.study.storage.netcdf import open_result, write_result
 from roughvisc.study.storage.results_table import write_table
 
@@ -72,10 +72,8 @@ def observe(
 
 def _add(case: Case, path: Path) -> bool:
     """Add the missing quantities of one case to its file; return whether any was missing."""
-    with open_result(path) as result:
-        if not _lacking(case, result):
-            return False
-    require_writable(path.parent, f"since {path.name} lacks what is to be observed")
+    if not _lacking(case, open_result(path)):
+        return False
     with lock_case(lock_path(path.parent, case.key)), open_result(path) as result:  # read again: it may have changed
         lacking = _lacking(case, result)
         frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame

@@ -153,12 +153,14 @@ def test_solves__are_kept(tmp_path, monkeypatch):
     xr.testing.assert_identical(stated(study, tmp_path, modulus_error=0.05), first)
 
 
-def test_result__gives_its_case_and_its_rows(tmp_path):
-    result = rv.run(case(BALL, tmp_path), out=tmp_path / "results", progress=False)
-    found = rv.budget(result, ["contact_area", "approach"], workers=0, progress=False)
+def test_finished_result__is_used(tmp_path):
+    study = case(BALL, tmp_path)
+    result = rv.run(study, progress=False)
+    found = rv.budget(study, ["contact_area", "approach"], workers=0, progress=False)
     assert found["time"].values.tolist() == [0.0, 1.0]
     assert float(found["value"][0, -1]) == float(result["contact_area"][-1])
-    assert len(list((tmp_path / "results" / "budget").glob("*.nc"))) == 2, "two coarser grids, and not the case again"
+    (folder,) = (tmp_path / "results").glob("*/budget")
+    assert len(list(folder.glob("*.nc"))) == 2, "two coarser grids, and not the case again"
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.realisations import over_realisations
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import realisations_table, to_table
+from roughvisc.study.storage.results_table import to_table
 from roughvisc.study.storage.sweep_data import open_results
 
 
@@ -128,15 +128,6 @@ def test_sweep__realisations_are_a_dimension_that_grows(study, tmp_path):
     table = to_table(out)
     assert table["realisation"].tolist() == [1, 2, 3] * 2
     assert table.index.tolist() == [0, 0, 0, 1, 1, 1]
-    area = over_realisations(again["contact_area"]).isel(time=-1)
-    told = realisations_table(table).set_index(["quantity", "program.0.pressure [Pa]"])
-    assert "nominal_pressure" not in told.index, "what is prescribed scatters nowhere"
-    for number, pressure in enumerate((1e4, 2e4)):
-        row = told.loc["contact_area", pressure]
-        for name in ("mean", "standard_deviation", "lower", "patch_upper"):
-            assert row[name] == pytest.approx(float(area[name][number]), rel=1e-6), name
-        assert row["case"] == number == area["case"][number]
-        assert (row["count"], row["unit"], row["where"]) == (3, "m^2", "end")
 
 
 def test_realisations__of_a_study_in_which_nothing_else_varies(study, tmp_path):

@@ -6,9 +6,10 @@ import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib import metadata
 from typing import TYPE_CHECKING
 
-from roughvisc.errors import RoughviscError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import PART, PROCESS, cores
 
 if TYPE_CHECKING:
@@ -65,6 +66,21 @@ def default_client() -> Client | None:
     with suppress(ValueError):
         return distributed.default_client()
     return None
+
+
+def require_same_version(client: Client) -> None:
+    """Refuse a cluster in which a worker has another version of roughvisc, or none.
+
+    Raises
+    ------
+    InputError
+        If a version differs; the message states the address of the worker and both versions.
+    """
+    here = metadata.version("roughvisc")
+    for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
+        version = found["packages"].get("roughvisc")
+        if version != here:
+            raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 
 
 def processes_that_fit(largest: float, most: int, free: float) -> int:

@@ -59,7 +59,7 @@ class Display:
             self._running.pop(outcome.key, None)
             self._bars.close(self._names[outcome.key])
             self._move()
-        if outcome.kind != "done" and not outcome.reused:
+        if outcome.kind != "done":
             self.say(f"{outcome.kind}: {outcome.message}", outcome.key)
 
     def say(self, text: str, key: str = "") -> None:

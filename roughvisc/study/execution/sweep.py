@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.labels import warnings_of
-from roughvisc.study.case import Case, program, read_cases
-from roughvisc.study.execution.cluster import default_client, local_client, threads_each
+from roughvisc.study.case import Case, read_cases
+from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import (
     log_file,
     record_failure,
     record_path,
-    recorded_failure,
     require_writable,
     write_json,
 )
@@ -42,16 +41,15 @@ def sweep(
     out: str | Path | None = None,
     client: Client | None = None,
     *,
-    retry_failed: bool = False,
     progress: bool = True,
     workers: int | None = None,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Compute many cases, store each in a file, and open the results together.
 
-    Finished cases are not computed again, and identical cases are computed once. Repeat the call to resume. In a
-    script, call it below ``if __name__ == "__main__":``, because the workers of the default cluster are processes that
-    import the script.
+    Finished cases are not computed again, and identical cases are computed once. Repeat the call to resume; failed
+    cases are tried again. In a script, call it below ``if __name__ == "__main__":``, because the workers of the default
+    cluster are processes that import the script.
 
     Parameters
     ----------
@@ -64,8 +62,6 @@ def sweep(
         Client of the cluster. Default: the default client, which ``Client()`` sets. If there is none, or `workers` is
         given, a cluster on this machine, or this process for a single case. The cluster has one process per core, or
         fewer processes with more threads each if the memory is too small.
-    retry_failed : bool
-        Compute cases that failed before again.
     progress : bool
         Show a progress bar.
     workers : int, optional
@@ -100,7 +96,6 @@ def sweep(
         folder,
         client=client,
         workers=workers,
-        retry_failed=retry_failed,
         threads=threads,
         display=Display(progress),
     )
@@ -120,7 +115,6 @@ def run_cases(
     display: Display,
     client: Client | None = None,
     workers: int | None = None,
-    retry_failed: bool = False,
     threads: int | None = None,
 ) -> dict[str, Outcome]:
     """Compute the cases without a result; see :func:`sweep`.
@@ -156,8 +150,6 @@ def run_cases(
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
-            elif (failed := recorded_failure(folder, key)).get("source") == program() and not retry_failed:
-                outcomes[key] = Outcome(key, "failed", failed["message"], failed["error"], reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
         display.begin(cases, numbers_of(listed))
@@ -209,6 +201,7 @@ def _computed(
 
     texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:
+        require_same_version(client)
         log.info("dashboard: %s", client.dashboard_link)
         yield from distribute(texts, folder, display, client, threads)
         return

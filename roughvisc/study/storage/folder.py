@@ -55,8 +55,9 @@ def result_files(folder: Path) -> list[Path]:
 
 
 def no_results(folder: Path) -> InputError:
-    """Return the error of a folder without a result."""
-    return InputError(f"{folder}: holds no results: expected files .nc, as roughvisc run writes them")
+    """Return the error of a path that is not a folder with results."""
+    found = "holds no results" if folder.is_dir() else "is a file" if folder.exists() else "does not exist"
+    return InputError(f"{folder}: {found}: expected a folder with results (.nc), as roughvisc run writes them")
 
 
 def results_at(place: Path) -> list[Path]:
@@ -90,18 +91,6 @@ def require_writable(folder: Path, why: str = "") -> None:
         needed = f", {why}" if why else ""
         text = f"{there}: is not writable: expected a folder with write permission{needed}"
         raise InputError(text, transient=True)
-
-
-def require_folder(folder: Path) -> None:
-    """Refuse a path that is not a folder.
-
-    Raises
-    ------
-    InputError
-        If the folder is absent, or is a file.
-    """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: {'is a file' if folder.exists() else 'does not exist'}: expected a results folder")
 
 
 def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc)") -> InputError:

@@ -30,8 +30,8 @@ from roughvisc.study.storage.folder import (
     checkpoint_path,
     lock_case,
     lock_path,
+    no_results,
     read_json,
-    require_folder,
     result_path,
     write_json,
 )
@@ -126,12 +126,7 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
     known : iterable of Entry
         Entries of results that need not be opened.
 
-    Raises
-    ------
-    InputError
-        If the folder is absent, or a file.
     """
-    require_folder(folder)
     cached = _read_cache(folder)
     before = cached | {entry.file: entry for entry in known}
     entries = {}
@@ -188,7 +183,8 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
         If the folder does not exist.
     """
     folder = Path(folder)
-    require_folder(folder)
+    if not folder.is_dir():
+        raise no_results(folder)
     removed: list[Path] = []
 
     def remove(path: Path) -> None:

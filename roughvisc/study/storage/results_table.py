@@ -13,12 +13,10 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.observables.frames import expect_result
-from roughvisc.study.realisations import over_realisations
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
 from roughvisc.study.study_file import unit_of
-from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ERRORS, GRID_ERROR, VARIABLES, axis_of, variables_in_table
 
 if TYPE_CHECKING:
@@ -96,40 +94,6 @@ def write_table(folder: Path) -> None:
             to_table(folder).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
     except (OSError, InputError) as error:
         log.warning("%s cannot be written: %s", folder / CASES, error)
-
-
-def realisations_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return mean, scatter and intervals over the realisations of each case, with one row per quantity.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        Result of :func:`to_table`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Number of the case and varied parameters as in :func:`to_table`; the quantity, its unit and its row; then the
-        variables of :func:`roughvisc.over_realisations`. The table omits prescribed quantities.
-    """
-    import pandas as pd
-
-    rows = []
-    varied = [name for name in table if "." in name.partition(" [")[0] and name not in DRAWN]
-    telling = AXES["speed" if "speed [m/s]" in table else "time"].telling
-    where = f"largest {telling}" if telling else "end"
-    drawn = table[table[REALISATION].notna()] if REALISATION in table else table[:0]
-    for case, group in drawn.groupby(level="case"):
-        for name in variables_in_table("last"):
-            values = group.get(heading(name, VARIABLES[name].units), pd.Series(dtype=float)).to_numpy()
-            known = values[np.isfinite(values)]
-            if name in AXES or not known.size or np.ptp(known) <= _ALIKE * abs(known).max():
-                continue
-            found = over_realisations(xr.DataArray(values, {REALISATION: group[REALISATION].to_numpy()}, name=name))
-            what = {"case": case, **group[varied].iloc[0]}
-            what |= {"quantity": name, "unit": VARIABLES[name].units, "where": where}
-            rows.append(what | {str(key): one.item() for key, one in found.data_vars.items()})
-    return pd.DataFrame(rows)
 
 
 def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:

@@ -297,5 +297,5 @@ def test_open_results__numbers_strings_and_what_some_cases_lack(study, tmp_path)
 def test_open_results__nothing_there(tmp_path):
     with pytest.raises(InputError, match="holds no results"):
         rv.open_results(tmp_path)
-    with pytest.raises(InputError, match="does not exist: expected a results folder"):
+    with pytest.raises(InputError, match="does not exist: expected a folder with results"):
         rv.open_results(tmp_path / "gone")
