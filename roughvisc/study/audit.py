@@ -40,8 +40,6 @@ Array = NDArray[np.float64]
 HOLDS, DOUBTFUL, BROKEN, NOT_KNOWN = VERDICTS = ("holds", "doubtful", "broken", "not known")
 #: Width of the printed table, which fits into a page of the documentation.
 _WIDTH = 98
-#: Numbers below it are shown as zero.
-_LEAST = 1e-9
 #: Relative rounding of loads.
 _ROUNDING = 1e-9
 #: Contact fraction above which the contact spots have merged.
@@ -462,7 +460,7 @@ class Finding:
     @property
     def shown(self) -> str:
         """The number to two digits, tiny numbers as 0; empty if it is not known."""
-        return "" if math.isnan(self.number) else f"{float(f'{max(self.number, _LEAST) - _LEAST:.2g}'):g}"
+        return "" if math.isnan(self.number) else f"{float(f'{round(max(self.number, 0.0), 9):.2g}'):g}"
 
 
 @dataclass(frozen=True)

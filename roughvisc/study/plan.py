@@ -76,8 +76,6 @@ _BUDGET, _SHARE = 1.2, 0.05
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
 #: Work of the run on a coarser grid for the grid error, over the work of the run. [-]
 _GRID_ERROR = 0.3
-#: Contact fraction that counts as full contact.
-_FULL = 0.95
 #: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
 _VARIABLES = {"curve": 90e3, "load": 122e3, "slide": 147e3}
 #: Size of a row without its fields. [byte]
@@ -108,8 +106,8 @@ def plan(
         each; ``wall_time`` in one process with one thread [s]; ``memory`` of the process at its peak and ``disk``, the
         size of the result [byte]; the largest ``contact_fraction`` and ``nominal_pressure`` [Pa], if the case had a
         coarse run. ``marched``: whether it had, or the numbers are from the nearest case. ``note``: how a measured
-        history became segments, and times that are left out. ``warning``: expected full contact, or contact at the
-        border, which ends a run. ``refusal``: why it cannot run.
+        history became segments, and times that are left out. ``warning``: expected contact at the border, which ends a
+        run. ``refusal``: why it cannot run.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
         thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, and
         ``refusal``, empty if all cases can run.
@@ -404,8 +402,6 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
             "Contact is expected to reach the border of the free-space domain, which ends a run: use boundary = "
             "'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = 'accept'."
         )
-    elif fraction >= _FULL:
-        warning = f"Full contact is expected: {100 * fraction:.0f} % of the area."
     return {
         "model": model,
         "cells_x": whole.shape[0],

@@ -24,7 +24,7 @@ from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
 from roughvisc.study.quantities import QUANTITIES, quantity_of
-from roughvisc.study.storage.folder import atomic_write, require_writable, result_path
+from roughvisc.study.storage.folder import atomic_write, result_path
 from roughvisc.study.storage.netcdf import write_dataset
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
@@ -121,7 +121,6 @@ def choose(
     targets = targets_of(want)
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
-    require_writable(folder, "since what is wanted takes several solves")
     height, smallest = case.height(), min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)

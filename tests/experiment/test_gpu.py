@@ -105,12 +105,12 @@ def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name,
     problem = Problem(height, as_body(body), settings)
     whole = solve(problem, Loading(program))
     count = iter(range(1000))
-    stopped = CheckpointWriter(tmp_path / "run", "key", seconds=0, stop=lambda: next(count) == 4)
+    stopped = CheckpointWriter(tmp_path / "run", seconds=0, stop=lambda: next(count) == 4)
     with pytest.raises(KeyboardInterrupt):
         solve(problem, Loading(program), stopped)
     stopped.save()
     stopped.close()
-    resumed = CheckpointWriter(tmp_path / "run", "key")
+    resumed = CheckpointWriter(tmp_path / "run")
     resumed.resume()
     assert 0 < resumed.latest.done < program.duration
     found = solve(problem, Loading(program), resumed).load()

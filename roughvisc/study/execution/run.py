@@ -168,7 +168,7 @@ def run_case(
         unfinished = checkpoint_path(folder, case.key)
         with (
             lock_case(lock_path(folder, case.key)),
-            closing(CheckpointWriter(unfinished, case.key, seconds=checkpoint_seconds, stop=stop)) as keeper,
+            closing(CheckpointWriter(unfinished, seconds=checkpoint_seconds, stop=stop)) as keeper,
         ):
             for torn in folder.glob(f".{case.key}.*.part.nc"):
                 torn.unlink()

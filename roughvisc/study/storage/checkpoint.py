@@ -24,10 +24,8 @@ from numpy.typing import NDArray
 from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
-from roughvisc.study.case import NUMERICS_REVISION
 from roughvisc.study.storage.folder import DAMAGED, atomic_write
 from roughvisc.study.storage.netcdf import lazy
-from roughvisc.variables import RESULT_FORMAT
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
@@ -50,9 +48,7 @@ class CheckpointWriter(Recorder):
     Parameters
     ----------
     folder : path
-        Folder of this run alone; created if necessary.
-    key : str
-        Key of the case.
+        Folder of this run alone, named by the key of the case; created if necessary.
     seconds : float
         Time between checkpoints, which is extended until writing takes at most a twentieth.
     stop : callable or None
@@ -61,13 +57,10 @@ class CheckpointWriter(Recorder):
 
     in_memory = False
 
-    def __init__(
-        self, folder: Path, key: str, *, seconds: float = 30.0, stop: Callable[[], bool] | None = None
-    ) -> None:
+    def __init__(self, folder: Path, *, seconds: float = 30.0, stop: Callable[[], bool] | None = None) -> None:
         super().__init__()  # keeps the rows that are not in a file yet
         folder.mkdir(exist_ok=True)
         self._folder = folder
-        self._owner = {"key": key, "revision": NUMERICS_REVISION, "result_format": RESULT_FORMAT}
         self._interval, self._stop = seconds, stop
         self._saved, self._last_save = self.latest, time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
@@ -103,24 +96,22 @@ class CheckpointWriter(Recorder):
         return self._reading[1][f"{row}/{name}"]
 
     def resume(self) -> None:
-        """Continue from the checkpoint if it is undamaged and belongs to this case, otherwise from the start."""
+        """Continue from the checkpoint if it is undamaged, otherwise from the start."""
         path = self._folder / STATE
         if path.exists():
             try:
                 plain = _read(path)
                 ends = plain["ends"]
-                if plain["owner"] == self._owner:
-                    rows = []
-                    for number, end in enumerate(ends[1:]):
-                        rows += _read(self._rows_path(number))[: end - len(rows)]
-                    if len(rows) != ends[-1]:
-                        raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
-                    self.latest = self._saved = plain["reached"]
-                    count = self.latest.rows  # rows after the state are computed again
-                    self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
-                    log.info("%s: goes on from here", path)
-                    return
-                log.warning("%s: belongs to another case or revision and is not used", path)
+                rows = []
+                for number, end in enumerate(ends[1:]):
+                    rows += _read(self._rows_path(number))[: end - len(rows)]
+                if len(rows) != ends[-1]:
+                    raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
+                self.latest = self._saved = plain["reached"]
+                count = self.latest.rows  # rows after the state are computed again
+                self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
+                log.info("%s: goes on from here", path)
+                return
             except _DAMAGED as error:
                 log.warning("%s: is damaged and not used: %s", path, error)
         self.restart()
@@ -155,7 +146,7 @@ class CheckpointWriter(Recorder):
             return
         began = time.monotonic()
         self._write_rows()  # before the state, which refers to the rows
-        _write(self._folder / STATE, {"owner": self._owner, "ends": self._ends, "reached": self.latest}, {})
+        _write(self._folder / STATE, {"ends": self._ends, "reached": self.latest}, {})
         self._saved, self._last_save = self.latest, time.monotonic()
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 

@@ -19,7 +19,6 @@ from roughvisc.mechanics.grid import transform_library
 from roughvisc.study.case import read_study, vary
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage import checkpoint as checkpoint_module
 from roughvisc.study.storage.folder import lock_case
 from roughvisc.study.storage.netcdf import open_result
 
@@ -378,31 +377,12 @@ def test_finished_case__is_not_run_again(whole, tmp_path, monkeypatch):
         run_case(case, tmp_path)
 
 
-def test_changed_study__does_not_use_what_is_not_its_own(whole, tmp_path, caplog):
-    case, _, steps = whole(MODES)
+def test_result_of_another_case__is_refused(whole, tmp_path):
+    case, _, _ = whole(MODES)
     other = vary(case, {"program.0.load": "21 mN"})
-    expected = values(run_case(other, tmp_path / "other"))
-    shutil.rmtree(tmp_path / "other")
-    unfinished = stopped(case, tmp_path, steps // 2)
-    shutil.copytree(unfinished, tmp_path / f".{other.key}.unfinished")  # whoever may have renamed it
-    with caplog.at_level(logging.WARNING, "roughvisc"):
-        assert values(run_case(other, tmp_path)) == expected
-    assert "belongs to another case or revision and is not used" in caplog.text
-    assert names(tmp_path) == sorted([unfinished.name, f"{other.key}.nc"])
-    (tmp_path / f"{other.key}.nc").rename(tmp_path / f"{case.key}.nc")
+    run_case(other, tmp_path).rename(tmp_path / f"{case.key}.nc")
     with refused(str(tmp_path / f"{case.key}.nc")):  # it is whole, and not damaged
         run_case(case, tmp_path)
-
-
-def test_other_revision__begins_again(whole, tmp_path, monkeypatch, caplog):
-    case, expected, steps = whole(MODES)
-    with monkeypatch.context() as patched:
-        patched.setattr(checkpoint_module, "NUMERICS_REVISION", -1)
-        stopped(case, tmp_path, steps // 2)
-    stop = Stop()
-    assert values(run_case(case, tmp_path, stop=stop)) == expected
-    assert stop.asked == steps
-    assert "belongs to another case or revision and is not used" in caplog.text
 
 
 def test_other_transforms__go_on(whole, tmp_path, monkeypatch, caplog):

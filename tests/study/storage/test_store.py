@@ -57,7 +57,7 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
     ds = hertz_creep((257, 256), 24)
     shape = ds["pressure"].shape
 
-    recorder = CheckpointWriter(tmp_path / "rows", "key")
+    recorder = CheckpointWriter(tmp_path / "rows")
     for row in range(shape[0]):
         recorder.append({}, {"pressure": np.full(shape[1:], float(row))})
     assert list((tmp_path / "rows").iterdir()), "some rows are in a file"
