@@ -273,7 +273,7 @@ def test_command__says_what_it_chose_and_ends_with_the_budget(tmp_path, invoke):
     (tmp_path / "study.toml").write_text(STUDY)
     status, said, complained = invoke("run", tmp_path / "study.toml", "--for", "10 % contact_area", "--no-plots")
     assert status == 0, complained
-    assert said.index("Chosen\n  grid: ") < said.index("Result: ") < said.index("found by") < said.index("Budget: ")
+    assert said.index("Chosen\n  grid: ") < said.index("found by") < said.index("Budget: ") < said.index("Result: ")
     folder = tmp_path / "results" / "study"
     assert len(list(folder.glob("*.nc"))) == 1
     assert (folder / "budget" / "budget-contact_area.nc").exists()

@@ -154,8 +154,7 @@ def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
 
 
 def test_full_contact__is_foreseen(study):
-    light, heavy = (rv.plan([study(ROUGH, {"program.0.load": load})]).isel(case=0) for load in (0.02, 2.0))
-    assert (str(light.warning.values) != "", str(heavy.warning.values) != "") == (False, True)
+    heavy = rv.plan([study(ROUGH, {"program.0.load": 2.0})]).isel(case=0)
     assert float(heavy.contact_fraction) > 0.95
     assert float(heavy.nominal_pressure) == pytest.approx(2e6)
 
