@@ -260,9 +260,7 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
     c2 = number(wlf_c2, "K", "wlf_c2", above=0, difference=True)
     above = temperature - reference_temperature
     if not c2 + above > 0:
-        pole = (
-            f"{reference_temperature - c2:g} K, the reference temperature less wlf_c2, where the WLF shift has its pole"
-        )
+        pole = f"{reference_temperature - c2:g} K, reference temperature less wlf_c2, the pole of the WLF shift"
         raise InputError(key="temperature", found=temperature, expected=f"a temperature above {pole}")
     return 10.0 ** min(-wlf_c1 * above / (c2 + above), _LARGEST)
 
@@ -377,7 +375,7 @@ def stiffened(material: Material, factor: float) -> Material:
     return check_material(material).scaled(1.0, factor, f"all moduli multiplied by {factor:.6g}")
 
 
-def check_material(material: Any) -> Material:
+def check_material(material: Any, key: str = "material") -> Material:
     """Return the argument if it is a material.
 
     Raises
@@ -386,9 +384,7 @@ def check_material(material: Any) -> Material:
         If it is not a :class:`Prony` or a :class:`Creep`.
     """
     if not isinstance(material, Prony | Creep):
-        raise InputError(
-            key="material", found=material, expected="a material, such as rv.zener(...) or rv.creep(function)"
-        )
+        raise InputError(key=key, found=material, expected="a material, such as rv.zener(...) or rv.creep(function)")
     return material
 
 

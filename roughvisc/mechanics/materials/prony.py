@@ -86,8 +86,7 @@ class Prony:
             number(time, "s", f"times[{i}]", above=0)
         check_poisson(self.poisson)
         if self.glassy + self.fluidity + sum(self.compliances) == 0:
-            expected = "a positive compliance: a rigid material cannot be pressed"
-            raise InputError(key="glassy", found=self.glassy, expected=expected)
+            raise InputError(key="glassy", found=self.glassy, expected="a positive compliance, not a rigid material")
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
@@ -123,10 +122,8 @@ def known_times(t: ArrayLike, longest: float) -> Array:
     """Return times up to the longest one, beyond which a material is not known. [s]"""
     t = np.asarray(t, dtype=float)
     if t.size and not np.max(t) <= longest * (1 + 1e-12):  # beyond rounding of a sum of steps
-        raise InputError(
-            f"creep is requested at {np.max(t):g} s, and the table ends at {longest:g} s: expected a table as long as "
-            "the program; creep data are not extrapolated"
-        )
+        late = f"creep is requested at {np.max(t):g} s, and the table ends at {longest:g} s"
+        raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
     return np.minimum(t, longest)
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -105,14 +104,40 @@ def from_relaxation(
     factor = tensile_to_shear(kind, constant)
     if bulk_modulus is None:
         return relaxation_series(equilibrium / factor, [one / factor for one in moduli], times, constant)
+    return _with_elastic_bulk(equilibrium, moduli, times, bulk_modulus, kind)
+
+
+def _with_elastic_bulk(
+    equilibrium: float, moduli: Sequence[float], times: Sequence[float], bulk_modulus: float, kind: Kind
+) -> Prony:
+    r"""Return the series with the contact compliance of a relaxing material with an elastic bulk modulus ``K``.
+
+    Notes
+    -----
+    In the transformed domain the contact compliance is :math:`\tfrac14 [1/G + 3/(3K + G)]`, or in terms of Young's
+    modulus :math:`3/(4E) + 1/(6K) - E/(36K^2)`. The series has four times this at a Poisson ratio of a half. The
+    second term is the creep compliance of the relaxation modulus ``3K + G(t)``, which vanishes for an incompressible
+    material; the last is a sum of exponentials with the relaxation times.
+    """
     found = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
-        shear = found.scaled(1.0, 1 / 3)  # 1/G = 3/E - 1/(3K)
-        if shear.glassy <= 1 / (3 * bulk_modulus):
+        part = (equilibrium + sum(moduli)) / (9 * bulk_modulus)
+        if part >= 1:
             expected = f"more than a ninth of the instantaneous Young's modulus, {1 / found.glassy:g} Pa"
             raise InputError(key="bulk_modulus", found=bulk_modulus, expected=expected)
-        found = replace(shear, glassy=shear.glassy - 1 / (3 * bulk_modulus))
-    return with_elastic_bulk(found, bulk_modulus)
+        found = found.scaled(1.0, 1 / 3)
+        glassy, later = found.glassy * (1 - part) * (1 + 3 * part), [one / (9 * bulk_modulus**2) for one in moduli]
+    else:
+        volume = relaxation_series(3 * bulk_modulus + equilibrium, moduli, times)
+        glassy, later, times = found.glassy + 3 * volume.glassy, [3 * one for one in volume.compliances], volume.times
+    return Prony(
+        glassy,
+        found.fluidity,
+        (*found.compliances, *later),
+        (*found.times, *times),
+        note=f"effective compliance for an elastic bulk modulus of {bulk_modulus:g} Pa",
+        stands_for="a body with an elastic bulk modulus, whose Poisson ratio changes in time",
+    )
 
 
 def relaxation_series(
@@ -134,49 +159,10 @@ def relaxation_series(
         # dividing G~(s) = G_e + sum G_i s/(s + r_i) by s makes the equilibrium modulus a pole at zero like the others:
         # G~(-m)/(-m) = -G_e/m + sum G_i/(r_i - m), one zero between each two poles and none above the last
         strengths, poles = np.append(equilibrium, strengths), np.append(0.0, poles)
-    rates, offsets = _secular_roots(strengths, poles, 0.0)
+    rates, offsets = _secular_roots(strengths, poles)
     # 1/G~ has the residue J_k rate there, and d(G~)/ds is rate * sum strengths / offset^2
     compliances = 1 / (rates * rates * np.sum(strengths / offsets**2, axis=1))
     return Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(1 / rates), poisson, **about)
-
-
-def with_elastic_bulk(shear: Prony, bulk_modulus: float) -> Prony:
-    r"""Return the series with the contact compliance of a material with an elastic bulk modulus.
-
-    Parameters
-    ----------
-    shear : Prony
-        Shear creep compliance ``J(t)``; its Poisson ratio is not used.
-    bulk_modulus : float
-        Bulk modulus ``K``. [Pa]
-
-    Returns
-    -------
-    Prony
-        ``J + 3 B`` at a Poisson ratio of a half, so that its contact compliance is ``(J + 3 B) / 4``.
-
-    Notes
-    -----
-    In the transformed domain :math:`(1 - \nu)/G = \tfrac12 [1/G + 3/(3K + G)]`, and ``B`` is the creep compliance
-    of the relaxation modulus ``3K + G(t)``: regular up to incompressibility, at which ``B`` vanishes.
-    With ``J^ = s J~``, ``B^ = J^/(1 + 3K J^) = 1/(3K) - 1/((3K)^2 (1/(3K) + J^))``: the rates of ``B`` are the zeros
-    of ``1/(3K) + J_0 - phi/m + sum J_i r_i / (r_i - m)``.
-    """
-    weights, poles = _merged(shear.compliances, shear.times)
-    strengths = weights * poles
-    if shear.fluidity:
-        strengths, poles = np.append(shear.fluidity, strengths), np.append(0.0, poles)
-    volume = 1 / (3 * bulk_modulus)
-    rates, offsets = _secular_roots(strengths, poles, volume + shear.glassy)
-    added = 3 * volume**2 / (rates * np.sum(strengths / offsets**2, axis=1))
-    return Prony(
-        shear.glassy + 3 * volume * shear.glassy / (volume + shear.glassy),
-        shear.fluidity,
-        (*shear.compliances, *added),
-        (*shear.times, *(1 / rates)),
-        note=f"effective compliance J + 3B for an elastic bulk modulus of {bulk_modulus:g} Pa",
-        stands_for="a body with an elastic bulk modulus, whose Poisson ratio changes in time",
-    )
 
 
 def _merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Array]:
@@ -186,21 +172,19 @@ def _merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Ar
     return np.bincount(place, np.asarray(weights, dtype=float)[positive], rates.size).astype(float), rates
 
 
-def _secular_roots(strengths: Array, poles: Array, constant: float) -> tuple[Array, Array]:
-    """Return the zeros ``mu`` of ``constant + sum strengths / (poles - mu)``, and their offsets ``poles - mu``.
+def _secular_roots(strengths: Array, poles: Array) -> tuple[Array, Array]:
+    """Return the zeros ``mu`` of ``sum strengths / (poles - mu)``, and their offsets ``poles - mu``.
 
     Parameters
     ----------
     strengths, poles : ndarray, shape (n,)
         Positive strengths, and ascending poles.
-    constant : float
-        Not negative.
 
     Returns
     -------
-    zeros : ndarray, shape (m,)
-        One zero lies between each two poles, and one above the last pole if ``constant > 0``.
-    offsets : ndarray, shape (m, n)
+    zeros : ndarray, shape (n - 1,)
+        One zero lies between each two poles.
+    offsets : ndarray, shape (n - 1, n)
         Distances of the poles from each zero.
 
     Notes
@@ -209,16 +193,13 @@ def _secular_roots(strengths: Array, poles: Array, constant: float) -> tuple[Arr
     logarithmic scale, so that the offset of a zero close to a pole is accurate. The equivalent eigenproblem loses the
     slow modes over many decades of rates (24 decades: a negative eigenvalue).
     """
-    gaps, inner = np.diff(poles), np.arange(poles.size - 1)
-    if constant > 0:  # above the last pole: less than half of this gap
-        gaps = np.append(gaps, 2 * np.sum(strengths) / constant)
-    below = poles[: gaps.size]
+    gaps, below, place = np.diff(poles), poles[:-1], np.arange(poles.size - 1)
     low, high = np.full(gaps.size, 1 / _LARGEST_RATIO), np.full(gaps.size, _LARGEST_RATIO)
     for _ in range(_BISECTIONS):
         ratio = np.sqrt(low) * np.sqrt(high)
         from_below = gaps / (1 + 1 / ratio)
         offsets = (poles - below[:, None]) - from_below[:, None]
-        offsets[inner, inner + 1] = (gaps / (1 + ratio))[inner]
-        is_beyond = constant + np.sum(strengths / offsets, axis=1) > 0  # the function rises between two poles
+        offsets[place, place + 1] = gaps / (1 + ratio)
+        is_beyond = np.sum(strengths / offsets, axis=1) > 0  # the sum rises between two poles
         low, high = np.where(is_beyond, low, ratio), np.where(is_beyond, ratio, high)
     return below + from_below, offsets

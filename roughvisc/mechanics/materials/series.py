@@ -16,16 +16,7 @@ import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import ArrayLike, NDArray
 
-from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import (
-    Creep,
-    Material,
-    check_creep,
-    check_material,
-    pair,
-    pair_creep,
-    power_creep,
-)
+from roughvisc.mechanics.materials.creep import Creep, Material, check_creep, pair, pair_creep, power_creep
 from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
@@ -155,6 +146,8 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     scale : ndarray, shape (rows,)
         Positive scale of the misfit of each row.
     """
+    if not columns.size:  # which SciPy's function cannot do
+        return np.zeros(columns.shape[1])
     scaled = columns / scale[:, None]
     norms = np.sqrt(np.sum(scaled**2, axis=0))
     norms[norms == 0] = 1.0
@@ -188,8 +181,7 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
     Raises
     ------
     InputError
-        If all frequencies are zero for a material without closed form, or a table ends before the times that the
-        frequencies need.
+        If a table ends before the times that the frequencies need.
 
     Notes
     -----
@@ -262,16 +254,12 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     InputError
         See :func:`complex_compliance`.
     """
-    material = check_material(material)
     if isinstance(material, Creep) and material.function is pair_creep:
         return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
     if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
         return material
     size = np.abs(np.asarray(frequency, dtype=float))
-    size = size[size > 0]
-    if not size.size:
-        raise InputError("frequency is zero throughout: expected others too, for a material without a closed form")
-    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size.min())
+    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
     if isinstance(material, Creep):
         return series(material, shortest, longest, tolerance)[0]
     material.creep_compliance(longest)  # refuses a table that ends earlier

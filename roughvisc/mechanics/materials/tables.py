@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
@@ -92,10 +92,8 @@ def creep_table(
         raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
     highest = np.maximum.accumulate(values)
     for row in np.flatnonzero(values < (1 - noise) * highest)[:1]:
-        raise InputError(
-            f"table row {row}: compliance {values[row]:g} 1/Pa at {t[row]:g} s is {1 - values[row] / highest[row]:.2%} "
-            f"below an earlier row, noise is {noise:g}: expected an ascending compliance, or a larger noise"
-        )
+        below = f"compliance is {1 - values[row] / highest[row]:.2%} below an earlier row"
+        raise InputError(f"table row {row}: {below}, noise is {noise:g}: expected ascending compliances or more noise")
     # equal weights of relative deviations; a compliance of zero comes first and does not move
     weights = (highest[-1] / np.where(values > 0, values, highest[-1])) ** 2
     ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
@@ -109,12 +107,9 @@ def creep_table(
     note += f", times {t[0]:g} to {t[-1]:g} s"
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
-    about: dict[str, Any] = {
-        "longest": float(t[-1]),
-        "warning": _gap("creep", rows),
-        "misfit": misfit if misfit > noise else 0.0,
-    }
-    return Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau), poisson, note, **about)
+    terms = float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau)
+    misfit = misfit if misfit > noise else 0.0
+    return Prony(glassy, *terms, poisson, note, longest=float(t[-1]), warning=_gap("creep", rows), misfit=misfit)
 
 
 @quantities(times="s", moduli="Pa")
@@ -222,10 +217,8 @@ def dynamic_table(
     again = np.diff(np.log(at[order])) < _SAME_FREQUENCY
     apart = np.abs(np.diff(np.log(size[order]))) > np.log(_ONE_TEMPERATURE)
     for row in order[1:][again & apart][:1]:
-        raise InputError(
-            f"table row {row}: other moduli than a row with the same frequency, {omega[row]:g} rad/s: several "
-            "temperatures? expected the rows of one temperature, or shift_factors"
-        )
+        same = f"other moduli than a row with the same frequency, {omega[row]:g} rad/s"
+        raise InputError(f"table row {row}: {same}: several temperatures? expected the rows of one, or shift_factors")
     least = 1e-3 * size
     target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
 
@@ -333,10 +326,8 @@ def _gap(kind: str, times: Array) -> str:
     if ratios.max(initial=1.0) <= _DECADE:
         return ""
     before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
-    return (
-        f"The {kind} table has no row between {before} and {after}, more than a decade: the material between is a "
-        "guess, and stated errors do not include it. Use one row per decade."
-    )
+    what = f"The {kind} table has no row between {before} and {after}, more than a decade"
+    return f"{what}: the material between is a guess that stated errors do not include. Use one row per decade."
 
 
 def _instantaneous(times: Array, compliances: Array) -> float:
