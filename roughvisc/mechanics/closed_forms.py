@@ -18,26 +18,13 @@ from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, number, quantities
 
-__all__ = [
-    "cone",
-    "flat_punch",
-    "full_contact_pressure",
-    "hertz",
-    "johnson_greenwood_higginson",
-    "lee_radok",
-    "westergaard",
-]
-
 Array = NDArray[np.float64]
+#: Elastic solutions, for completion.
+_ELASTIC = ["cone", "flat_punch", "full_contact_pressure", "hertz", "johnson_greenwood_higginson", "westergaard"]
 
 
 def __dir__() -> list[str]:
-    return __all__
-
-
-def _from_axis(r: ArrayLike) -> Array:
-    """Return distances from the axis, not negative. [m]"""
-    return np.abs(np.asarray(r, dtype=float))
+    return [*_ELASTIC, "lee_radok"]
 
 
 @dataclass(frozen=True)
@@ -109,11 +96,11 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     a = float(np.cbrt(0.75 * sphere_radius * force / contact_modulus))
 
     def pressure(r: ArrayLike) -> Array:
-        s = _from_axis(r)
+        s = np.abs(np.asarray(r, dtype=float))
         return np.asarray(2 * contact_modulus / (np.pi * sphere_radius) * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
 
     def displacement(r: ArrayLike) -> Array:
-        s = _from_axis(r)
+        s = np.abs(np.asarray(r, dtype=float))
         out = np.maximum(s, a)
         outside = (2 * a**2 - out**2) * np.arcsin(a / out) + a * np.sqrt((out - a) * (out + a))
         return np.asarray(np.where(s <= a, (2 * a**2 - s**2) / 2, outside / np.pi) / sphere_radius)
@@ -156,14 +143,14 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     a = float(np.sqrt(2 * force / (np.pi * contact_modulus * slope)))
 
     def pressure(r: ArrayLike) -> Array:
-        s = _from_axis(r)
+        s = np.abs(np.asarray(r, dtype=float))
         with np.errstate(divide="ignore", invalid="ignore"):
             # arcosh(1 + e) without the rounding of 1 + e, which would be the whole value near the edge
             excess = np.where(s < a, (a - s) / s, 0.0)
             return np.asarray(contact_modulus * slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
 
     def displacement(r: ArrayLike) -> Array:
-        s = _from_axis(r)
+        s = np.abs(np.asarray(r, dtype=float))
         out = np.maximum(s, a)
         outside = a * np.arcsin(a / out) - out + np.sqrt((out - a) * (out + a))
         return np.asarray(slope * np.where(s <= a, np.pi / 2 * a - s, outside))
@@ -205,13 +192,13 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     a, approach = radius, force / (2 * contact_modulus * radius)
 
     def pressure(r: ArrayLike) -> Array:
-        s = _from_axis(r)
+        s = np.abs(np.asarray(r, dtype=float))
         with np.errstate(divide="ignore"):
             inside = force / (2 * np.pi * a * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
         return np.asarray(np.where(s <= a, inside, 0.0))
 
     def displacement(r: ArrayLike) -> Array:
-        return np.asarray(2 / np.pi * approach * np.arcsin(a / np.maximum(_from_axis(r), a)))
+        return np.asarray(2 / np.pi * approach * np.arcsin(a / np.maximum(np.abs(np.asarray(r, dtype=float)), a)))
 
     return RoundContact(a, approach, force, pressure, displacement)
 
