@@ -18,8 +18,8 @@ from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.rows import memory_of
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import arrays_of
-from roughvisc.mechanics.layer_memory import LayerMemory
 from roughvisc.mechanics.memory import Memory
+from roughvisc.mechanics.memory_choice import LayerMemory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT
 from roughvisc.settings import Settings

@@ -11,9 +11,9 @@ even in x and in y, and so are their transforms. A *symbol* holds the non-negati
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,14 +21,13 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.materials.creep import Creep, Material
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.materials.series import complex_compliance, over_frequencies
 
 Array = NDArray[np.float64]
 
 
-class Kernel(Protocol):
+class Kernel(ABC):
     """Displacement of a surface under pressure, at unit contact compliance.
 
     The body is homogeneous along its surface, and symmetric in x and y. A class needs two methods:
@@ -186,12 +185,10 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
     symbol = np.array(kernel.transfer(*waves), dtype=float)
     wrong = ~(np.isfinite(symbol) & (symbol > 0))
     wrong[0, 0] = not 0 <= symbol[0, 0] < math.inf
-    if wrong.any():
-        i, j = np.argwhere(wrong)[0]
-        raise InputError(
-            f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at wave numbers {waves[0][i, 0]:g} and "
-            f"{waves[1][0, j]:g} 1/m: expected a positive number, or zero where both are zero"
-        )
+    for i, j in np.argwhere(wrong)[:1]:
+        at = f"wave numbers {waves[0][i, 0]:g} and {waves[1][0, j]:g} 1/m"
+        expected = "expected a positive number, or zero if both are zero"
+        raise InputError(f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at {at}: {expected}")
     return symbol
 
 
@@ -236,13 +233,9 @@ class Body:
     kernel: Kernel = HALF_SPACE
 
     def __post_init__(self) -> None:
-        if not isinstance(self.material, Prony | Creep):
-            expected = "a material, such as rv.zener(...) or rv.creep(function)"
-            raise InputError(key="material", found=self.material, expected=expected)
-        for name in ("influence", "transfer"):
-            if not callable(getattr(self.kernel, name, None)):
-                found = type(self.kernel).__name__
-                raise InputError(f"kernel is a {found}: expected a Kernel; it has no {name}")
+        check_material(self.material)
+        if not isinstance(self.kernel, Kernel):
+            raise InputError(key="kernel", found=self.kernel, expected="a kernel, derived from Kernel")
 
     @property
     def separates(self) -> bool:
@@ -307,3 +300,11 @@ class Body:
 def as_body(material: Any) -> Body:
     """Return a body itself, or the half-space of a material."""
     return material if isinstance(material, Body) else Body(material)
+
+
+def check_one_body(key: str, material: Any) -> None:
+    """Check that an argument is the material of one body with a constant Poisson's ratio of 0 to 1/2."""
+    if check_material(material, key).stands_for:
+        raise InputError(key=key, found=material.stands_for, expected="one body, Poisson's ratio constant")
+    if material.poisson < 0:
+        raise InputError(key=key, found=material.poisson, expected="Poisson's ratio from 0 to 1/2")

@@ -59,10 +59,9 @@ def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
     kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
     for start, end, points in _GAUSS:
         ring = (distance > start) & (distance <= end)
-        if ring.any():
-            rows, columns = np.nonzero(ring)
-            mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
-            kernel[ring] = mean * (dx * dy)
+        rows, columns = np.nonzero(ring)
+        mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
+        kernel[ring] = mean * (dx * dy)
     return kernel * (longer / math.pi)
 
 

@@ -13,27 +13,21 @@ proportion.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, check_one_body
 from roughvisc.mechanics.half_space import corner_sum, love_kernel
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.materials.prony import Prony
-from roughvisc.mechanics.materials.series import (
-    complex_compliance,
-    laplace_compliance,
-    lattice,
-    nonnegative,
-    over_frequencies,
-)
+from roughvisc.mechanics.materials.series import laplace_compliance, lattice, nonnegative, over_frequencies
 from roughvisc.mechanics.quadrature import cell_mean
 from roughvisc.units import Quantity, format_quantity, quantities
 
@@ -70,8 +64,8 @@ _LEAST = 1e-6
 _NEAR_CELLS, _GAUSS_POINTS = 12.0, 4
 # Distances per decade at which images are added up.
 _DISTANCES = 400
-# Ages at which compliances are compared, the first at which all are known and none is zero or infinite. [s]
-_AGES = (math.inf, 0.0, 1.0, 1e-3, 1e-6)
+# Shear compliance of a material without instantaneous compliance, over the largest one.
+_ALMOST_RIGID = 1e-30
 # Largest relative difference of compliances that are in proportion.
 _ROUNDING = 1e-12
 
@@ -133,11 +127,9 @@ def effective_compliance(
     for h, poisson, compliance in zip(thicknesses[::-1], poissons[-2::-1], layers[-2::-1], strict=True):
         down, down_stress, up, up_stress = _partial_waves(poisson)
         reflected = _inverse(compliance * up - below @ up_stress) @ (below @ down_stress - compliance * down)
-        x = q * h
-        way = np.zeros((*x.shape, 2, 2))
-        way[..., 0, 0] = way[..., 1, 1] = np.exp(-x)
-        way[..., 0, 1] = x * np.exp(-x)
-        there, back = way, way * np.array([[1, -1], [1, 1]])
+        x = (q * h)[..., None, None]
+        there = np.exp(-x) * (np.eye(2) + x * np.eye(2, k=1))
+        back = there * np.array([[1, -1], [1, 1]])
         returned = back @ reflected @ there
         below = compliance * ((down + up @ returned) @ _inverse(down_stress + up_stress @ returned))
     return np.asarray(np.broadcast_to(-below[..., 1, 1] / 4, shape))
@@ -156,75 +148,6 @@ def _inverse(matrix: NDArray[Any]) -> NDArray[Any]:
     (a, b), (c, d) = np.moveaxis(matrix, (-2, -1), (0, 1))
     adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (-2, -1))
     return np.asarray(adjugate / (a * d - b * c)[..., None, None])
-
-
-@dataclass(frozen=True)
-class Layers:
-    """Layers on a half-space, whose materials are exponential series.
-
-    Attributes
-    ----------
-    thicknesses : tuple of float
-        Thicknesses of the layers, from the top. [m]
-    materials : tuple of Prony
-        Materials of the layers and of the half-space.
-    """
-
-    thicknesses: tuple[float, ...]
-    materials: tuple[Prony, ...]
-
-    @property
-    def poissons(self) -> tuple[float, ...]:
-        """Poisson's ratios."""
-        return tuple(one.poisson for one in self.materials)
-
-    def at_once(self, q: Array) -> Array:
-        """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
-        shear = [one.glassy for one in self.materials]
-        rigid = shear.index(0.0) if 0.0 in shear else len(shear) - 1  # layers below a rigid one have no influence
-        if rigid == 0:
-            return 0 * q
-        thicknesses, poissons = self.thicknesses[:rigid], self.poissons[: rigid + 1]
-        return np.asarray(effective_compliance(q, thicknesses, poissons, shear[: rigid + 1]))
-
-    def creep(self, q: Array, t: Array) -> Array:
-        """Return the effective contact compliance of waves after some times, shape ``(waves, times)``. [1/Pa]
-
-        Notes
-        -----
-        The inverse Laplace transform on Talbot's contour with the parameters of [1]_.
-
-        References
-        ----------
-        .. [1] J. A. C. Weideman, SIAM J. Numer. Anal. 44 (2006) 2342.
-        """
-        count = 2 * _NODES
-        angle = (2 * np.arange(_NODES) + 1) * math.pi / count
-        cotangent, sine = 1 / np.tan(0.6407 * angle), np.sin(0.6407 * angle)
-        z = count * (-0.4814 + 0.6122 * angle * cotangent + 0.2645j * angle)
-        slope = 0.6122 * cotangent - 0.6122 * 0.6407 * angle / sine**2 + 0.2645j
-        weights = 2 * np.exp(z) * slope / z
-        shear = [laplace_compliance(one, z / t[:, None]) for one in self.materials]
-        found = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
-        return np.asarray((found @ weights).imag)
-
-    def times(self, shortest: float, longest: float, per_decade: float) -> Array:
-        """Return possible retardation times of waves: the times of the materials, and a number per decade between.
-
-        If the moduli of all materials have the same sign at the complex frequency ``-1/tau``, no wave has the time
-        ``tau``. The limits represent all times beyond them.
-        """
-        place = lattice(shortest, longest, _SIGNS)
-        with np.errstate(divide="ignore"):  # at a retardation time of the material
-            signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
-        apart = (signs != signs[0]).any(axis=0)
-        apart[1:] |= apart[:-1].copy()
-        apart[:-1] |= apart[1:].copy()
-        found = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], apart, [False]]).astype(int)))
-        for first, end in zip(place[ends[::2]], place[ends[1::2] - 1], strict=True):
-            found |= {float(first), float(end)} if per_decade == 0 else set(lattice(first, end, per_decade).tolist())
-        return np.array(sorted(found))
 
 
 # ------------------------------------------------------------------------------------------------- kernels and series
@@ -257,10 +180,8 @@ class LayerKernel(Kernel):
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return ``2 C(|q|) / |q|``; zero at ``q = 0``, as for a half-space. [m]"""
-        q = np.asarray(np.hypot(qx, qy), dtype=float)
-        acts = q > 0
-        q = np.where(acts, q, 1.0)
-        return np.where(acts, 2 / q * self._along(np.log(np.clip(q, self.q[0], self.q[-1]))), 0.0)
+        q = np.clip(np.hypot(qx, qy), self.q[0], self.q[-1])
+        return np.asarray(HALF_SPACE.transfer(qx, qy) * self._along(np.log(q)))
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel and the images, for cells of any length. [m]"""
@@ -276,9 +197,7 @@ class LayerKernel(Kernel):
 
     @cached_property
     def _along(self) -> Any:
-        from scipy.interpolate import CubicSpline  # slow to import
-
-        return CubicSpline(np.log(self.q), self.compliance)
+        return scipy.interpolate.CubicSpline(np.log(self.q), self.compliance)
 
 
 def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths: Array, weights: Array) -> Array:
@@ -296,8 +215,6 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
     ndarray, shape (nx, ny)
         Averages over the loaded cell: near it in closed form, beyond by Gauss quadrature. [m]
     """
-    from scipy.interpolate import CubicSpline  # slow to import
-
     (dx, dy), unit = spacing, float(depths[0])
     x, y = dx * np.arange(shape[0])[:, None], dy * np.arange(shape[1])[None, :]
     near = np.hypot(x, y) <= _NEAR_CELLS * max(spacing)
@@ -309,7 +226,8 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
         return found
     farthest = math.hypot(shape[0] * dx, shape[1] * dy)
     at = unit * np.geomspace(1, 1 + farthest / unit, math.ceil(_DISTANCES * math.log10(1 + farthest / unit)) + 8) - unit
-    along = CubicSpline(np.log1p(at / unit), (weights / np.sqrt(at[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi)
+    far = (weights / np.sqrt(at[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi
+    along = scipy.interpolate.CubicSpline(np.log1p(at / unit), far)
     mean = cell_mean(lambda r: along(np.log1p(r / unit)), x, y, spacing, (_GAUSS_POINTS, _GAUSS_POINTS))
     return np.where(near, found, mean * (dx * dy))
 
@@ -323,13 +241,9 @@ class LayerSeries:
     q : ndarray, shape (n,)
         Wave numbers, ascending; longer and shorter waves have the compliance of the first and of the last. [1/m]
     times : tuple of float
-        ``tau_m``. [s]
-    at_once : ndarray, shape (n,)
-        ``C_0``. [1/Pa]
-    compliances : ndarray, shape (m, n)
-        ``C_m`` [1/Pa], and last the fluidity, if there is one [1/(Pa s)].
-    flows : bool
-        Whether there is a fluidity.
+        ``tau_m``; infinite for a fluidity, which is the last one. [s]
+    compliances : ndarray, shape (m + 1, n)
+        ``C_m`` [1/Pa], or the fluidity [1/(Pa s)], of each time, and last the instantaneous compliance. [1/Pa]
     duration : float
         Longest age. [s]
     error : float
@@ -338,22 +252,18 @@ class LayerSeries:
 
     q: Array
     times: tuple[float, ...]
-    at_once: Array
     compliances: Array
-    flows: bool
     duration: float
     error: float
 
-    def kernel(self, weights: ArrayLike = (), at_once: float = 1.0) -> LayerKernel:
-        """Return the kernel of ``C_0`` times a number plus the weighted sum of the terms. Default: without terms."""
+    def kernel(self, weights: ArrayLike) -> LayerKernel:
+        """Return the kernel of the weighted sum of the terms, of which the instantaneous compliance is the last."""
         weights = np.asarray(weights, dtype=float)
-        final = self.at_once + self.crept(self.duration) @ self.compliances
-        if not weights.any():
-            compliance, scale = at_once * self.at_once, np.maximum(self.at_once, _LEAST * final)
-        else:
-            compliance, scale = at_once * self.at_once + weights @ self.compliances, final
+        scale = crept(self.times, self.duration) @ self.compliances
+        if not weights[:-1].any():
+            scale = np.maximum(self.compliances[-1], _LEAST * scale)
         scale = scale if scale.any() else np.ones_like(scale)
-        return LayerKernel(tuple(self.q.tolist()), tuple(compliance.tolist()), tuple(scale.tolist()))
+        return LayerKernel(tuple(self.q), tuple(weights @ self.compliances), tuple(scale))
 
     def fastest_wave(self, longest: float, shortest: float) -> Prony:
         """Return the series of the wave that creeps most, relative to its instantaneous compliance.
@@ -364,33 +274,39 @@ class LayerSeries:
             Limits of the wave numbers. [1/m]
         """
         q = np.clip(np.geomspace(longest, shortest, 50), self.q[0], self.q[-1])
-        at_once, terms = self._interpolant(np.log(q))[0], self._interpolant(np.log(q))[1:]
-        crept = self.crept(self.duration) @ terms
-        wave = int(np.argmax(crept / np.maximum(at_once, 1e-12 * crept)))
-        own = np.maximum(terms[:, wave], 0.0) * 4.0  # contact compliances are a quarter of the shear's at nu = 1/2
-        fluidity = max(float(own[-1]), 1e-300) if self.flows else 0.0
-        return Prony(4.0 * float(at_once[wave]), fluidity, tuple(own[: len(self.times)].tolist()), self.times)
-
-    def crept(self, t: float) -> Array:
-        """Return ``1 - exp(-t / tau_m)`` for each term, and the time itself for a fluidity. [s]"""
-        retarded = -np.expm1(-t / np.array(self.times)) if self.times else np.zeros(0)
-        return np.append(retarded, t) if self.flows else retarded
+        terms = self.along(np.log(q))
+        final = crept(self.times, self.duration)[:-1] @ terms[:-1]
+        wave = int(np.argmax(final / np.maximum(terms[-1], 1e-12 * final)))
+        # contact compliances are a quarter of the shear's at nu = 1/2
+        *own, at_once = (4.0 * np.maximum(terms[:, wave], 0.0)).tolist()
+        fluidity = max(own.pop(), 1e-300) if math.inf in self.times else 0.0
+        return Prony(at_once, fluidity, tuple(own), self.times[: len(own)])
 
     @cached_property
-    def _interpolant(self) -> Any:
-        from scipy.interpolate import CubicSpline  # slow to import
+    def along(self) -> Any:
+        """Interpolant of the compliances in the logarithm of the wave number."""
+        return scipy.interpolate.CubicSpline(np.log(self.q), self.compliances, axis=1)
 
-        return CubicSpline(np.log(self.q), np.vstack([self.at_once, self.compliances]), axis=1)
+
+def crept(times: ArrayLike, t: ArrayLike) -> Array:
+    """Return the weights of the terms of a series after some times, shape ``(..., m + 1)``.
+
+    These are ``1 - exp(-t / tau_m)``, the age ``t`` itself for an infinite time, and last one.
+    """
+    age, tau = np.asarray(t, dtype=float)[..., None], np.append(times, 1.0)
+    weights = np.where(np.isinf(tau), age, -np.expm1(-age / tau))
+    weights[..., -1] = 1.0
+    return weights
 
 
 @lru_cache(maxsize=8)
-def layer_series(layers: Layers, shortest: float, duration: float, tolerance: float) -> LayerSeries:
-    """Return the series of the waves of a layered body.
+def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance: float) -> LayerSeries:
+    """Return the series of the waves of a layered body, whose materials are series.
 
     Parameters
     ----------
-    layers : Layers
-        Thicknesses and materials.
+    body : LayeredBody
+        The body; its kernel is not used.
     shortest, duration : float
         Ages between which the compliance is needed, besides zero; without a duration the series has no terms. [s]
     tolerance : float
@@ -403,65 +319,48 @@ def layer_series(layers: Layers, shortest: float, duration: float, tolerance: fl
     accurate as the compliances themselves.
     """
     t = lattice(shortest, duration, _AGES_PER_DECADE) if duration > 0 else np.zeros(0)
-    q, between, error = _known_waves(layers, t, tolerance)
-    at_once = layers.at_once(q)
-    if not t.size:
-        return LayerSeries(q, (), at_once, np.zeros((0, q.size)), False, 0.0, error)
-    exact, expected = layers.creep(q, t), layers.creep(between, t)
+    q, between, error = _known_waves(body, t, tolerance)
+    at_once = body.at_once(q)
+    best = LayerSeries(q, (), at_once[None], duration, error if duration == 0 else math.inf)
+    exact, expected = body.creep(q, t), body.creep(between, t)
     first, last = shortest / _BEYOND, duration * _BEYOND
-    flows = any(one.fluidity > 0 for one in layers.materials)
-    best: LayerSeries | None = None
-    for per_decade in _OFFERED:
-        times = layers.times(first, last, per_decade)
-        columns = -np.expm1(-t[:, None] / times)
-        if flows or last in times:
-            columns = np.column_stack([columns, t])
-        weights = np.zeros((q.size, columns.shape[1]))
-        if columns.size:
-            pairs = zip(at_once, exact, strict=True)
-            weights = np.array([nonnegative(columns, row - instantaneous, row) for instantaneous, row in pairs])
-        used = (weights[:, None] * columns / exact[..., None]).max(axis=(0, 1), initial=0.0) > _UNSEEN
-        weights, columns = weights[:, used], columns[:, used]
-        fluid = used.size > times.size and bool(used[-1])  # the fluidity comes last
-        kept = tuple(times[used[: times.size]].tolist())
-        found = LayerSeries(q, kept, at_once, np.ascontiguousarray(weights.T), fluid, duration, math.inf)
-        there = found._interpolant(np.log(between))
-        error = max(
-            np.abs((at_once[:, None] + weights @ columns.T) / exact - 1).max(),
-            np.abs((there[0][:, None] + there[1:].T @ columns.T) / expected - 1).max(),
-        )
-        if best is None or error < best.error:
-            best = replace(found, error=float(error))
+    for per_decade in _OFFERED if duration > 0 else ():
+        times = body.times(first, last, per_decade)
+        if last in times or any(one.fluidity > 0 for one in body.materials):
+            times = np.append(times, math.inf)
+        terms = crept(times, t)[:, :-1]
+        weights = np.array([nonnegative(terms, row - zero, row) for zero, row in zip(at_once, exact, strict=True)])
+        used = (weights[:, None] * terms / exact[..., None]).max(axis=(0, 1)) > _UNSEEN
+        found = replace(best, times=tuple(times[used]), compliances=np.vstack([weights[:, used].T, at_once]))
+        course = crept(found.times, t)
+        of_waves = (found.compliances, exact), (found.along(np.log(between)), expected)
+        error = max(float(np.abs((course @ one).T / known - 1).max()) for one, known in of_waves)
+        best = replace(found, error=error) if error < best.error else best
         if error <= tolerance:
             break
-    assert best is not None
     return best
 
 
-def _known_waves(layers: Layers, t: Array, tolerance: float) -> tuple[Array, Array, float]:
+def _known_waves(body: LayeredBody, t: Array, tolerance: float) -> tuple[Array, Array, float]:
     """Return wave numbers to interpolate between, others between them [1/m], and the error of the interpolant."""
-    from scipy.interpolate import CubicSpline  # slow to import
-
-    whole, thinnest = sum(layers.thicknesses), min(layers.thicknesses)
-    few = t[:: max(t.size // 4, 1)]
+    whole, thinnest, few = sum(body.thicknesses), min(body.thicknesses), t[:: max(t.size // 4, 1)]
 
     def known(q: NDArray[Any]) -> Array:
-        return np.column_stack([layers.at_once(q), layers.creep(q, few)])
+        return np.column_stack([body.at_once(q), body.creep(q, few)])
 
     decades = 10.0 ** -np.arange(1, _DECADES + 1) / whole
-    found, base = known(decades), layers.materials[-1]
-    alone = np.array([float(base.contact_compliance(time)) for time in (0.0, *few)])
-    far = np.abs(found - alone) > _INTERPOLATED * 0.1 * tolerance * np.maximum(alone, 1e-300)
-    near = ~far.any(axis=1)
-    longest = float(decades[int(np.argmax(near))] if near.any() else decades[-1])
+    alone = body.materials[-1].contact_compliance(np.append(0.0, few))
+    off = np.abs(known(decades) - alone) / np.maximum(alone, 1e-300)
+    is_near = off.max(axis=1) <= _INTERPOLATED * 0.1 * tolerance
+    longest = decades[np.argmax(np.append(is_near[:-1], True))]
     for per_decade in _WAVES_PER_DECADE:
         q = lattice(longest, _SHORT / thinnest, per_decade)
         between = np.asarray(np.sqrt(q[1:] * q[:-1]), dtype=np.float64)
         expected = known(between)
-        off = np.abs(CubicSpline(np.log(q), known(q))(np.log(between)) - expected)
-        scale = np.abs(expected)
-        scale[:, 0] = np.maximum(scale[:, 0], scale[:, 1] if few.size else 1e-300)  # zero of long waves on a rigid base
-        error = float((off / np.maximum(scale, 1e-300)).max())
+        off = np.abs(scipy.interpolate.CubicSpline(np.log(q), known(q))(np.log(between)) - expected)
+        scale = np.maximum(np.abs(expected), 1e-300)
+        scale[:, 0] = scale[:, :2].max(axis=1)  # zero of long waves on a rigid base
+        error = float((off / scale).max())
         if error <= _INTERPOLATED * tolerance:
             break
     return q, between, error
@@ -492,29 +391,83 @@ class LayeredBody(Body):
         return text
 
     @property
-    def materials(self) -> tuple[Material, ...]:
+    def materials(self) -> tuple[Any, ...]:
         """Materials from the top."""
         return (self.material, *self.below)
+
+    @property
+    def poissons(self) -> tuple[float, ...]:
+        """Poisson's ratios from the top."""
+        return tuple(one.poisson for one in self.materials)
 
     @property
     def separates(self) -> bool:
         """Whether space and time separate: the compliances of all materials are in proportion."""
         return all(in_proportion(one, self.materials[0]) for one in self.materials)
 
+    def of(self, materials: Iterable[Material]) -> LayeredBody:
+        """Return the body with other materials, from the top."""
+        top, *below = materials
+        return replace(self, material=top, below=tuple(below))
+
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> LayeredBody:
         """Return the body with materials that represent its own at some frequencies. [1/s]"""
-        top, *below = (over_frequencies(one, frequency, tolerance) for one in self.materials)
-        return replace(self, material=top, below=tuple(below))
+        return self.of(over_frequencies(one, frequency, tolerance) for one in self.materials)
 
     def waves(self, qx: Array, qy: Array, frequency: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return the kernel of a half-space [m], and the effective contact compliance of each wave. [1/Pa]"""
-        q = np.hypot(qx, qy)
-        contact = [complex_compliance(one, frequency) for one in self.materials]
-        poissons = [one.poisson for one in self.materials]
-        flows = np.any([~np.isfinite(one) for one in contact], axis=0)
-        shear = [2 / (1 - poisson) * np.where(flows, 1.0, one) for poisson, one in zip(poissons, contact, strict=True)]
-        found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, poissons, shear)
+        law, q = self.over_frequencies(frequency, 1e-4), np.hypot(qx, qy)
+        with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
+            shear = np.array([laplace_compliance(one, 1j * frequency) for one in law.materials])
+        flows = ~np.isfinite(shear).all(axis=0)
+        shear[:, flows] = 1.0
+        found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, list(shear))
         return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
+
+    def at_once(self, q: Array) -> Array:
+        """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
+        shear = [one.glassy for one in self.materials]
+        if shear[0] == 0:
+            return 0 * q
+        almost_rigid = _ALMOST_RIGID * max(shear)
+        return effective_compliance(q, self.thicknesses, self.poissons, [max(one, almost_rigid) for one in shear])
+
+    def creep(self, q: Array, t: Array) -> Array:
+        """Return the effective contact compliance of waves after some times, shape ``(waves, times)``. [1/Pa]
+
+        Notes
+        -----
+        The inverse Laplace transform on Talbot's contour with the parameters of [1]_.
+
+        References
+        ----------
+        .. [1] J. A. C. Weideman, SIAM J. Numer. Anal. 44 (2006) 2342.
+        """
+        count = 2 * _NODES
+        angle = (2 * np.arange(_NODES) + 1) * math.pi / count
+        cotangent, sine = 1 / np.tan(0.6407 * angle), np.sin(0.6407 * angle)
+        z = count * (-0.4814 + 0.6122 * angle * cotangent + 0.2645j * angle)
+        slope = 0.6122 * cotangent - 0.6122 * 0.6407 * angle / sine**2 + 0.2645j
+        weights = 2 * np.exp(z) * slope / z
+        shear = [laplace_compliance(one, z / t[:, None]) for one in self.materials]
+        found = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
+        return np.asarray((found @ weights).imag)
+
+    def times(self, shortest: float, longest: float, per_decade: float) -> Array:
+        """Return possible retardation times of waves: the times of the materials, and a number per decade between.
+
+        If the moduli of all materials have the same sign at the complex frequency ``-1/tau``, no wave has the time
+        ``tau``. The limits represent all times beyond them.
+        """
+        place = lattice(shortest, longest, _SIGNS)
+        with np.errstate(divide="ignore"):  # at a retardation time of the material
+            signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
+        apart = scipy.ndimage.binary_dilation((signs != signs[0]).any(axis=0))
+        found = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
+        for (part,) in scipy.ndimage.find_objects(scipy.ndimage.label(apart)[0]):
+            first, *_, end = place[part]
+            found.update(lattice(first, end, per_decade).tolist())
+        return np.array(sorted(found))
 
     def facts(self, end: float) -> dict[str, Any]:
         """Return the compliances of the top layer [1/Pa], and the body in words."""
@@ -565,46 +518,26 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
     """
     if not (isinstance(thickness, int | float) and thickness > 0):
         raise InputError(key="thickness", found=thickness, expected="a positive number [m]")
-    _check("material", material)
-    thicknesses: tuple[float, ...] = (float(thickness),)
-    if isinstance(on, LayeredBody):
-        below, thicknesses = (on.material, *on.below), (*thicknesses, *on.thicknesses)
-    else:
-        below = (on.material if isinstance(on, Body) and on.kernel == HALF_SPACE else on,)
-        _check("on", below[0])
+    is_known = isinstance(on, LayeredBody) or (isinstance(on, Body) and on.kernel == HALF_SPACE)
+    below: tuple[Any, ...] = on.materials if is_known else (on,)
+    check_one_body("material", material)
+    check_one_body("on", below[0])
     if thickness == math.inf:
         return Body(material)
-    # the kernel is of the final state, or of an earlier one if it is unknown or infinite, per unit of the top
     materials = (material, *below)
-    for age in _AGES:
-        with suppress(InputError):  # a table ends earlier
-            shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]
-            if all(0 < one < math.inf for one in shear):
-                break
+    # the kernel is of one age, at which all compliances are known, positive and finite, per unit of the top
+    age = min([1.0, *(one.longest for one in materials if isinstance(one, Prony))])
+    shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in materials]
     unit = 0.5 * (1 - material.poisson) * shear[0]
-    elastic = tuple(Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, materials, strict=True))
-    kernel = layer_series(Layers(thicknesses, elastic), 0.0, 0.0, _ELASTIC).kernel()
-    return LayeredBody(material, kernel, below, thicknesses)
-
-
-def _check(name: str, material: Any) -> None:
-    """Check that an argument is a material of one body with a constant Poisson's ratio of 0 to 1/2."""
-    if isinstance(material, Body):
-        raise InputError(key=name, found=material, expected="a material" + " or a layer" * (name == "on"))
-    amiss = check_material(material).stands_for
-    if amiss:
-        raise InputError(key=name, found=amiss, expected="one body, Poisson's ratio constant")
-    poisson = material.poisson
-    if not 0 <= poisson <= 0.5:
-        raise InputError(key=name, found=poisson, expected="Poisson's ratio from 0 to 1/2 in a layered body")
+    elastic = [Prony(one / unit, poisson=of.poisson) for one, of in zip(shear, materials, strict=True)]
+    body = LayeredBody(elastic[0], HALF_SPACE, tuple(elastic[1:]), (float(thickness), *getattr(on, "thicknesses", ())))
+    return replace(body.of(materials), kernel=layer_series(body, 0.0, 0.0, _ELASTIC).kernel([1.0]))
 
 
 def in_proportion(material: Material, other: Material) -> bool:
     """Return whether the compliances of two materials have the same ratio at all times."""
-    if not (isinstance(material, Prony) and isinstance(other, Prony)):
+    if not (isinstance(material, Prony) and isinstance(other, Prony) and material.times == other.times):
         return bool(material == other)
-    if material.times != other.times:
-        return False
     mine, theirs = (np.array([one.glassy, one.fluidity, *one.compliances]) for one in (material, other))
     ratio = float(mine.sum() / theirs.sum())
     return bool(np.all(np.abs(mine - ratio * theirs) <= _ROUNDING * mine.max()))

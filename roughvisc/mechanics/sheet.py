@@ -12,14 +12,14 @@ from functools import lru_cache
 from typing import Any, Literal, get_args
 
 import numpy as np
+import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body, Kernel
+from roughvisc.mechanics.body import Body, Kernel, check_one_body
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.quadrature import cell_mean, panels
 from roughvisc.units import Quantity, number, quantities
 
@@ -31,14 +31,16 @@ BASE: Base = "bonded"
 _REACH = 46.0
 # Argument x from which 1 - S(x), which decreases as x^2 exp(-2 x), is below rounding.
 SHORTEST_WAVE = 24.0
-# Length of the pieces of the correction in thicknesses, and number of Chebyshev nodes in each: error below 1e-15.
-_PIECE, _NODES = 0.15, 10
+# Nodes of the correction per thickness, and degree of the spline through them: error below 1e-14.
+_PER_THICKNESS, _DEGREE = 16, 9
 # Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
 # Cell sides in thicknesses above which cells are long, and above which they are refused.
 _LONG, _LONGEST = 0.5, 50.0
-# Below this, sinh(2 x) - 2 x is computed from its series.
-_SERIES_BELOW = 0.5
+# Below this x, sinh(2 x) - 2 x is computed from its series, with these coefficients.
+_SERIES_BELOW, _SERIES = 0.5, 1 / np.cumprod(np.arange(2.0, 27))[1::2]
+# Smallest x, below which the transfer function has the value of uniform pressure.
+_LONGEST_WAVE = 1e-150
 
 
 @quantities(thickness="m")
@@ -74,10 +76,7 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
     >>> ds.attrs["thickness"], ds.attrs["base"]
     (0.0001, 'bonded')
     """
-    amiss = check_material(material).stands_for
-    if amiss:
-        expected = f"none with a material that is {amiss}; a sheet has one material, Poisson's ratio constant"
-        raise InputError(key="thickness", found=thickness, expected=expected)
+    check_one_body("material", material)
     endless = thickness == math.inf
     kernel = Sheet(1.0 if endless else thickness, material.poisson, base)  # checks all arguments
     return Body(material) if endless else Body(material, kernel)
@@ -128,12 +127,6 @@ class Sheet(Kernel):
         one_of("base", self.base, get_args(Base))
 
     @property
-    def uniform_displacement(self) -> float:
-        """Displacement of the sheet under uniform unit pressure. [m]"""
-        slope = (1 - 2 * self.poisson) / (1 - self.poisson) ** 2 if self.base == "bonded" else 1.0
-        return slope * self.thickness
-
-    @property
     def relief(self) -> float:
         """Reduction of the approach of a small contact by the base, over load and compliance. [1/m]
 
@@ -148,10 +141,8 @@ class Sheet(Kernel):
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return ``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit, zero if the sheet is incompressible. [m]"""
-        q = np.asarray(np.hypot(qx, qy), dtype=float)
-        long = q * self.thickness < 1e-150
-        q = np.where(long, 1.0, q)
-        return np.where(long, self.uniform_displacement, 2 / q * reduction(q * self.thickness, self.poisson, self.base))
+        x = np.maximum(np.hypot(qx, qy) * self.thickness, _LONGEST_WAVE)
+        return 2 * self.thickness / x * reduction(x, self.poisson, self.base)
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel less the correction, to 1e-13 of the largest value; or the kernel of long cells. [m]"""
@@ -181,18 +172,16 @@ class Sheet(Kernel):
         ]
         sines = [np.sin(np.pi / 2 * np.arange(count) / (count - 1)) ** 2 for count in counts]
         qx, qy = (2 / side * np.sqrt(s + s**2 / 3) for s, side in zip(sines, spacing, strict=True))
-        influence: Array = fft.idctn(self.transfer(qx[:, None], qy), type=1)
+        influence: Array = scipy.fft.idctn(self.transfer(qx[:, None], qy), type=1)
         return influence[: shape[0], : shape[1]]
 
     def check_cells(self, spacing: tuple[float, float]) -> None:
         """Refuse cells longer than fifty thicknesses."""
         ratio = max(spacing) / self.thickness
         if ratio > _LONGEST * (1 + 1e-9):
-            raise InputError(
-                f"thickness is {self.thickness:.6g} m and a cell is {max(spacing):.6g} m long, {ratio:.4g} times the "
-                f"thickness: expected cells of at most {_LONGEST:g} thicknesses in free space; take shorter cells, "
-                "periodic boundaries, or a thicker sheet"
-            )
+            found = f"thickness is {self.thickness:.6g} m, and cells are {ratio:.4g} times the thickness"
+            advice = "take shorter cells or periodic boundaries"
+            raise InputError(f"{found}: expected cells of at most {_LONGEST:g} thicknesses in free space; {advice}")
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
@@ -216,23 +205,18 @@ def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
     if base == "slipping":
         return np.asarray(np.expm1(-2 * x) ** 2 / (-np.expm1(-4 * x) + 4 * x * e))
     k, rest = _bonded(x, poisson)
-    small = np.minimum(x, _SERIES_BELOW)
-    term, series = 2 * small, np.zeros_like(small)  # sinh(2 x) - 2 x, whose terms cancel where x is small
-    for n in range(3, 27, 2):
-        term = term * (2 * small) ** 2 / (n * (n - 1))
-        series = series + term
+    y = 2 * np.minimum(x, _SERIES_BELOW)
+    series = y**3 * np.polynomial.polynomial.polyval(y**2, _SERIES)  # sinh(y) - y, whose terms cancel if y is small
     excess = np.where(x < _SERIES_BELOW, 2 * e * series, -np.expm1(-4 * x) - 4 * x * e)
     return np.asarray((excess - (k - 1) * np.expm1(-4 * x)) / (k * (1 + e * e) + 2 * e * rest))
 
 
 def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """Return ``1 - S`` without cancellation."""
+    """Return ``1 - S`` of waves, for positive ``x``, without cancellation."""
     x = np.asarray(x, dtype=float)
     e = np.exp(-2 * x)
     if base == "slipping":
-        with np.errstate(invalid="ignore"):
-            whole = 2 * e * (2 * x - np.expm1(-2 * x)) / (-np.expm1(-4 * x) + 4 * x * e)
-        return np.asarray(np.where(x > 0, whole, 1.0))
+        return np.asarray(2 * e * (2 * x - np.expm1(-2 * x)) / (-np.expm1(-4 * x) + 4 * x * e))
     k, rest = _bonded(x, poisson)
     return np.asarray(2 * e * (k * e + rest + 2 * x) / (k * (1 + e * e) + 2 * e * rest))
 
@@ -245,17 +229,12 @@ def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
 @lru_cache(maxsize=8)
 def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
     """Return the kernel of a half-space less the kernel of a sheet, by distance in thicknesses. [1/thickness]"""
-    from scipy.interpolate import PPoly  # slow to import
-    from scipy.special import j0
-
     s, weights = panels(96, SHORTEST_WAVE, 16)
     amplitude = weights * complement(s, poisson, base) / math.pi
-    count = math.ceil(_REACH / _PIECE)
-    ends = np.linspace(0.0, _REACH, count + 1)
-    side = ends[1]
-    nodes = np.polynomial.chebyshev.chebpts1(_NODES)
-    at = ends[:-1, None] + (nodes + 1) / 2 * side
-    values = np.array([j0(np.outer(row, s)) @ amplitude for row in at])
-    powers = np.linalg.solve(np.vander((nodes + 1) / 2, increasing=False), values.T)
-    correction: Callable[[Array], Array] = PPoly(powers / side ** np.arange(_NODES - 1, -1, -1)[:, None], ends)
+    # the function is even: the nodes begin before zero, so that zero is no end
+    at = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))
+    values = np.array([amplitude @ scipy.special.j0(r * s) for r in at])
+    spline = scipy.interpolate.make_interp_spline(at, values, _DEGREE)
+    powers = [spline(at[:-1], order) / math.factorial(order) for order in range(_DEGREE, -1, -1)]
+    correction: Callable[[Array], Array] = scipy.interpolate.PPoly(powers, at)  # quicker than a B-spline
     return correction

@@ -27,7 +27,7 @@ def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base, con
     modulus = 2e6 / (1 - poisson)
     crest = modulus * amplitude / float(sheet.transfer(q, 0.0))
     # the mean of the gap is zero: the highest cell has sunk by its height and by the sheet's compression
-    sunk = float(wave.max()) + 3 * crest / modulus * sheet.uniform_displacement
+    sunk = float(wave.max()) + 3 * crest / modulus * float(sheet.transfer(0.0, 0.0))
     load = 3 * crest * side**2
     program = getattr(rv.Program(), control)(load if control == "load" else sunk, over=0)
     ds = pressed(wave, rv.elastic(1e6, poisson), program, base=base, boundary="periodic", tolerance=1e-4)
@@ -79,10 +79,10 @@ def test_python__refuses(case):
     thick = rv.Body(rv.elastic(1e6), Sheet(1.0))
     with refused("material", thick):
         pressed(case.height(), thick, load)
-    with pytest.raises(rv.InputError, match="kernel is a float: expected a Kernel; it has no influence"):
+    with refused("kernel", 1e-4):
         rv.Body(rv.elastic(1e6), 1e-4)
     for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.power_law(1e-7, 1e-6, 0.3), rv.elastic(1e9))):
         with pytest.raises(rv.InputError, match="a pair of bodies"):
             pressed(case.height(), two, load)
-    with pytest.raises(rv.InputError, match="changes in time"):
+    with refused("material"):
         pressed(case.height(), rv.from_relaxation(5e5, [5e5], [0.05], bulk_modulus=1e9), load)

@@ -8,7 +8,6 @@ from scipy.special import j0
 from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.layer import effective_compliance
 
@@ -63,13 +62,12 @@ def test_layer__lies_on_another_one():
     assert rv.layer(soft, math.inf, on=base) == rv.Body(soft)
 
 
-def test_body_of_the_users_own__that_does_not_separate_is_refused():
-    class Aged(rv.Body):
-        separates = False
-
-    ball, press = rv.sphere(1e-3, 2e-4, 45), rv.Program().load(1e-4, over=0.1)
-    with pytest.raises(InputError, match=r"Aged in which space and time do not separate.*expected the body"):
-        rv.simulate(ball, Aged(rv.zener(3e6, 1e6, 1e5)), press, progress=False)
+def test_creep_functions_that_do_not_creep__are_elastic_layers():
+    ball, press = rv.sphere(1e-3, 2e-4, 21), rv.Program().load(1e-4, over=0.1)
+    constant = [rv.creep(lambda t, one=one: one + 0 * t) for one in (1e-6, 1e-7)]
+    found = rv.simulate(ball, rv.layer(constant[0], 1e-4, on=constant[1]), press, progress=False)
+    expected = rv.simulate(ball, rv.layer(rv.elastic(1e6), 1e-4, on=rv.elastic(1e7)), press, progress=False)
+    assert float(found.approach[-1]) == pytest.approx(float(expected.approach[-1]), rel=1e-4)
 
 
 SOLID, SHEET = rv.elastic(1e6), rv.sheet(rv.elastic(1e6), 1e-3)
@@ -83,7 +81,7 @@ SOLID, SHEET = rv.elastic(1e6), rv.sheet(rv.elastic(1e6), 1e-3)
         (SHEET, 1e-3, SOLID, "material", SHEET),
         (rv.elastic(1e6, poisson=-0.2), 1e-3, SOLID, "material", -0.2),
         (SOLID, 1e-3, rv.pair(SOLID, SOLID), "on", None),
-        (SOLID, 1e-3, 2e6, "material", 2e6),
+        (SOLID, 1e-3, 2e6, "on", 2e6),
     ],
 )
 def test_layer__refuses(material, thickness, on, key, found):

@@ -6,7 +6,7 @@ from samples import COMPRESSIBLE as RUBBER
 from samples import POLYMER
 
 import roughvisc as rv
-from roughvisc.mechanics.layer import Layers, layer_series
+from roughvisc.mechanics.layer import crept, layer_series
 
 FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
 
@@ -23,18 +23,12 @@ FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
     ],
 )
 def test_layer_series__is_as_near_as_it_says_and_has_no_negative_term(materials):
-    strata = Layers((1e-4,), materials)
-    found = layer_series(strata, 1e-5, 1.0, 1e-3)
+    body = rv.layer(materials[0], 1e-4, on=materials[1])
+    found = layer_series(body, 1e-5, 1.0, 1e-3)
     assert found.error <= 1e-3
     assert (found.compliances >= 0).all()
     q, t = np.exp(np.random.default_rng(1).uniform(np.log(1e2), np.log(3e5), 40)), np.geomspace(1.3e-5, 0.9, 23)
-    at_once, *terms = (found.kernel(one, first).transfer(q, 0.0) * q / 2 for first, one in _each(found))
-    series = at_once[:, None] + np.transpose(terms) @ np.array([found.crept(one) for one in t]).T
-    np.testing.assert_allclose(series, strata.creep(q, t), rtol=1.2e-3)
-    np.testing.assert_allclose(at_once, strata.at_once(q), rtol=1e-3, atol=1e-3 * series[:, 0].min())
-
-
-def _each(series):
-    """``C_0`` alone, then each term alone."""
-    count = len(series.compliances)
-    return [(1.0, np.zeros(count)), *((0.0, one) for one in np.eye(count))]
+    *terms, at_once = (found.kernel(one).transfer(q, 0.0) * q / 2 for one in np.eye(len(found.compliances)))
+    series = np.transpose([*terms, at_once]) @ crept(found.times, t).T
+    np.testing.assert_allclose(series, body.creep(q, t), rtol=1.2e-3)
+    np.testing.assert_allclose(at_once, body.at_once(q), rtol=1e-3, atol=1e-3 * series[:, 0].min())
