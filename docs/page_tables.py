@@ -7,14 +7,14 @@ import re
 import sys
 
 from roughvisc.study.audit import LIMITS
-from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
+from roughvisc.variables import OF_STEPS, STATUS_MEANINGS, STEP, VARIABLES
 
 
 def variables():
     """Return the table of all variables of results and observables."""
     lines = ["| variable | over | unit | meaning |", "|---|---|---|---|"]
     for name, one in VARIABLES.items():
-        steps = "steps" if one.of_steps else "rows and steps"
+        steps = "steps" if name in OF_STEPS else "rows and steps"
         over = [steps if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims]
         meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
         if name == "status":

@@ -23,7 +23,7 @@ from roughvisc.experiment.resources import threads_for
 from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
-from roughvisc.variables import STEP, STEPPED, VARIABLES
+from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
@@ -155,7 +155,7 @@ def solve(
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
-    kept = [name for name in dataset.data_vars if experiment.axis != "time" or not VARIABLES[name].of_steps]
+    kept = [name for name in dataset.data_vars if experiment.axis != "time" or name not in OF_STEPS]
     return label(dataset[sorted(kept, key=list(VARIABLES).index)])  # main results first
 
 

@@ -12,9 +12,10 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import wraps
 from inspect import signature
 from numbers import Real
+from operator import ge, gt, le, lt
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -50,13 +51,6 @@ _CLOCK = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"))
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-@cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry()
-
-
 def number(
     value: Any,
     unit: str,
@@ -67,7 +61,6 @@ def number(
     most: float | None = None,
     below: float | None = None,
     difference: bool = False,
-    instead: Mapping[str, str] | None = None,
 ) -> float:
     """Return a quantity as a number in a given unit.
 
@@ -85,8 +78,6 @@ def number(
     difference : bool
         Whether the quantity is a difference of temperatures, so that degrees Celsius, which count from 273.15 K, are
         refused.
-    instead : mapping of str to str, optional
-        Key -> unit of quantities that may be meant if the value has their unit; the message suggests the key.
 
     Returns
     -------
@@ -111,9 +102,6 @@ def number(
     >>> number("-5 mN", "N", "load", above=0)  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
     InputError: load: found '-5 mN': expected a number [N], or text with a unit, above 0
-    >>> number("2 MPa", "N", "load", instead={"pressure": "Pa"})  # doctest: +IGNORE_EXCEPTION_DETAIL
-    Traceback (most recent call last):
-    InputError: load: found '2 MPa', in megapascal: expected ...; did you mean pressure = '2 MPa'?
     """
     if getattr(value, "shape", None) == ():
         value = value.item()
@@ -126,27 +114,18 @@ def number(
     elif isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an integer of hundreds of digits
             found = float(value)
-    inside = (
-        math.isfinite(found)
-        and (above is None or found > above)
-        and (above != 0 or found >= sys.float_info.min)  # otherwise the reciprocal overflows
-        and (least is None or found >= least)
-        and (most is None or found <= most)
-        and (below is None or found < below)
-    )
-    if inside:
+    bounds = {"above": (gt, above), "at least": (ge, least), "up to": (le, most), "below": (lt, below)}
+    limits = {word: one for word, one in bounds.items() if one[1] is not None}
+    too_small = above == 0 and found < sys.float_info.min  # its reciprocal overflows
+    if math.isfinite(found) and not too_small and all(compare(found, limit) for compare, limit in limits.values()):
         return found
-    limits = {"above": above, "at least": least, "up to": most, "below": below}
-    words = " and ".join(f"{word} {limit:g}" for word, limit in limits.items() if limit is not None)
-    words = words or "finite" * isinstance(value, float)
     kind = "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit,"
+    words = " and ".join(f"{word} {limit:g}" for word, (_, limit) in limits.items())
     expected = f"{kind} {words}" if words else kind.rstrip(",")
     named = f"{key}: " if key else ""
-    message = f"{named}found {short_repr(value)}{problem}: expected {expected}"
-    for other, its_unit in (instead or {}).items() if problem else ():
-        if is_quantity(value, its_unit):
-            message += f"; did you mean {other} = {value!r}?"
-    raise InputError(message, key=key, found=value, expected=expected)
+    raise InputError(
+        f"{named}found {short_repr(value)}{problem}: expected {expected}", key=key, found=value, expected=expected
+    )
 
 
 def in_si(value: Any, unit: str, name: str) -> Any:
@@ -208,25 +187,18 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
         if isinstance(function, type):
             function.__init__ = decorate(function.__init__)  # type: ignore[misc]
             return function
-        parameters = signature(function).parameters
-        names = list(parameters)
-
-        def converted(name: str, value: Any) -> Any:
-            unit, bound = declared[name]
-            if not bound or (value is None and parameters[name].default is None):
-                return in_si(value, unit, name)
-            return number(value, unit, name, **{"least" if bound == "= 0" else "above": 0.0})
+        taking = signature(function)
 
         @wraps(function)
         def called(*args: Any, **given: Any) -> Any:
-            known = list(args)
-            for place, name in enumerate(names[: len(args)]):
-                if name in declared:
-                    known[place] = converted(name, args[place])
-            for name in declared:
-                if name in given:
-                    given[name] = converted(name, given[name])
-            return function(*known, **given)
+            bound = taking.bind(*args, **given)
+            for name in filter(bound.arguments.__contains__, declared):
+                (unit, limit), value = declared[name], bound.arguments[name]
+                if not limit or (value is None and taking.parameters[name].default is None):
+                    bound.arguments[name] = in_si(value, unit, name)
+                else:
+                    bound.arguments[name] = number(value, unit, name, **{"least" if limit == "= 0" else "above": 0.0})
+            return function(*bound.args, **bound.kwargs)
 
         called.quantities = {name: unit for name, (unit, _) in declared.items()}  # type: ignore[attr-defined]
         return called
@@ -256,24 +228,19 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
         raise ValueError(f"without a unit (such as {f'{matched[1]} {unit}'!r})")
     if (plain := _prefixed(matched[1], found, unit)) is not None:
         return plain
-    from pint import PintError  # slow to import
+    from pint import PintError, get_application_registry  # slow to import
 
-    expected = _registry().Unit("" if dimensionless else unit)
+    registry = get_application_registry()
     try:
         known = "percent" if found == "%" else found.replace("·", "*")
-        names = _registry().parse_units_as_container(f"1{known}" if known.startswith("/") else known)
-        given = _registry().Unit(names)
-        same_kind = given.dimensionality == expected.dimensionality
-        converted, begins = (
-            float(_registry().Quantity(one, given).to(expected).magnitude) if same_kind else math.nan
-            for one in (value, 0.0)
-        )
-    # pint raises the last three for a unit called nan, a unit to the power 0, and letters that are invalid in names
-    except (PintError, ValueError, KeyError, AssertionError) as error:
+        names = registry.parse_units_as_container(f"1{known}" if known.startswith("/") else known)
+        given, expected = registry.Unit(names), registry.Unit("" if dimensionless else unit)
+        if given.dimensionality != expected.dimensionality or (dimensionless and not _ANGLES.isdisjoint(names)):
+            raise ValueError(f"in {given}")
+        converted, begins = (float(registry.Quantity(one, given).to(expected).magnitude) for one in (value, 0.0))
+    # pint raises the last two for a unit to the power 0, and letters that are invalid in names
+    except (PintError, KeyError, AssertionError) as error:
         raise ValueError(f"in an unknown unit {found!r}") from error
-    angle = expected.dimensionless and any(name in _ANGLES for name in names)
-    if not same_kind or (angle and str(expected) not in _ANGLES):
-        raise ValueError(f"in {given}")
     if difference and begins:
         raise ValueError(f"a temperature and not a difference of temperatures (such as {f'{value:g} K'!r})")
     return float(f"{converted:.15g}")
@@ -365,12 +332,11 @@ def unit_for(values: ArrayLike, si: str) -> Unit:
             if largest >= least:
                 return Unit(factor, symbol)
     head, _, tail = si.partition("/")
-    name = head.rstrip("^0123456789")  # old results have m2
-    power = int(head[len(name) :].strip("^") or 1)
+    name, _, exponent_of_name = head.partition("^")
+    power = int(exponent_of_name or 1)
     least = 1.0 if power == 1 else 10.0**-power  # 0.05 mm² reads better than 50000 µm²
-    exponent = 0
-    if largest > 0:
-        exponent = 3 * math.floor(math.log10(largest / least * 1.0005) / (3 * power))  # 0.99999 N is not 1000 mN
+    rounded = largest / least * 1.0005 or 1.0  # 0.99999 N is not 1000 mN
+    exponent = 3 * math.floor(math.log10(rounded) / (3 * power))
     exponent = min(max(exponent, min(_PREFIXES)), 0 if si == "s" else max(_PREFIXES))
     symbol = _PREFIXES[exponent] + name + (str(power).translate(_SUPERSCRIPTS) if power > 1 else "")
     return Unit(10.0 ** (exponent * power), symbol + (f"/{tail}" if tail else ""))

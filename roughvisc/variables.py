@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -47,10 +47,6 @@ class Variable:
         As in the file of a result.
     meanings : tuple of str
         Meanings of the values 0, 1, ... of a flag.
-    in_table : {"", "last", "largest"}
-        Column in the table of a sweep: the value in the last row, or the largest one.
-    of_steps : bool
-        Whether a result over time has it at its accepted steps alone, in the group ``steps``.
     """
 
     dims: tuple[str, ...]
@@ -59,8 +55,6 @@ class Variable:
     comment: str = ""
     dtype: str = "float64"
     meanings: tuple[str, ...] = ()
-    in_table: Literal["", "last", "largest"] = ""
-    of_steps: bool = False
 
     @property
     def label(self) -> str:
@@ -87,172 +81,108 @@ _COARSER = "bound in practice, from a coarser grid; relative to the largest row 
 _SPOTS = "of the contact spots between half-spaces; infinite in full contact; the gap does not conduct"
 _FLUX = "of the fluid, over the height of the gap; zero in contact and without flow"
 _SOLVER = "of the solution on this grid alone: without the errors of the grid and of the gap"
-_GRID_AND_SOLVER = "of the grid and of the solver"
+_BOTH = "of the grid and of the solver"
 _PERSSON = "by Persson's theory of the same waves"
 _ASPERITIES = "at the rms slope of the surface; missing once the load has fallen"
 
 VARIABLES: dict[str, Variable] = {
     # coordinates; no standard_name "time", which in CF is a date
-    "time": Variable(
-        _STEPS, "s", "time", "since the start of the program; at a jump the state after it", in_table="last"
-    ),
-    "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding", in_table="last"),
+    "time": Variable(_STEPS, "s", "time", "since the start of the program; at a jump the state after it"),
+    "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding"),
     "x": Variable(("x",), "m", "x", "of the cell centre"),
     "y": Variable(("y",), "m", "y", "of the cell centre"),
     "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
     # surface
-    "height": Variable(
-        _GRID, "m", "height", "of the rigid profile, peaks up; missing where absent; attribute `highest`: its apex [m]"
-    ),
+    "height": Variable(_GRID, "m", "height", "of the rigid profile, peaks up; attribute `highest`: its apex [m]"),
     "filled": Variable(_GRID, "", "filled points", dtype="int8", meanings=("measured", "filled")),
     # fields
     "pressure": Variable(_FRAME, "Pa", "pressure", "of the contact, mean over the cell"),
     "gap": Variable(_FRAME, "m", "gap", "between the surfaces at the cell centre; missing where the profile is absent"),
     "displacement": Variable(
-        _FRAME, "m", "displacement", "of the body's surface, positive into the body; of zero mean unless space is free"
+        _FRAME, "m", "displacement", "of the body's surface, into the body; of zero mean unless space is free"
     ),
     # histories
-    "force": Variable(_STEPS, "N", "force", "normal force", in_table="last"),
+    "force": Variable(_STEPS, "N", "force", "normal force"),
     "approach": Variable(
         _STEPS,
         "m",
         "approach",
         "of the rigid profile since first touch of its highest point; in free space against the undeformed plane, "
         "otherwise against the mean plane of the body; of an open contact the value at which it would just close",
-        in_table="last",
     ),
     "nominal_pressure": Variable(
-        _STEPS,
-        "Pa",
-        "nominal pressure",
-        "force over the area of the grid, absent cells included",
-        in_table="last",
-        of_steps=True,
+        _STEPS, "Pa", "nominal pressure", "force over the area of the grid, absent cells included"
     ),
     "work": Variable(
         _STEPS,
         "J",
         "work",
-        "of the force on the approach since the start, over all steps; without the friction force of a slide; with "
-        "periodic boundaries without the uniform displacement",
+        "of the force on the approach, without friction; if periodic without the uniform displacement",
     ),
-    "contact_area": Variable(
-        _STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge", in_table="last"
-    ),
-    "contact_area_counted": Variable(
-        _STEPS, "m^2", "contact area, counted", "cells that carry pressure", of_steps=True
-    ),
+    "contact_area": Variable(_STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge"),
+    "contact_area_counted": Variable(_STEPS, "m^2", "contact area, counted", "cells that carry pressure"),
     "contact_fraction": Variable(
-        _STEPS,
-        "1",
-        "contact fraction",
-        "contact_area over the area of the grid, absent cells included",
-        in_table="last",
+        _STEPS, "1", "contact fraction", "contact_area over the area of the grid, with absent cells"
     ),
-    "mean_gap": Variable(_STEPS, "m", "mean gap", "over the present cells", in_table="last"),
+    "mean_gap": Variable(_STEPS, "m", "mean gap", "over the present cells"),
     # sliding
-    "sliding_distance": Variable(
-        _STEPS, "m", "sliding distance", "since the start, along the path; in whole cells of the grid", in_table="last"
-    ),
+    "sliding_distance": Variable(_STEPS, "m", "sliding distance", "since the start, along the path, in whole cells"),
     "reduced_speed": Variable(_SERIES, "m/s", "reduced speed a_T V", "speed times the shift factor of the material"),
     "friction_coefficient": Variable(
-        _STEPS, "1", "friction coefficient", "friction_force over force; missing while apart", in_table="last"
+        _STEPS, "1", "friction coefficient", "friction over normal force; missing while apart"
     ),
     "friction_force": Variable(
-        _STEPS,
-        "N",
-        "friction force",
-        "against the motion, of pressure on inclined faces, without shear; in a hold against the last slide",
-        in_table="last",
+        _STEPS, "N", "friction force", "of pressure on inclined faces, against the motion (in a hold the last one)"
     ),
-    "friction_force_across": Variable(
-        _STEPS,
-        "N",
-        "force across the motion",
-        "to the left of the motion; keeps the profile on its path",
-        in_table="last",
-        of_steps=True,
-    ),
-    "friction_force_error": Variable(
-        _SERIES, "N", "stated error of the friction force", "of steps of one cell, without the rest of the grid error"
-    ),
+    "friction_force_across": Variable(_STEPS, "N", "force across the motion", "to the left of the motion"),
+    "friction_force_error": Variable(_SERIES, "N", "stated error of the friction force", "of steps of one cell"),
     # accuracy and cost
     "stated_error": Variable(
         _SERIES,
         "1",
         "numerical error",
-        "the largest of pressure (L1), force and approach, of time steps, contact solver and series, over the largest "
-        "of the kept rows so far; in steady sliding of pressure (L1) and friction, by the iteration; without the grid",
-        in_table="largest",
+        "largest of pressure (L1), force and approach, over the largest of the rows so far: steps, solver and series; "
+        "of steady sliding pressure (L1) and friction, by the iteration; without the grid",
     ),
-    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", of_steps=True),
-    "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error", of_steps=True),
+    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error"),
+    "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error"),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
     "work_error": Variable(_SERIES, "J", "stated error of the work", "adds up over the steps; without the grid"),
     "contact_area_error": Variable(
-        _SERIES,
-        "m^2",
-        "stated error of the contact area",
-        "area of the cells whose contact is uncertain; without the grid",
+        _SERIES, "m^2", "stated error of the contact area", "of uncertain cells; without the grid"
     ),
-    "grid_error": Variable(
-        _SERIES,
-        "1",
-        "grid error",
-        f"the largest of pressure (L1), force and approach; {_COARSER}; also from the force at the edge of the contact",
-        in_table="largest",
-    ),
-    "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER, in_table="largest"),
-    "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}", in_table="largest"),
-    "grid_error_area": Variable(
-        _SERIES, "1", "grid error of the area", f"{_COARSER}; also from the edge of the contact", in_table="largest"
-    ),
-    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", _COARSER, in_table="largest"),
-    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS, of_steps=True),
-    "convolutions": Variable(
-        _STEPS, "1", "convolutions", "of a speed; of time steps since the last listed one", dtype="int32", of_steps=True
-    ),
-    "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run", of_steps=True),
+    "grid_error": Variable(_SERIES, "1", "grid error", f"largest of pressure (L1), force, approach; {_COARSER}"),
+    "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER),
+    "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}"),
+    "grid_error_area": Variable(_SERIES, "1", "grid error of the area", _COARSER),
+    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", _COARSER),
+    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
+    "convolutions": Variable(_STEPS, "1", "convolutions", "since the last step, or of the speed", dtype="int32"),
+    "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run"),
     # observables: contact and gap
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
     "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
     "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
-    "pressure_density": Variable(
-        (ROW, "pressure_bin"), "1/Pa", "probability density of the pressure", "over the cells in contact"
-    ),
-    "gap_density": Variable(
-        (ROW, "gap_bin"), "1/m", "probability density of the gap", "over the present cells out of contact"
-    ),
+    "pressure_density": Variable((ROW, "pressure_bin"), "1/Pa", "probability density of the pressure", "in contact"),
+    "gap_density": Variable((ROW, "gap_bin"), "1/m", "probability density of the gap", "out of contact"),
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
     "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
     "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
     # observables: leakage
-    "leak_rate": Variable(
-        _SERIES,
-        "m^3/s",
-        "leak rate",
-        "volume of fluid through the gap in unit time, by the pressure drop",
-        in_table="last",
-    ),
+    "leak_rate": Variable(_SERIES, "m^3/s", "leak rate", "volume of fluid in unit time, by the pressure drop"),
     "leak_rate_error": Variable(_SERIES, "m^3/s", "stated error of the leak rate", _SOLVER),
-    "transmissivity": Variable(
-        _SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12", in_table="last"
-    ),
-    "hydraulic_aperture": Variable(
-        _SERIES, "m", "hydraulic aperture", "the parallel gap that leaks as much", in_table="last"
-    ),
-    "flux": Variable(_FRAME, "m^2/s", "flux", "volume flux, its size, over the height of the gap; missing in contact"),
+    "transmissivity": Variable(_SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12"),
+    "hydraulic_aperture": Variable(_SERIES, "m", "hydraulic aperture", "the parallel gap that leaks as much"),
+    "flux": Variable(_FRAME, "m^2/s", "flux", "volume flux over the height of the gap; missing in contact"),
     "flux_x": Variable(_FRAME, "m^2/s", "flux along x", f"volume flux {_FLUX}"),
     "flux_y": Variable(_FRAME, "m^2/s", "flux along y", f"volume flux {_FLUX}"),
     # observables: contact spots
-    "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS, in_table="last"),
-    "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _GRID_AND_SOLVER),
-    "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS, in_table="last"),
-    "electrical_conductance_error": Variable(
-        _SERIES, "S", "stated error of the electrical conductance", _GRID_AND_SOLVER
-    ),
+    "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS),
+    "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _BOTH),
+    "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS),
+    "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
     # theories
     "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES),
     "asperity_contact_area": Variable(
@@ -266,6 +196,9 @@ VARIABLES: dict[str, Variable] = {
 FIELDS = ("pressure", "gap", "displacement")
 #: Histories that are known at all accepted steps.
 STEPPED = tuple(name for name, one in VARIABLES.items() if one.dims == _STEPS and name != "time")
+#: Variables that a result over time has at its accepted steps alone, in the group ``steps``.
+_FORCES = ("nominal_pressure", "contact_area_counted", "friction_force_across")
+OF_STEPS = (*_FORCES, "time_error", "residual", "status", "convolutions", "wall_time")
 #: Conductances of the contact spots.
 CONDUCTANCES = ("thermal_conductance", "electrical_conductance")
 #: Quantity -> variable with its grid error.
@@ -277,15 +210,16 @@ GRID_ERROR = {
     "contact_area": "grid_error_area",
     "friction_force": "grid_error_friction",
 }
+#: Variables whose values in the last row are in the table of a sweep, and those whose largest values are.
+_CONTACT = ("force", "approach", "nominal_pressure", "contact_area", "contact_fraction", "mean_gap")
+_SLIDING = ("sliding_distance", "friction_coefficient", "friction_force", "friction_force_across")
+_FLOW = ("leak_rate", "transmissivity", "hydraulic_aperture")
+IN_TABLE = ("time", "speed", *_CONTACT, *_SLIDING, *_FLOW, *CONDUCTANCES)
+LARGEST_IN_TABLE = ("stated_error", *dict.fromkeys(GRID_ERROR.values()))
 #: Variable -> variables that may state its error. The variable `time_error` is about the time steps, not the time.
 ERRORS = {
     name: tuple(one for one in (f"{name}_error", GRID_ERROR.get(name, "")) if one in VARIABLES) for name in VARIABLES
 } | {"time": ()}
-
-
-def variables_in_table(which: Literal["last", "largest"]) -> list[str]:
-    """Return the variables with a column for their last, or their largest, value in the table of a sweep."""
-    return [name for name, one in VARIABLES.items() if one.in_table == which]
 
 
 @dataclass(frozen=True)
@@ -330,10 +264,8 @@ class Axis:
 
 #: Name of an axis -> the axis.
 AXES: dict[str, Axis] = {
-    "time": Axis("time", "kept times", "t", needed=("time", "force", "approach")),
-    "speed": Axis(
-        "speed", "speeds", "V", needed=("speed", "force", "friction_coefficient"), telling="friction_coefficient"
-    ),
+    "time": Axis("time", "kept times", "t", ("time", "force", "approach")),
+    "speed": Axis("speed", "speeds", "V", ("speed", "force", "friction_coefficient"), "friction_coefficient"),
 }
 
 

@@ -17,7 +17,7 @@ from roughvisc.errors import printable
 from roughvisc.labels import cost_of
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, ERRORS, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import AXES, ERRORS, IN_TABLE, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     from roughvisc.study.execution.run import Outcome
@@ -73,7 +73,7 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
         (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, to {axis.place(float(dataset[axis.name].max()), 3)}"),
     ]
-    for name in variables_in_table("last"):
+    for name in IN_TABLE:
         if name in row and name != axis.name:
             text = readable(float(row[name]), VARIABLES[name].units)
             for error in filter(row.__contains__, ERRORS[name]):

@@ -172,8 +172,6 @@ class Segment:
         return not self.amplitude and start == 0 and not self.end
 
 
-#: Controlled quantity -> the other quantities, to suggest if the unit is of another kind: names and units.
-INSTEAD = {control: {other: unit for other, unit in UNITS.items() if other != control} for control in UNITS}
 #: Largest number of cycles.
 MOST_CYCLES = 1e6
 # Segments that the text of a program lists.
@@ -225,7 +223,7 @@ class Program:
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""
         least = 0.0 if control in PUSHING else None
-        end = number(value, UNITS[control], control, least=least, instead=INSTEAD[control])
+        end = number(value, UNITS[control], control, least=least)
         return self._then(Segment(control, number(over, "s", "over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
@@ -444,9 +442,9 @@ class Program:
         InputError
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
-        unit, instead = UNITS[one_of("control", control, UNITS)], INSTEAD[control]
-        middle = number(mean, unit, "mean", least=0 if control in PUSHING else None, instead=instead)
-        height = number(amplitude, unit, "amplitude", instead=instead)
+        unit = UNITS[one_of("control", control, UNITS)]
+        middle = number(mean, unit, "mean", least=0 if control in PUSHING else None)
+        height = number(amplitude, unit, "amplitude")
         length = number(period, "s", "period", above=0)
         duration = number(length * number(cycles, "1", "cycles", above=0, most=MOST_CYCLES), "s", "cycles")
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))

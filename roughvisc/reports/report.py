@@ -31,7 +31,7 @@ from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import AXES, IN_TABLE, VARIABLES, axis_of
 
 #: Largest numbers of cases with figures, audit and study, which are evenly spread, and of cases with every figure.
 _SHOWN, _DRAWN = 6, 3
@@ -184,7 +184,7 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
         "Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
         axis.rows.capitalize(): str(dataset[axis.name].size),
     }
-    cells |= {VARIABLES[name].label: _text(telling[name]) for name in variables_in_table("last") if name in telling}
+    cells |= {VARIABLES[name].label: _text(telling[name]) for name in IN_TABLE if name in telling}
     if "stated_error" in dataset and dataset["stated_error"].notnull().any():
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""

@@ -17,7 +17,7 @@ from roughvisc.study.storage.folder import atomic_write, no_results, recorded_fa
 from roughvisc.study.storage.index import index_of
 from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
 from roughvisc.study.study_file import unit_of
-from roughvisc.variables import AXES, ERRORS, GRID_ERROR, VARIABLES, axis_of, variables_in_table
+from roughvisc.variables import AXES, ERRORS, GRID_ERROR, IN_TABLE, LARGEST_IN_TABLE, VARIABLES, axis_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,10 +69,10 @@ def to_table(out: str | Path) -> pd.DataFrame:
         if entry is not None:
             status = "converged"
             row = AXES[entry.along].telling_row(entry.arrays)
-            for name in chain.from_iterable((name, *ERRORS[name]) for name in variables_in_table("last")):
+            for name in chain.from_iterable((name, *ERRORS[name]) for name in IN_TABLE):
                 if name not in GRID_ERROR.values() and len(entry.arrays.get(name, ())):
                     found[heading(name, VARIABLES[name].units)] = float(entry.arrays[name][row])
-            for name in variables_in_table("largest"):
+            for name in LARGEST_IN_TABLE:
                 known = filter(np.isfinite, entry.arrays.get(name, ()))
                 found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
         elif record := recorded_failure(folder, key):
