@@ -65,7 +65,7 @@ _NEAR_CELLS, _GAUSS_POINTS = 12.0, 4
 # Distances per decade at which images are added up.
 _DISTANCES = 400
 # Shear compliance of a material without instantaneous compliance, over the largest one.
-_ALMOST_RIGID = 1e-30
+_ALMOST_RIGID = 1e-100
 # Largest relative difference of compliances that are in proportion.
 _ROUNDING = 1e-12
 

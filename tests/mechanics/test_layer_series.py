@@ -32,3 +32,10 @@ def test_layer_series__is_as_near_as_it_says_and_has_no_negative_term(materials)
     series = np.transpose([*terms, at_once]) @ crept(found.times, t).T
     np.testing.assert_allclose(series, body.creep(q, t), rtol=1.2e-3)
     np.testing.assert_allclose(at_once, body.at_once(q), rtol=1e-3, atol=1e-3 * series[:, 0].min())
+
+
+def test_layers_below_one_that_is_rigid_at_first__have_no_instantaneous_influence():
+    q = np.geomspace(1e-3, 1e6, 100)
+    soft, hard = (rv.layer(RUBBER, 1e-4, on=rv.layer(SOFT, 5e-5, on=rv.elastic(one))).at_once(q) for one in (1e2, 1e9))
+    np.testing.assert_allclose(soft, hard, rtol=1e-12)
+    assert (rv.layer(SOFT, 1e-4, on=RUBBER).at_once(q) == 0).all()
