@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import click
@@ -17,8 +18,11 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.cli import main
+from roughvisc.mechanics.materials.models import MODELS
+from roughvisc.settings import Settings
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
+from roughvisc.study.study_file import GEOMETRY, TABLES, TEMPERATURE
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -52,6 +56,13 @@ def blocks(path, language):
     """Blocks of a language that are to be tried; one is left out by a comment above it that says why."""
     found = _BLOCK.finditer(path.read_text(encoding="utf-8"))
     return [b["text"] for b in found if b["language"] == language and "not run:" not in b["before"]]
+
+
+@pytest.fixture
+def docs_script(monkeypatch):
+    """Import a script of the documentation by its name."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib.import_module
 
 
 @pytest.fixture
@@ -137,34 +148,43 @@ def test_reference__names_everything_public():
     assert functions == {f"{name}.{one}" for name in ("plot", "observables") for one in getattr(rv, name).__all__}
 
 
-def test_gallery__is_what_its_script_writes(monkeypatch):
-    monkeypatch.syspath_prepend(str(DOCS))
-    import make_gallery
-
-    assert make_gallery.page() == (DOCS / "gallery.md").read_text(encoding="utf-8"), "run docs/make_gallery.py"
+def test_gallery__is_what_its_script_writes(docs_script):
+    page = docs_script("make_gallery").page()
+    assert page == (DOCS / "gallery.md").read_text(encoding="utf-8"), "run docs/make_gallery.py"
 
 
 @pytest.mark.parametrize(
-    ("page", "module", "table", "name"),
+    ("page", "script", "table", "name"),
     [
         ("nomenclature.md", "page_tables", "variables", "contact_area"),
         ("howto/audit.md", "page_tables", "limits", "border"),
         ("study-files.md", "study_keys", "material: zener", "kelvin_modulus"),
     ],
 )
-def test_table__is_in_the_built_page_and_printed_by_the_command_that_stands_for_it(
-    monkeypatch, page, module, table, name
-):
-    monkeypatch.syspath_prepend(str(DOCS))
+def test_table__is_in_the_built_page_and_printed_by_the_command_of_the_page(docs_script, page, script, table, name):
     before, row = (DOCS / page).read_text(encoding="utf-8"), f"\n| `{name}` |"
-    after = importlib.import_module(module).filled(before)
-    commands = [shlex.split(one) for one in re.findall(r"^`(python docs/.*)` prints", before, re.M)]
+    commands = [shlex.split(one) for one in re.findall(r"^`python (docs/.*)` prints", before, re.M)]
     (command,) = (one for one in commands if one[-1] == table)
-    assert row in after
+    assert row in docs_script(script).filled(before)
     assert row not in before
-    assert "prints th" not in re.sub(r"prints this page", "", after)
-    done = subprocess.run([sys.executable, *command[1:]], cwd=ROOT, env=os.environ, capture_output=True, text=True)
-    assert row in done.stdout, done.stderr
+    printed = subprocess.run([sys.executable, *command], cwd=ROOT, capture_output=True, text=True)
+    assert row in printed.stdout, printed.stderr
+
+
+def test_study_files_page__has_every_key_with_its_meaning(docs_script):
+    page, study_keys = (DOCS / "study-files.md").read_text(encoding="utf-8"), docs_script("study_keys")
+    assert sorted(study_keys.MARK.findall(page)) == sorted(study_keys.TABLES)
+    for model in MODELS:
+        assert "$$" in page.split(f"### `{model}`")[1].split("study_keys.py")[0], f"{model} has no formula"
+    keys = {}
+    for table in study_keys.TABLES:
+        rows = study_keys.rows(table)
+        assert all(meaning for *_, meaning in rows), table
+        keys[table] = {key for key, *_ in rows}
+    assert keys["study"] == {*TABLES, "sweep"}
+    assert keys["material: temperature"] | keys["material: thickness"] == {*TEMPERATURE, *GEOMETRY}
+    assert keys["solve"] | keys["keep"] == {one.name for one in fields(Settings)} - {"missing"}
+    assert keys["observe"] == {*rv.observables.OBSERVABLES}
 
 
 def test_functions_and_comments__that_pages_name_are_there():
