@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from references import punch_approach
+from references.half_space import punch_approach
 from support import at_rows
 
 import roughvisc as rv
 from roughvisc import closed_forms
-from roughvisc.labels import cost_of
 from roughvisc.variables import STATUS_MEANINGS
 
 thorough = pytest.mark.thorough
@@ -27,11 +26,9 @@ def simulate(height, material, program, **settings):
     return rv.simulate(height, material, program, **{"progress": False, "times": 3, "tolerance": TOLERANCE, **settings})
 
 
-def cells(values, dx, dy=None):
+def cells(values, side):
     """Heights on a grid of any shape, also of one cell."""
-    values = np.asarray(values, dtype=float)
-    sides = (dx, dx if dy is None else dy)
-    centres = {a: (np.arange(n) + 0.5) * side for a, n, side in zip("xy", values.shape, sides, strict=True)}
+    centres = {axis: (np.arange(n) + 0.5) * side for axis, n in zip("xy", values.shape, strict=True)}
     return xr.DataArray(values, dims=("x", "y"), coords=centres)
 
 
@@ -39,7 +36,7 @@ def cell_area(ds):
     return np.prod([2 * float(ds[a][0]) if ds.sizes[a] == 1 else float(ds[a][1] - ds[a][0]) for a in ("x", "y")])
 
 
-def assert_a_contact_state(ds, tolerance=TOLERANCE):
+def assert_a_contact_state(ds):
     """Everything finite, force balanced, no tension, no penetration beyond what the solver's tolerance leaves."""
     present = np.isfinite(ds.height.values)
     known = ds.assign(at_rows(ds).data_vars)
@@ -55,7 +52,7 @@ def assert_a_contact_state(ds, tolerance=TOLERANCE):
         opening = np.nanmax(ds.height.values) - ds.height.values + ds.displacement.values
         opening -= ds.approach.values[:, None, None]
         scale = np.nanmax(np.abs(ds.displacement.values)) + np.ptp(ds.height.values[present])
-        assert np.nanmin(opening) >= -30 * tolerance * scale
+        assert np.nanmin(opening) >= -30 * TOLERANCE * scale
 
 
 def assert_follows(ds, exact):
@@ -65,11 +62,11 @@ def assert_follows(ds, exact):
     assert error < TOLERANCE + GRID, error
 
 
-def step_load(material, duration, tolerance=TOLERANCE):
+def step_load(material, duration):
     """A load applied at once that ends on a contact radius of one, with its closed form (Lee, Radok)."""
     load = 4 / 3 / R / float(material.contact_compliance(duration))
     times = duration * np.array([0.01, 0.5, 1.0])
-    ds = simulate(BALL, material, rv.Program().load(load, over=0).hold(duration), times=times, tolerance=tolerance)
+    ds = simulate(BALL, material, rv.Program().load(load, over=0).hold(duration), times=times)
     assert_a_contact_state(ds)
     return ds, closed_forms.lee_radok(R, material, load).approach(times)
 
@@ -181,9 +178,6 @@ def test_lengths__are_neutral(scale):
         ball = rv.sphere(R * unit, SIZE * unit, SHAPE)
         runs.append(simulate(ball, ZENER, program, times=5, tolerance=1e-4))
     one, other = runs
-    # an error that is at its limit, to rounding, costs an iteration more or less
-    counts = [cost_of(run)[1] for run in runs]
-    assert counts[0] == pytest.approx(counts[1], rel=0.01)
     for name, power in (("pressure", 0), ("approach", 1), ("contact_area", 2), ("work", 3), ("gap", 1)):
         expected, found = one[name].values * scale**power, other[name].values
         # a hundredth of the tolerance: single precision magnifies rounding of the coordinates, 1e-14 of the kernel
@@ -294,13 +288,6 @@ def test_slopes_that_are_not_loaded__do_not_warn():
     assert "slope:" not in punch.attrs.get("warnings", "")
 
 
-def test_single_cell_left__carries_all():
-    height = cells(np.where((X == 5) & (Y == 6), 0.0, np.nan), 1 / 32)
-    ds = simulate(height, ZENER, rv.Program().load(1.0, over=0.1).hold(1.0), boundary="free", missing="absent")
-    assert_a_contact_state(ds)
-    assert ds.pressure.values[1:, 5, 6] == pytest.approx(32**2, rel=1e-12)
-
-
 def test_float32_heights__differ_by_their_rounding():
     program = rv.Program().load(1e-2, over=0.1).hold(1.0)
     found, exact = (simulate(h, ZENER, program, boundary="periodic") for h in (ROUGH.astype("float32"), ROUGH))
@@ -314,24 +301,8 @@ def test_float32_heights__differ_by_their_rounding():
 
 
 def test_constant_load__takes_few_steps_once_relaxed():
-    """A hundred times the hold, hardly more steps; a step only costs one solution that is confirmed."""
+    """A hundred times the hold, hardly more steps."""
     load = rv.Program().load(0.05, over=0)
     short, longer = (simulate(BALL, ZENER, load.hold(time), times=[time]) for time in (30.0, 3000.0))
     assert longer.roughvisc.steps.sizes["step"] <= short.roughvisc.steps.sizes["step"] + 10
-    late = simulate(BALL, ZENER, load.hold(30.0).hold(2970.0), times=[30.0, 3000.0])
-    steps = late.roughvisc.steps
-    early = steps.convolutions.where(steps.time <= 30.0).sum()
-    assert float(early) > cost_of(late)[1] / 2
-    assert float(longer.approach[-1]) == pytest.approx(float(late.approach[-1]), rel=TOLERANCE)
-
-
-@pytest.mark.parametrize("material", [rv.elastic(1e6), rv.zener(3e6, 1e6, 1e5), rv.maxwell(1e6, 1e6)])
-def test_a_flat_periodic_surface_in_full_contact_has_no_residual(material):
-    """Its pressure is uniform whatever rounding leaves of its heights."""
-    program = rv.Program().load(1e-3, over=0.1).hold(0.2)
-    for amplitude in (0.0, 1e-18):
-        for step in ("auto", 0.01):
-            surface = rv.wavy(1.0, 1e-3, 1e-3, (12, 9)) * amplitude
-            ds = simulate(surface, material, program, boundary="periodic", numerics=rv.Numerics(time_step=step))
-            np.testing.assert_allclose(ds.pressure[-1], 1e-3 / 1e-6, rtol=1e-9)
-            assert ds.roughvisc.steps.residual.max() < 1e-9
+    assert float(longer.approach[-1]) == pytest.approx(float(short.approach[-1]), rel=TOLERANCE)
