@@ -1,4 +1,4 @@
-"""Random edits of studies, tables and scans: each gives values, or a RoughviscError that names the file."""
+"""Random edits of studies and of tables: each gives values, or a RoughviscError that names the file."""
 
 import contextlib
 import re
@@ -8,32 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
-from scan_files import write_sdf, write_x3p
 from strategies import examples
-from support import BALL, LOADS, ROUGH
+from support import BALL, FRICTION, LOADS, ROUGH
 
 import roughvisc as rv
 
-FRICTION = """
-[surface]
-generate = "wavy"
-amplitude = "10 um"
-wavelength = "0.5 mm"
-size = "1 mm"
-shape = [16, 13]
-[material]
-model = "from_relaxation"
-moduli = ["2 MPa", "1 MPa"]
-times = ["10 ms", "0.3 s"]
-equilibrium = "0.5 MPa"
-[friction]
-pressure = "10 kPa"
-speeds = ["1 mm/s", "10 mm/s"]
-"""
-TABULATED = re.sub(
-    r'model = "zener".*?(?=\n\[\[)', 'model = "creep_table"\nfile = "edited.csv"', BALL, count=1, flags=re.S
-)
-CREEP = "time [s]; compliance [1/MPa]\n0,01; 0,20\n0,1; 0,31\n1; 0,55\n10; 0,82\n"
 MACHINE = '"Time [s]","Force [mN]"\n0,0\n0.1,4\n0.2,7\n0.4,5.5\n'
 #: Values of the wrong kind, size, sign or unit, and signs that mean something to TOML or a table.
 TOKENS = (
@@ -69,12 +48,6 @@ def edited_texts(draw, texts):
     return "".join(parts)
 
 
-def edited_bytes(whole, at, lost, new):
-    """Bytes of which a part is lost, exchanged or doubled."""
-    at %= len(whole)
-    return whole[:at] + (whole[at : at + 64] if new is None else new) + whole[at + lost :]
-
-
 @contextlib.contextmanager
 def read_or_refused(path):
     """Allow a RoughviscError that names the file, and warnings to the user."""
@@ -102,17 +75,6 @@ def test_edited_study__gives_a_case_or_names_the_file(text, tmp_path):
         assert case.material.contact_compliance(1.0) > 0
 
 
-@pytest.mark.thorough
-@HUNDRED
-@given(text=edited_texts([CREEP]))
-def test_edited_creep_table__gives_a_material_or_names_the_file(text, tmp_path):
-    path, study = tmp_path / "edited.csv", tmp_path / "study.toml"
-    path.write_text(text, encoding="utf-8", errors="replace", newline="")
-    study.write_text(TABULATED)
-    with read_or_refused(path):
-        assert rv.read_study(study).material.contact_compliance(1.0) > 0
-
-
 @HUNDRED
 @given(text=edited_texts([MACHINE]))
 def test_edited_load_table__gives_a_program_or_names_the_file(text, tmp_path):
@@ -120,19 +82,3 @@ def test_edited_load_table__gives_a_program_or_names_the_file(text, tmp_path):
     path.write_text(text, encoding="utf-8", errors="replace", newline="")
     with read_or_refused(path):
         assert 0 < rv.read_program(path, load="Force").duration < np.inf
-
-
-@pytest.mark.parametrize("write", [write_x3p, write_sdf], ids=["x3p", "sdf"])
-@HUNDRED
-@given(
-    at=st.integers(0, 400) | st.integers(0, 10_000),
-    lost=st.integers(0, 8) | st.just(10_000),
-    new=st.binary(max_size=8) | st.none(),
-)
-def test_edited_scan__gives_heights_or_names_the_file(write, at, lost, new, tmp_path):
-    path = tmp_path / f"edited.{write.__name__[-3:]}"
-    path.write_bytes(edited_bytes(write(path).read_bytes(), at, lost, new))
-    with read_or_refused(path):
-        height = rv.open_scan(path)
-        assert height.dims == ("x", "y")
-        assert np.isfinite(height.values).any()

@@ -1,12 +1,10 @@
-"""Runs that are killed, refused a file, or find one damaged: the next run ends with the same bits."""
+"""Runs that are killed or refused a file: the next run ends with the same bits."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 from support import SMALL, with_steps
@@ -54,32 +52,3 @@ def test_at_a_file_operation(case, wanted, tmp_path, most):
             xr.testing.assert_equal(with_steps(found), wanted)
         clean_folder(folder)
         assert [path.name for path in folder.iterdir()] == [f"{case.key}.nc"], (way, at, end)
-
-
-def damaged_bytes(rng, whole):
-    """Bytes of which one is another, or some are zero, or an end is cut off."""
-    at, kind = int(rng.integers(len(whole))), rng.integers(3)
-    if kind == 0:
-        return whole[:at] + bytes([whole[at] ^ 1 << int(rng.integers(8))]) + whole[at + 1 :]
-    return whole[:at] if kind == 1 else whole[:at] + bytes(len(whole[at : at + 64])) + whole[at + 64 :]
-
-
-@pytest.mark.thorough
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize("count", [8, pytest.param(300, marks=pytest.mark.long)])
-def test_damaged_checkpoints(case, wanted, tmp_path, count):
-    """The state, rows, or all: each run ends with the same bits, from the checkpoint or from the start."""
-    rng, steps = np.random.default_rng(24), iter(range(1000))
-    with pytest.raises(KeyboardInterrupt):
-        run_case(case, tmp_path / "stopped", checkpoint_seconds=0, stop=lambda: next(steps) >= 6)
-    (unfinished,) = (tmp_path / "stopped").glob(".*.unfinished")
-    names = sorted(path.name for path in unfinished.iterdir())
-    assert {"rows-0000.npz", "rows-0001.npz", "state.npz"} <= set(names)
-    for number in range(count):
-        there = tmp_path / str(number) / unfinished.name
-        shutil.copytree(unfinished, there)
-        for name in rng.choice(names, size=rng.integers(1, 4), replace=False):
-            (there / name).write_bytes(damaged_bytes(rng, (unfinished / name).read_bytes()))
-        with open_result(run_case(case, there.parent)) as found:
-            xr.testing.assert_equal(with_steps(found), wanted)
-        assert [path.name for path in there.parent.iterdir()] == [f"{case.key}.nc"]
