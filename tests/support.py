@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from references import lee_radok_step
+from references.half_space import lee_radok_step
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import Grid

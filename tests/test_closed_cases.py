@@ -27,43 +27,21 @@ def test_expected_errors__shrink_with_the_grid_down_to_the_tolerance():
         assert all(after < min(before, 0.02) for before, after in zip(coarse, fine, strict=True))
 
 
-def scaled_displacement(monkeypatch):
-    """A kernel one per cent too soft."""
-    sound = Grid.displacement
-    monkeypatch.setattr(Grid, "displacement", lambda self, *given: 1.01 * sound(self, *given))
-
-
-def forgetful_recursion(monkeypatch):
-    """A memory that loses two per cent of what it carries."""
-    sound = Memory.predict
-
-    def predict(self, *arguments):
-        found = sound(self, *arguments)
-        return replace(found, carried=0.98 * found.carried)
-
-    monkeypatch.setattr(Memory, "predict", predict)
-
-
-def stiff_step(monkeypatch):
-    """The compliance of a step one per cent too small."""
-    sound = Memory.predict
-
-    def predict(self, *arguments):
-        found = sound(self, *arguments)
-        return replace(found, compliance=0.99 * found.compliance)
-
-    monkeypatch.setattr(Memory, "predict", predict)
+def scaled(method, field, factor):
+    """A method of a memory whose result has another value in one field."""
+    return lambda self, *given: replace(found := method(self, *given), **{field: factor * getattr(found, field)})
 
 
 @pytest.mark.parametrize(
-    ("fault", "cases"),
+    ("owner", "method", "broken", "cases"),
     [
-        (scaled_displacement, ["Hertz", "Johnson", "Zener"]),
-        (forgetful_recursion, ["Maxwell", "punch"]),
-        (stiff_step, ["Hertz", "Zener", "punch"]),
+        (Grid, "displacement", lambda sound: lambda *given: 1.01 * sound(*given), ["Hertz", "Johnson", "Zener"]),
+        (Memory, "predict", lambda sound: scaled(sound, "carried", 0.98), ["Maxwell", "punch"]),
+        (Memory, "predict", lambda sound: scaled(sound, "compliance", 0.99), ["Hertz", "Zener", "punch"]),
     ],
+    ids=["kernel too soft", "memory that forgets", "step too stiff"],
 )
-def test_broken_solver__exceeds_the_expected_error(fault, cases, monkeypatch):
-    fault(monkeypatch)
+def test_broken_solver__exceeds_the_expected_error(owner, method, broken, cases, monkeypatch):
+    monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     for name in cases:
         assert any(not error <= expected for _, error, expected in compared(name, 65)), name

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references import Cone, Paraboloid, pressure_of_springs, reduced_contact
+from references.half_space import Cone, Paraboloid, pressure_of_springs, reduced_contact
 
 import roughvisc as rv
 

@@ -6,7 +6,8 @@
 import math
 import sys
 
-from references import ElasticLayer, OnSheet, Paraboloid
+from references.half_space import Paraboloid
+from references.layered import ElasticLayer, OnSheet
 
 import roughvisc as rv
 

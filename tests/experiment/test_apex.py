@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references import Cone, Paraboloid
+from references.half_space import Cone, Paraboloid
 from samples import UNIT
 
 import roughvisc as rv

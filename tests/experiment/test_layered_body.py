@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from layered_ball import POISSONS, errors
-from references import Cone, ElasticLayer, OnSheet, Paraboloid
+from references.half_space import Cone, Paraboloid
+from references.layered import ElasticLayer, OnSheet
 
 import roughvisc as rv
 from roughvisc.mechanics.layer import effective_compliance

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references import punch_approach, punch_force
+from references.half_space import punch_approach, punch_force
 
 import roughvisc as rv
 

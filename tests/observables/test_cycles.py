@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-import references
 import xarray as xr
+from references.half_space import punch_dissipation, punch_force
 from samples import RUBBER
 from scipy.integrate import cumulative_trapezoid
 from support import BALL, case_of, refused
@@ -45,10 +45,10 @@ def test_cycle_work__of_a_punch_settles_at_the_closed_form():
     times = np.linspace(0.0, cycles * PERIOD, per_cycle * cycles + 1)
     approach = mean + amplitude * np.sin(2 * np.pi * times / PERIOD)
     table = rv.Program.table(np.r_[0.0, times], np.r_[0.0, approach], control="approach")
-    force = references.punch_force(RADIUS, RUBBER, table, times)
+    force = punch_force(RADIUS, RUBBER, table, times)
     program = rv.Program.cycle(mean, amplitude, PERIOD, cycles, control="approach")
     work = observables.cycle_work(histories(program, times, force, approach))["cycle_work"]
-    exact = references.punch_dissipation(RADIUS, RUBBER, amplitude, PERIOD)
+    exact = punch_dissipation(RADIUS, RUBBER, amplitude, PERIOD)
     np.testing.assert_allclose(work[-1], exact, rtol=2e-3)
     assert abs(work[0] / exact - 1) > 1e-2, "a part of the work of the first cycle is stored"
 

@@ -47,16 +47,12 @@ def settled(matrix, gap, total, active, most):
     return None
 
 
-def dense(height, material, speed, load, start=None):
-    """The same equations of a line contact on a half-space: pressure of the cells. [Pa]"""
-
-    def symbol(q):
-        return 2 / np.abs(q) * complex_compliance(material, -q * speed)
-
-    return dense_on_body(height, symbol, load, start)
+def half_space_symbol(material, speed):
+    """Complex displacement over pressure of waves on a half-space, in the frame of what slides."""
+    return lambda q: 2 / np.abs(q) * complex_compliance(material, -q * speed)
 
 
-def dense_on_body(height, symbol, load, start=None):
+def dense(height, symbol, load, start=None):
     """Line contact on any body by dense matrices and active sets: pressure of the cells. [Pa]
 
     ``g + K p >= delta`` with equality where ``p > 0``, and ``K`` of complex displacements over pressure, `symbol`, of
@@ -93,22 +89,3 @@ def line_profiles(cells):
         (PERIOD, 3 * PERIOD / cells), (cells, 3), hurst=0.8, rms_slope=0.1, rolloff=PERIOD / 3, seed=1
     )
     return {"wave": 1e-5 * np.cos(2 * np.pi * x), "rough": rough.values[:, 0], "broad": -1e-5 * np.abs(2 * x - 1) ** 4}
-
-
-def dense_speeds(height, ratio, load, speeds):
-    """Pressure by :func:`dense` at each speed; each begins with the contact of the one before. [Pa]"""
-    active, rows = None, []
-    for speed in speeds:
-        rows.append(dense(height, rubber(ratio), speed, load * 256 / len(height), active))  # a row of square cells
-        active = rows[-1] > 0
-    return rows
-
-
-def strong_errors(height, ratio, load, speeds, tolerance, exact=None):
-    """Of each speed: true and stated error of the pressure (L1), iterations."""
-    rows = []
-    for speed, pressure in zip(speeds, exact or dense_speeds(height, ratio, load, speeds), strict=True):
-        found = slid(height[:, None], rubber(ratio), speed, load * 256 / len(height), tolerance=tolerance)
-        error = np.abs(found.pressure[:, 0] - pressure).sum() / pressure.sum()
-        rows.append((error, found.residual, found.iterations))
-    return np.array(rows)

@@ -153,22 +153,16 @@ class OnSheet:
         """Pressure over contact modulus of an elastic contact. [-]"""
         return pressure_of_springs(*_solved(self.indenter, self.sheet, radius)[2](), r)
 
-    def radius_at_approach(self, approach):
-        return self._inverse(self.reduced, self.indenter.radius_at_approach, approach)
-
     def radius_at_scaled_force(self, scaled_force):
-        return self._inverse(self.scaled_force, self.indenter.radius_at_scaled_force, scaled_force)
-
-    def _inverse(self, function, of_half_space, values):
         found = []
-        for value in np.ravel(values).tolist():
-            low = high = float(of_half_space(value))
-            while function(low) > value:
+        for value in np.ravel(scaled_force).tolist():
+            low = high = float(self.indenter.radius_at_scaled_force(value))
+            while self.scaled_force(low) > value:
                 low /= 2
-            while function(high) < value:
+            while self.scaled_force(high) < value:
                 high *= 2
-            found.append(brentq(lambda a, v=value: float(function(a)) - v, low, high, rtol=1e-13))
-        return np.array(found).reshape(np.shape(values))
+            found.append(brentq(lambda a, v=value: float(self.scaled_force(a)) - v, low, high, rtol=1e-13))
+        return np.array(found).reshape(np.shape(scaled_force))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 sys.path.append(str(Path(__file__).parents[2] / "tests"))
-from references import lee_radok_step
+from references.half_space import lee_radok_step
 
 RADIUS = 1.0
 

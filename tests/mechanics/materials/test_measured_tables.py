@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
-import references
 from hypothesis import given
 from hypothesis import strategies as st
+from references.half_space import relaxation_spectrum
 from strategies import examples
 from support import refused
 
@@ -150,7 +150,7 @@ def distance(material, t=SPAN):
 
 
 def modulus(material, t):
-    equilibrium, moduli, times = references.relaxation_spectrum(material)
+    equilibrium, moduli, times = relaxation_spectrum(material)
     return equilibrium + np.exp(-t[:, None] / times) @ moduli
 
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from references import sliding_cylinder
+from references.cylinder import sliding_cylinder
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from references.dense import PERIOD, dense_on_body, line_profiles
+from references.dense import PERIOD, dense, line_profiles
 from references.layered import sliding_symbol
 
 import roughvisc as rv
@@ -41,7 +41,7 @@ def power(height, pressure, speed, pair, thickness):
 def test_line_contact__agrees_with_a_dense_solution(pair, speed, profile):
     """And the force times the speed is what both bodies dissipate."""
     height, thickness, load = line_profiles(63)[profile], 8e-5, 4e-4
-    exact = dense_on_body(height, lambda q: sliding_symbol(q, speed, *PAIRS[pair], thickness), load)
+    exact = dense(height, lambda q: sliding_symbol(q, speed, *PAIRS[pair], thickness), load)
     found = on_layer(height[:, None], PAIRS[pair], thickness, speed, load, tolerance=1e-8)
     assert 0.05 < np.mean(exact > 0) < 0.9
     assert np.abs(found.pressure[:, 0] - exact).sum() < 1e-5 * exact.sum()
