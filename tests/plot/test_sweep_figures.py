@@ -8,7 +8,7 @@ import sample_results as made
 import scipy.stats
 import xarray as xr
 from matplotlib.collections import PolyCollection
-from support import refused
+from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import plot
@@ -166,34 +166,12 @@ def test_figures__a_realisation_without_a_result_does_not_count():
 
 # ------------------------------------------------------------------------------------------------- from a folder
 
-STUDY = """
-title = "Bumps"
-[surface]
-generate = "wavy"
-amplitude = "1 um"
-wavelength = "50 um"
-size = "0.1 mm"
-shape = 16
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-load = "1 mN"
-over = "50 ms"
-[[program]]
-hold = "0.2 s"
-[solve]
-boundary = "periodic"
-tolerance = 1e-2
-[keep]
-fields = []
-times = "all"
-[sweep]
-"program.0.load" = ["1 mN", "5 mN", "10 mN"]
-"program.1.hold" = ["0.1 s", "0.2 s"]
-"""
+STUDY = (
+    BALL.replace("over = 0", 'over = "50 ms"').replace(
+        'fields = ["pressure", "displacement"]\ntimes = [0, "0.1 s", "200 ms"]', 'fields = []\ntimes = "all"'
+    )
+    + '[sweep]\n"program.0.load" = ["1 mN", "5 mN", "10 mN"]\n"program.1.hold" = ["0.1 s", "0.2 s"]\n'
+)
 
 
 def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):

@@ -8,6 +8,7 @@ import tomllib
 import pytest
 import sample_results as made
 from click.testing import CliRunner
+from support import BALL
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
@@ -21,33 +22,7 @@ from roughvisc.study.storage.sweep_data import SWEEP as LISTED
 from roughvisc.study.storage.sweep_data import sweep_cases
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
-SWEEP = f"""
-title = '{HOSTILE}'
-[surface]
-generate = "wavy"
-amplitude = "1 um"
-wavelength = "50 um"
-size = "0.1 mm"
-shape = [21, 18]
-rotate90 = 1
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-load = "1 mN"
-over = "50 ms"
-[[program]]
-hold = "0.2 s"
-[solve]
-boundary = "periodic"
-tolerance = 1e-2
-[keep]
-times = 4
-[sweep]
-"program.0.load" = ["2 mN", "10 mN", "1 mN"]
-"""
+SWEEP = BALL.replace('"A ball"', f"'{HOSTILE}'") + '[sweep]\n"program.0.load" = ["2 mN", "10 mN", "1 mN"]\n'
 
 
 @pytest.fixture(scope="module")

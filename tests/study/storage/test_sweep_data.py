@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, LOADS, refused
+from support import BALL, FRICTION, LOADS, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -89,26 +89,8 @@ def test_own_times__have_observables_as_each_result(own_times):
 
 
 def test_own_speeds__are_rows(tmp_path):
-    (tmp_path / "slide.toml").write_text("""
-[surface]
-generate = "wavy"
-amplitude = "1 um"
-wavelength = "0.1 mm"
-size = "0.1 mm"
-shape = [16, 12]
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[friction]
-pressure = "10 kPa"
-speeds = ["1 mm/s"]
-[solve]
-boundary = "periodic"
-[[sweep]]
-"friction.speeds" = [["1 mm/s", "10 mm/s"], ["1 mm/s", "2 mm/s", "5 mm/s"]]
-""")
+    speeds = '[[sweep]]\n"friction.speeds" = [["1 mm/s", "10 mm/s"], ["1 mm/s", "2 mm/s", "5 mm/s"]]\n'
+    (tmp_path / "slide.toml").write_text(FRICTION + speeds)
     ds = rv.sweep(tmp_path / "slide.toml", tmp_path / "out", workers=0, progress=False)
     assert ds.friction_coefficient.dims == ds.speed.dims == ("case", "row")
     assert ds.rows.values.tolist() == [2, 3]
