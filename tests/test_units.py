@@ -13,27 +13,24 @@ from support import refused
 from roughvisc.errors import InputError
 from roughvisc.units import number, unit_for
 
-PREFIXES = {"nm": "e-9", "um": "e-6", "µm": "e-6", "mm": "e-3", "km": "e3"}
+PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6}
+UNITS = st.sampled_from(["m", "N", "Pa", "s", "Pa s"])
 
 
 @pytest.mark.parametrize(
     ("text", "unit", "expected"),
     [
         ("10um", "m", 1e-5),
-        ("10 µm", "m", 1e-5),
         ("10 μm", "m", 1e-5),  # the other Greek mu
         ("-3.5 nm", "m", -3.5e-9),
         ("1 Em", "m", 1e18),
         ("1 inch", "m", 0.0254),
-        ("0.1 MPa s", "Pa s", 1e5),
         ("0.1 MPa*s", "Pa s", 1e5),
         ("2 s kPa", "Pa s", 2e3),
         ("3 N/m^2", "Pa", 3.0),
-        ("3 N / m**2", "Pa", 3.0),
         ("3 N/m²", "Pa", 3.0),
         ("1 hPa", "Pa", 100.0),
         ("2 kg m/s^2", "N", 2.0),
-        ("50 ms", "s", 0.05),
         ("2 min", "s", 120.0),
         ("0.3", "1", 0.3),
         ("50 %", "1", 0.5),
@@ -47,20 +44,9 @@ def test_number__reads_number_and_unit(text, unit, expected):
     assert number(text, unit) == pytest.approx(expected, rel=2e-15)
 
 
-@given(st.decimals(min_value="0.001", max_value="9999", places=3), st.sampled_from(sorted(PREFIXES)))
-def test_number__is_the_float_that_a_person_would_write(value, unit):
-    assert number(f"{value} {unit}", "m") == float(f"{value}{PREFIXES[unit]}")
-
-
-@given(
-    st.decimals(-(10**6), 10**6, places=6, allow_nan=False),
-    st.integers(-30, 30),
-    st.sampled_from(["m", "N", "Pa", "s", "Pa s"]),
-    st.sampled_from(["", "f", "p", "n", "µ", "\N{GREEK SMALL LETTER MU}", "u", "m", "k", "M", "G", "T"]),
-)
-def test_number__with_a_prefix_is_what_pint_makes_of_it(value, power, unit, prefix):
-    by_pint = number(f"{value}e{power} {prefix}{unit.replace(' ', ' * ')}*m/m", unit)  # which only pint reads
-    assert number(f"{value}e{power} {prefix}{unit}", unit) == by_pint
+@given(st.decimals(min_value="0.001", max_value="9999", places=3), st.sampled_from([*PREFIXES]), UNITS)
+def test_number__is_the_float_that_a_person_would_write(value, prefix, unit):
+    assert number(f"{value} {prefix}{unit}", unit) == float(f"{value}e{PREFIXES[prefix]}")
 
 
 @pytest.mark.parametrize("value", [3, 3.0, np.float64(3), np.int32(3), np.array(3.0), xr.DataArray(3.0)])
