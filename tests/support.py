@@ -1,9 +1,12 @@
 """What tests of several modules share: cases, scenes, and how they are looked at."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
 from references.half_space import lee_radok_step
+from samples import RUBBER
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import Grid
@@ -13,10 +16,9 @@ from roughvisc.mechanics.stepping import Scene
 from roughvisc.study.case import read_study, vary
 from roughvisc.study.storage.netcdf import open_result
 
-RADIUS, LOAD, SIZE = 10e-3, 0.1, (2.4e-3, 2.3e-3)
-RUBBER = rv.zener(3e6, 3e6, 0.3e6)
-PRESS = rv.Program().load(LOAD, over=0).hold(0.4)
-TIMES = [0.0, 0.1, 0.4]
+#: The ball, the rubber and the press of BALL.
+RADIUS, LOAD, SIZE, TIMES = 10e-3, 5e-3, (1e-3, 1e-3), [0.0, 0.1, 0.2]
+PRESS = rv.Program().load(LOAD, over=0).hold(0.2)
 EXACT = lee_radok_step(RADIUS, RUBBER, LOAD)
 
 
@@ -126,27 +128,8 @@ def displaced(scene, step):
     return scene.memory.displacement(step.point.history)[0]
 
 
-STUDY = """
-title = "A ball"                            # a comment
-[surface]
-generate = "sphere"
-radius = "10 mm"
-size = ["2.4 mm", "2.3 mm"]
-shape = [33, 31]
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "3 MPa"
-kelvin_viscosity = "0.3 MPa s"
-[[program]]
-load = "0.1 N"
-over = 0
-[[program]]
-hold = "0.4 s"
-[keep]
-fields = ["gap"]
-times = [0, "0.1 s", "0.4 s"]
-"""
+#: The same ball on more cells, as a recipe whose grid may grow.
+STUDY = re.sub("level = 0.*\n", "", BALL).replace("[24, 21]", "[33, 31]").replace('[solve]\nboundary = "free"\n', "")
 ROUGH = """
 [surface]
 generate = "self_affine"

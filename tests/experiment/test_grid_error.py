@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from support import EXACT, LOAD, PRESS, RADIUS, RUBBER, SIZE, TIMES, true_errors
+from samples import RUBBER
+from support import EXACT, LOAD, PRESS, RADIUS, SIZE, TIMES, true_errors
 
 import roughvisc as rv
 from roughvisc import closed_forms
@@ -97,8 +98,9 @@ def test_grid_error__is_missing_where_the_coarser_solve_fails():
     height = rv.sphere(RADIUS, SIZE, (24, 21)) * 1.0
     height.values[0, 0] -= 1e-9  # no longer the recipe's: it can neither grow nor be made anew
     at_border = {"boundary": "free", "times": TIMES, "progress": False, "grid_error": True, "tolerance": 1e-2}
-    load = LOAD * (1.05e-3 / float(EXACT.radius(0.4))) ** 3  # inside the border of these cells, not of the coarser ones
-    ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.4), **at_border)
+    inside = 0.456 * SIZE[1]  # the border of these cells, and not of the coarser ones
+    load = LOAD * (inside / float(EXACT.radius(0.2))) ** 3
+    ds = rv.simulate(height, RUBBER, rv.Program().load(load, over=0).hold(0.2), **at_border)
     assert np.isnan(ds.grid_error).all()
     assert np.isnan(ds.grid_error_area).all()
 

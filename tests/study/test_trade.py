@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from support import FRICTION, PRESS, RADIUS, ROUGH, RUBBER, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
+from samples import RUBBER
+from support import FRICTION, PRESS, RADIUS, ROUGH, SIZE, STUDY, TIMES, case_of, measured, refused, true_errors
 
 import roughvisc as rv
 from roughvisc.study.storage.netcdf import write_dataset
