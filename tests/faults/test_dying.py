@@ -1,12 +1,10 @@
 """Runs that are killed or refused a file: the next run ends with the same bits."""
 
 import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 import xarray as xr
+from dying import struck
 from support import SMALL, with_steps
 
 from roughvisc.study.case import read_study
@@ -17,15 +15,6 @@ from roughvisc.study.storage.netcdf import open_result
 WAYS = ("kill", "ENOSPC", "EROFS", "EIO", "MemoryError")
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
-
-
-def struck(tmp_path, most):
-    """What happened, at which operation, and how the run ended, for each run."""
-    script = Path(__file__).with_name("dying.py")
-    command = [sys.executable, script, tmp_path / "ball.toml", tmp_path, most, "20", *WAYS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=3600, check=True)
-    assert "Traceback" not in done.stderr
-    return [line.split(" ", 2) for line in done.stdout.splitlines()]
 
 
 @pytest.fixture
@@ -43,7 +32,7 @@ def wanted(case, tmp_path):
 @pytest.mark.timeout(7200)  # the large one: some 700 runs
 @pytest.mark.parametrize("most", ["2", pytest.param("all", marks=pytest.mark.long)])
 def test_at_a_file_operation(case, wanted, tmp_path, most):
-    lines = struck(tmp_path, most)
+    lines = struck(tmp_path / "ball.toml", tmp_path, most, *WAYS)
     assert len(lines) == 2 * len(WAYS) if most == "2" else len(lines) > 30 * len(WAYS)
     for way, at, end in lines:
         assert end == "killed" if way == "kill" else "TRACEBACK" not in end

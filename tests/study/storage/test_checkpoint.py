@@ -4,15 +4,14 @@ import errno
 import logging
 import os
 import shutil
-import subprocess
-import sys
 import threading
 from contextlib import nullcontext
 
 import numpy as np
 import pytest
 import xarray as xr
-from support import refused, with_steps
+from dying import struck
+from support import STUDY, refused, with_steps
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import transform_library
@@ -62,28 +61,13 @@ SOFT = (
     .replace("over = 0\n", 'over = "1 ms"\n')
 )
 # Grows from 15 x 12 cells while it is loaded: twice and more.
-GROWING = """
-title = "Growing"
-[surface]
-generate = "sphere"
-radius = "1 mm"
-size = ["30 um", "24 um"]
-shape = [15, 12]
-[material]
-model = "maxwell"
-shear_modulus = "1 MPa"
-viscosity = "1 MPa s"
-[[program]]
-load = "1 mN"
-over = "0.2 s"
-[[program]]
-hold = "0.5 s"
-[solve]
-tolerance = 3e-2
-[keep]
-fields = ["gap"]
-times = "all"
-"""
+GROWING = (
+    STUDY.replace('"1 mm"', '["0.15 mm", "0.12 mm"]')
+    .replace("[33, 31]", "[15, 12]")
+    .replace("over = 0", 'over = "0.2 s"')
+    .replace('["pressure", "displacement"]\ntimes = [0, "0.1 s", "200 ms"]', '["gap"]\ntimes = "all"')
+    + "[solve]\ntolerance = 3e-2\n"
+)
 # Slides, rests with what the slide has left, and slides back.
 SLIDING = (
     MODES.replace("[40, 33]", "[20, 15]")
@@ -244,91 +228,23 @@ def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path):
     assert values(run_case(case, tmp_path)) == expected
 
 
-_KILLED = """
-import os, random, signal, sys, time
-from pathlib import Path
-from roughvisc.study.case import read_study
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage import checkpoint
-checkpoint._SHARE = float("inf")  # at every step
-study, out, kills, seed = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
-case, draw, done = read_study(study), random.Random(seed), 0
-for warm in ("imports", "timed"):
-    began, told = time.perf_counter(), []
-    run_case(case, out.parent / warm, checkpoint_seconds=0, progress=lambda now, end: told.append(now))
-    step = (time.perf_counter() - began) / len(told)
-
-def work(pipe):
-    def report(now, end):
-        os.write(pipe, f"{now!r}\\n".encode())
-    run_case(case, out, progress=report, checkpoint_seconds=0)
-
-def after(reports, pipe):
-    "What a run has told by then, or before it ended; at a random instant of the next step."
-    told = b""
-    while told.count(b"\\n") < reports and (more := os.read(pipe, 1000)):
-        told += more
-    time.sleep(draw.uniform(0.0, step))
-    return told.decode().split()
-
-def begun(pipe):
-    pid = os.fork()
-    if pid == 0:
-        code = 1
-        try:
-            work(pipe)
-            code = 0
-        finally:
-            os._exit(code)
-    return pid
-
-while done < kills:
-    near, far = os.pipe()
-    pid = begun(far)
-    os.close(far)
-    came = after(draw.randrange(int(0.6 * len(told))), near)
-    os.kill(pid, signal.SIGKILL)
-    _, status = os.waitpid(pid, 0)
-    print(*came[:1] or "-", os.WIFSIGNALED(status), flush=True)
-    os.close(near)
-    if os.WIFSIGNALED(status):
-        done += 1
-    elif status:
-        sys.exit("failed")
-    else:  # it was through before: begin anew
-        (out / f"{case.key}.nc").unlink()
-near, far = os.pipe()
-_, status = os.waitpid(begun(far), 0)
-sys.exit(status)
-"""
-
-
-def killed(folder, kills, seed):
-    """Times at which the killed runs began, as far as they came."""
-    arguments = [folder / "study.toml", folder / "out", kills, seed]
-    command = [sys.executable, "-c", _KILLED, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return [line.split()[0] for line in done.stdout.splitlines()]
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
 @pytest.mark.parametrize(
-    ("name", "kills"),
+    ("name", "most"),
     [
-        ("modes", 2),
-        *(pytest.param(name, 3, marks=pytest.mark.thorough) for name in ("sliding", "pulled", "layer", "curve")),
-        *(pytest.param(name, 24, marks=pytest.mark.long) for name in CASES),
+        ("modes", "2"),
+        *(pytest.param(name, "3", marks=pytest.mark.thorough) for name in ("sliding", "pulled", "layer", "curve")),
+        *(pytest.param(name, "24", marks=pytest.mark.long) for name in CASES),
     ],
 )
-def test_killed_at_random_instants__ends_with_the_same_bits(whole, tmp_path, name, kills):
+def test_killed_at_some_file_operations__ends_with_the_same_bits(whole, tmp_path, name, most):
     _, expected, _ = whole(CASES[name])
     case = case_of(CASES[name], tmp_path)
-    began = killed(tmp_path, kills, seed=kills)
-    assert len(began) >= kills
-    assert any(first not in ("-", "0.0") for first in began), "some went on from a checkpoint"
-    assert values(tmp_path / "out" / f"{case.key}.nc") == expected
-    assert names(tmp_path / "out") == [f"{case.key}.nc"]
+    for _, at, end in struck(tmp_path / "study.toml", tmp_path, most, "kill"):
+        assert end == "killed"
+        path = run_case(case, tmp_path / "kill" / at)
+        assert values(path) == expected
+        assert names(path.parent) == [path.name]
 
 
 @pytest.mark.parametrize("size", ["16k", "500k", "1200k"])
