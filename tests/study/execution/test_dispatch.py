@@ -148,30 +148,6 @@ def key_of(event):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_restart__by_another_client_loses_nothing(study, tmp_path):
-    case = short_hold(study)
-    restarted = []
-
-    class Restarter(Display):
-        def reached(self, key, now, end):
-            if now > 0 and not restarted:
-                restarted.append(now)
-                threading.Thread(target=restart).start()
-
-    def restart():
-        with Client(client.scheduler.address, set_as_default=False) as other:
-            other.restart()
-
-    with bare_cluster() as client, worker_process(client):
-        outcomes = run_cases([case], tmp_path / "out", display=Restarter(False), client=client)
-    assert restarted
-    assert [o.kind for o in outcomes.values()] == ["done"]
-    run_cases([case], tmp_path / "calm", display=Display(False), workers=0)
-    assert_same(numbers(tmp_path / "out"), numbers(tmp_path / "calm"))
-
-
-@pytest.mark.thorough
-@pytest.mark.timeout(300)
 def test_lost_scheduler__is_one_message_and_no_traceback(study, tmp_path):
     study(LONG)
     scheduler = [sys.executable, "-m", "dask", "scheduler", "--scheduler-file", "s.json", "--host", "127.0.0.1"]

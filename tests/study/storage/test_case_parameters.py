@@ -78,10 +78,3 @@ def test_labels__are_apart_from_all_variables():
     assert not [name for name in names if any(name.startswith(table) for table in tables)]
     assert not names & {f"friction_{key}" for key in arguments(SteadySliding)}
     assert not {*VARIABLES} & {*TABLES}
-
-
-def test_axes__are_found_by_cf_xarray(folder):
-    """Not by an attribute `axis`, with which ParaView would take x and y for longitude and latitude."""
-    pytest.importorskip("cf_xarray")
-    with xr.open_dataset(next(folder.glob("*.nc"))) as ds:
-        assert dict(ds.cf.axes) == {"X": ["x"], "Y": ["y"], "T": ["time"]}

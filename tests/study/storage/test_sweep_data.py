@@ -131,19 +131,6 @@ def test_list_of_cases__damaged_is_refused(study, tmp_path):
     assert rv.open_results(out).sizes["case"] == 4
 
 
-@pytest.mark.thorough
-def test_index__damaged_is_made_again(study, tmp_path):
-    out = tmp_path / "out"
-    sweep(study(), out, workers=0, progress=False)
-    wanted, whole = rv.open_results(out).load(), np.fromfile(out / INDEX, np.uint8)
-    rng = np.random.default_rng(5)
-    for at in [0, *rng.integers(len(whole), size=20), len(whole) - 1]:
-        damaged = whole.copy()
-        damaged[at] ^= 1 << rng.integers(8)
-        damaged.tofile(out / INDEX)
-        xr.testing.assert_identical(rv.open_results(out).load(), wanted)
-
-
 def synthetic(folder, loads=10, seeds=6, template=None, shape=(8, 6), times=4):
     """Results of a sweep over loads and seeds, made up: fast to write, in the form that a run writes."""
     rng = np.random.default_rng(1)
