@@ -2,9 +2,9 @@
 
 import math
 
-import mpmath
 import numpy as np
 import pytest
+from references.layered import elastic_factor
 from support import refused
 
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
@@ -13,40 +13,12 @@ from roughvisc.mechanics.sheet import Sheet, complement, reduction
 BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
 
 
-def wave_on_sheet(x, poisson, base):
-    """``S`` from the equations of plane strain: Airy's function ``f(z) cos(q x)``, four constants, four conditions.
-
-    With ``q = 1`` and the thickness `x`: stresses ``-f, f', f''``, displacements along the sheet
-    ``(1 - nu) f'' + nu f`` and through it ``(1 - nu) f''' - (2 - nu) f'``, over twice the shear modulus.
-    """
-    with mpmath.workdps(60):
-        nu, h, z = mpmath.mpf(poisson), mpmath.mpf(x), mpmath.mpf(0)
-
-        def derivatives(z):
-            """Of f = e^-z, z e^-z, e^z, z e^z: rows f, f', f'', f'''."""
-            down, up = mpmath.exp(-z), mpmath.exp(z)
-            return [[(-1) ** n * down, (-1) ** n * (z - n) * down, up, (z + n) * up] for n in range(4)]
-
-        top, bottom = derivatives(z), derivatives(h)
-
-        def along(d):
-            return [(1 - nu) * d[2][i] + nu * d[0][i] for i in range(4)]
-
-        def through(d):
-            return [(1 - nu) * d[3][i] - (2 - nu) * d[1][i] for i in range(4)]
-
-        conditions = mpmath.matrix([top[0], top[1], through(bottom), along(bottom) if base == "bonded" else bottom[1]])
-        constants = mpmath.lu_solve(conditions, mpmath.matrix([1, 0, 0, 0]))
-        sinks = sum(a * b for a, b in zip(through(top), constants, strict=True)) / 2  # over p / G
-        return float(sinks / (1 - nu)), sinks / (1 - nu)  # a half-space: u = (1 - nu) p / (G q)
-
-
 @pytest.mark.parametrize(("base", "poisson"), [*BODIES, ("bonded", 0.4999999)])
 @pytest.mark.parametrize("x", [1e-5, 1e-3, 0.0999, 0.499, 0.501, 1.0, 4.0, 15.0])
 def test_reduction__is_that_of_plane_strain(base, poisson, x):
-    exact, digits = wave_on_sheet(x, poisson, base)
-    assert float(reduction(x, poisson, base)) == pytest.approx(exact, rel=2e-13)
-    assert float(complement(x, poisson, base)) == pytest.approx(float(1 - digits), rel=2e-13)
+    exact = elastic_factor([x], [poisson], [1], base)
+    assert float(reduction(x, poisson, base)) == pytest.approx(float(exact), rel=2e-13)
+    assert float(complement(x, poisson, base)) == pytest.approx(float(1 - exact), rel=2e-13)
 
 
 @pytest.mark.parametrize(("base", "poisson"), BODIES)
@@ -86,7 +58,7 @@ def test_influence__answers_long_waves_as_plane_strain_does(base, poisson, side)
     influence[1:] *= 2
     influence[:, 1:] *= 2
     answer = float(influence.sum(axis=1) @ np.cos(q * side * np.arange(reach[0])))
-    assert answer == pytest.approx(2 / q * wave_on_sheet(q, poisson, base)[0], rel=5e-3)
+    assert answer == pytest.approx(2 / q * float(elastic_factor([q], [poisson], [1], base)), rel=5e-3)
 
 
 @pytest.mark.parametrize(("base", "poisson"), BODIES)

@@ -34,18 +34,27 @@ def depth_matrix(poisson, modulus):
     )
 
 
-def elastic_factor(x, poissons, moduli, digits=60):
+#: Components of a field that are free at a base which does not deform: both stresses, or ``U`` and the normal stress.
+FREE = {"bonded": (2, 3), "slipping": (0, 3)}
+
+
+def elastic_factor(x, poissons, moduli, base=None):
     """Displacement of a wave over that of a half-space of the top layer's material, by a matrix exponential.
 
-    Wave number times thickness of the layers, from the top; Poisson's ratios and shear moduli of one material more.
+    Wave number times thickness of the layers, from the top; Poisson's ratios and shear moduli of the layers, and of one
+    material more below them unless the base is rigid: bonded or slipping.
     """
-    with mp.workdps(digits):
-        field = (depth_matrix(poissons[-1], moduli[-1]) - mp.eye(4)) ** 2  # its columns decay as (1, s) exp(-s)
-        for one, poisson, modulus in zip(x[::-1], poissons[-2::-1], moduli[-2::-1], strict=True):
+    with mp.workdps(60):
+        if base is None:
+            field = (depth_matrix(poissons[-1], moduli[-1]) - mp.eye(4)) ** 2  # its columns decay as (1, s) exp(-s)
+        else:
+            field = mp.matrix(4, 2)
+            field[FREE[base][0], 0] = field[FREE[base][1], 1] = 1
+        for one, poisson, modulus in list(zip(x, poissons, moduli, strict=False))[::-1]:
             field = mp.expm(-mp.mpf(one) * depth_matrix(poisson, modulus)) * field
         weights = mp.lu_solve(field[2:4, 0:2], mp.matrix([0, -1]))
         displacement = field[1, 0] * weights[0] + field[1, 1] * weights[1]
-        return complex(displacement * mp.mpmathify(moduli[0]) / (1 - mp.mpf(poissons[0])))
+        return displacement * mp.mpmathify(moduli[0]) / (1 - mp.mpf(poissons[0]))
 
 
 def layered_compliance(q, s, layer, base, thickness):
