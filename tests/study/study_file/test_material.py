@@ -125,11 +125,9 @@ def test_temperature__both_bodies_of_a_pair_or_one(read_one):
     [
         ({"model": "creep_table", "file": "gone.csv"}, "material.file"),
         ({"model": "creep_table", "file": "creep.csv", "times": [0, 1]}, "material.file"),
-        ({"model": "creep_table", "times": [0, 1]}, "material.compliances"),
         ({"model": "creep_table", "file": "bare.csv"}, "material.file"),
         ({"model": "creep_table", "file": "falling.csv", "noise": "1 %"}, "material"),
         ({"model": "dynamic_table", "file": "creep.csv"}, "material.frequency_unit"),
-        ({"model": "power_law", "glassy": 0, "coefficient": 1, "exponent": 1}, "material.exponent"),
         ({"model": "pair", "a": STIFF | {"shear_modulus": -1}, "b": {"model": "pair"}}, "material.a.shear_modulus"),
         (COAT | {"on": ZENER, "thickness": None}, "material.thickness"),
         (COAT | {"on": ZENER, "base": "bonded"}, "material.base"),
@@ -138,7 +136,6 @@ def test_temperature__both_bodies_of_a_pair_or_one(read_one):
         (COAT | {"on": ZENER | {"thickness": "1 mm"}}, "material.on"),
         (COAT | {"on": ZENER | {"poisson": -0.2}}, "material.on"),
         (COAT | {"on": ZENER, "poisson": -0.1}, "material"),
-        (COAT | {"on": ZENER | {"viscosity": "1 Pa s"}}, "material.on.viscosity"),
         (ZENER | {"temperature": 300}, "material.reference_temperature"),
         (ZENER | {"wlf_c1": 3}, "material.temperature"),
         (ZENER | {"temperature": 300, "reference_temperature": 290}, "material.wlf_c1"),
@@ -148,7 +145,6 @@ def test_temperature__both_bodies_of_a_pair_or_one(read_one):
         (ZENER | ARRHENIUS | {"temperature": 25}, "material.temperature"),
         (ZENER | ARRHENIUS | {"shift_factor": 2}, "material.temperature"),
         (ZENER | {"shift_factor": -2}, "material.shift_factor"),
-        (ZENER | {"temperatur": 300}, "material.temperatur"),
     ],
 )
 def test_material__is_refused_at_the_key(read, tmp_path, table, key):

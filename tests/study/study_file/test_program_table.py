@@ -156,22 +156,17 @@ def test_thinned__passes_every_row_within_the_tolerance(rows, tolerance):
         ([{"table": {"times": [0, 2, 1], "values": [0, 1, 2]}}], "program.0.table.times.2"),
         ([{"table": {"file": "length.csv"}}], "program.0.table"),
         ([{"table": {"file": "named.csv"}}], "program.0.table"),
-        ([{"table": {"file": "nan.csv"}}], "program.0.table"),
-        ([{"table": {"file": "none.csv"}}], "program.0.table"),
         ([{"table": {"file": "back.csv"}}], "program.0.table"),
-        ([{"table": {"file": "machine.csv", "laod": "F"}}], "program.0.table.laod"),
         ([{"table": {"file": "gone.csv"}}], "program.0.table.file"),
         ([{"table": "machine.csv"}], "program.0.table"),
         ([{"table": {"file": "machine.csv", "time": "t", "load": "F"}, "control": "load"}], "program.0.table.control"),
         ([{"table": {"file": "machine.csv", "zero": "1 mm"}}], "program.0.table.zero"),
-        ([{"table": {"file": "machine.csv", "thin": "1 s"}}], "program.0.table.thin"),
         ([{"table": {"file": "machine.csv", "time": "t"}}], "program.0.table"),
     ],
 )
 def test_program__is_refused_at_the_key(read, tmp_path, program, key):
-    heading = "time [s], load [N]\n"
-    rows = {"length": "time [ms], load [mm]\n0, 0", "named": "time [s], force [N]\n0, 0", "none": heading}
-    rows |= {"nan": f"{heading}0, 0\n1, nan", "back": f"{heading}0, 0\n2, 1\n1, 3"}
+    rows = {"length": "time [ms], load [mm]\n0, 0", "named": "time [s], force [N]\n0, 0"}
+    rows["back"] = "time [s], load [N]\n0, 0\n2, 1\n1, 3"
     for name, text in (rows | {"machine": "t [s];F [N]\n0;0\n1;1"}).items():
         (tmp_path / f"{name}.csv").write_text(text)
     with refused(key):
