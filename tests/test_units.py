@@ -13,7 +13,7 @@ from support import refused
 from roughvisc.errors import InputError
 from roughvisc.units import number, unit_for
 
-PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6}
+PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9, "T": 12}
 UNITS = st.sampled_from(["m", "N", "Pa", "s", "Pa s"])
 
 
