@@ -34,8 +34,8 @@ ADDED = {
     },
     "material": {
         "mechanics/materials/models.py": {
-            "MODELS: dict[str, Callable[..., Material]] = {\n": '    "gel": gel,\n',
-            "from roughvisc.units import Quantity, number, quantities\n": """
+            "dynamic_table, pair)\n": "_OTHERS = (*_OTHERS, gel)\n",
+            "from roughvisc.units import Quantity, quantities\n": """
 
 @quantities(modulus="Pa", drainage="s")
 def gel(modulus: Quantity, drainage: Quantity) -> Prony:
