@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import textwrap
 import threading
 import warnings
 from collections.abc import Iterator
@@ -20,7 +21,8 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.formats.registry import Channel, ScanFile, brief, forget, open_file, suffixes
+from roughvisc.topography.formats.registry import open_file, suffixes
+from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
 from roughvisc.topography.orientation import orientation, top_line_first
@@ -283,10 +285,9 @@ def _reading(path: Path) -> Iterator[None]:
         except InputError as error:
             raise error.prefixed(str(path)) from error
         except Exception as error:  # damaged files raise many types, such as MemoryError and struct.error
-            forget(error)
-            raise InputError(
-                f"{path}: it cannot be read ({brief(error)}): the file is damaged, or of another format"
-            ) from error
+            found = textwrap.shorten(str(error), 200, placeholder="...") or type(error).__name__
+            text = f"{path}: it cannot be read ({found}): the file is damaged, or of another format"
+            raise InputError(text) from error
 
 
 def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:

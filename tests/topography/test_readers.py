@@ -227,7 +227,7 @@ def test_shipped_card__opens_with_title_and_licence(path):
 
 
 def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "_ADDED", {})
+    monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
     heights = np.arange(12.0).reshape(4, 3) * 1e-6
 
     def read(path):

@@ -1,4 +1,4 @@
-"""Formats that libraries parse: x3pio, sdfio, NumPy and SurfaceTopography.
+"""Formats that libraries parse: x3pio, sdfio, NumPy, netCDF and SurfaceTopography.
 
 x3pio and sdfio return rows along y, ascending, so ``height(x, y)`` is the transpose. SurfaceTopography returns
 ``(x, y)``.
@@ -12,10 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
-from roughvisc.topography.formats.registry import Channel, ScanFile, brief, suffixes
-from roughvisc.units import number
+from roughvisc.topography.formats.scan_file import Channel, ScanFile
+from roughvisc.topography.grid import in_metres
+from roughvisc.units import is_quantity, number
+
+#: Names of heights in netCDF, in order of preference.
+_NAMES = ("height", "heights", "z", "h")
 
 
 def read_x3p(path: Path) -> ScanFile:
@@ -26,17 +32,15 @@ def read_x3p(path: Path) -> ScanFile:
     try:
         content = x3pio.read(path)
     except x3pio.X3pChecksumError as error:
-        complaints.append(f"its checksum is wrong ({brief(error)}): it was changed or damaged after it was written")
+        complaints.append(f"its checksum is wrong ({error}): it was changed or damaged after it was written")
         content = x3pio.read(path, verify=False)
-    is_cloud = content.feature_type == x3pio.FeatureType.POINT_CLOUD
     channels = []
     for i, layer in enumerate(content.layers):
-        heights, sides, kind = layer.z.T, None, "points" if is_cloud else "profile"
-        if is_cloud:
-            heights = np.stack([np.ravel(one) for one in (layer.x, layer.y, layer.z)], axis=1)
-        elif heights.ndim == 2:
-            kind = "height" if layer.is_regular_grid else "points on no regular grid (absolute axes)"
-            sides = (content.header.x.increment, content.header.y.increment)
+        heights, kind, sides = layer.z.T, "height", (content.header.x.increment, content.header.y.increment)
+        if content.feature_type == x3pio.FeatureType.POINT_CLOUD:
+            heights, kind, sides = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3), "points", None
+        elif heights.ndim < 2 or not layer.is_regular_grid:
+            kind = "a profile, or a map on absolute axes"
         load = partial(np.array, heights, float)
         channels.append(Channel(f"layer {i}", layer.z.shape[::-1], load, "m", "m", sides, kind=kind))
     maker = content.metadata.instrument if content.metadata else None
@@ -49,43 +53,55 @@ def read_sdf(path: Path) -> ScanFile:
     import sdfio
 
     content = sdfio.read(path)
-    rows, columns = content.data.shape
-    sides = (content.header.x_scale, content.header.y_scale)
-    kind = "height" if rows > 1 else "profile"
-    channel = Channel("height", (columns, rows), lambda: content.data.T, "m", "m", sides, kind=kind)
-    return ScanFile("sdf", [channel], 0, content.header.manufacturer_id.strip())
+    heights, sides = content.data.T, (content.header.x_scale, content.header.y_scale)
+    channel = Channel("height", heights.shape, lambda: heights, "m", "m", sides)
+    return ScanFile("sdf", [channel], instrument=content.header.manufacturer_id.strip())
 
 
 def read_npy(path: Path) -> ScanFile:
     """Read a NumPy array with rows along x."""
     heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
     kind = "height" if heights.ndim == 2 and heights.dtype.kind in "fiu" else "no areal height"
-    return ScanFile(
-        "npy", [Channel("array", heights.shape[::-1], lambda: np.array(heights.T, float, order="C"), kind=kind)]
-    )
+    load = partial(np.array, heights.T, float, order="C")
+    return ScanFile("npy", [Channel("array", heights.shape[::-1], load, kind=kind)])
 
 
-def read_with_surface_topography(path: Path, format: str, source: BytesIO | StringIO | None = None) -> ScanFile:
-    """Read any format of SurfaceTopography.
+def read_netcdf(path: Path) -> ScanFile:
+    """Read the variables of at least two dimensions of a file in netCDF, as heights if they lie over x and y."""
+    with path.open("rb") as stream:  # the netCDF library crashes on some damaged files of the classic format
+        options: dict[str, Any] = {"engine": "scipy" if stream.read(3) == b"CDF" else "netcdf4", "decode_times": False}
+    # netCDF-4 is not thread-safe, and xarray would lock only the reading
+    with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
+        found = [_variable(name, one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
+    return ScanFile("nc", sorted(found, key=lambda one: _NAMES.index(one.name) if one.name in _NAMES else len(_NAMES)))
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    format : str
-        Name of the format.
-    source : stream, optional
-        Content to read instead of the file.
-    """
-    from SurfaceTopography.IO import lookup_reader_by_format
+
+def _variable(name: Any, variable: xr.DataArray) -> Channel:
+    """Return a variable as a channel, with its heights loaded."""
+    unit = variable.attrs.get("units")
+    is_grid = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
+    if not is_grid or (unit is not None and not is_quantity(f"1 {unit}", "m")):
+        return Channel(str(name), variable.shape, lambda: None, unit, kind="no areal height")
+    heights, positions, lateral = variable.transpose("x", "y").astype(float).load(), None, None
+    if {"x", "y"} <= set(heights.coords):
+        units = [heights[axis].attrs.get("units") for axis in "xy"]
+        if (units[0] is None) != (units[1] is None):
+            raise InputError(f"its coordinates x and y have the units {units[0]!r} and {units[1]!r}: expected both")
+        lateral = None if units[0] is None else "m"
+        positions = (in_metres(heights["x"], "x"), in_metres(heights["y"], "y"))
+    return Channel(str(name), heights.shape, lambda: heights, unit, lateral, positions=positions)
+
+
+def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str) -> ScanFile:
+    """Read any format of SurfaceTopography, from a file or from its content."""
+    from SurfaceTopography.IO import lookup_reader_by_format  # slow to import
 
     if format not in lookup_reader_by_format:
-        raise InputError(key="format", found=format, expected=f"one of {', '.join(sorted(suffixes()))}, or 'auto'")
-    reader = lookup_reader_by_format[format](str(path) if source is None else source)
-
+        raise InputError(key="format", found=format, expected="a key of supported_formats, or 'auto'")
+    reader = lookup_reader_by_format[format](str(source) if isinstance(source, Path) else source)
     channels = [_channel(found) for found in reader.channels]
-    described = reader.channels[0].info.get("instrument", {}) if channels else {}
-    instrument = described.get("name", "") if isinstance(described, dict) else ""
+    described = reader.channels[0].info.get("instrument") if channels else None
+    instrument = described.get("name") if isinstance(described, dict) else None
     default = getattr(reader, "_default_channel_index", None)
     return ScanFile(format, channels, default, str(instrument or ""), close=reader.close)
 
@@ -102,14 +118,12 @@ def _channel(found: Any) -> Channel:
     # a reader may mistake another unit for a length: phases in Bruker files come as heights in ('µm', None)
     units = [unit for unit in (found.unit, found.data_unit) if unit is not None]
     is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
-    if len(shape) == 1 or 1 in shape:
-        return Channel(str(found.channel_id), shape, load, kind="profile")
     if not (found.is_height_channel and found.dim == 2 and is_length and found.is_uniform is not False):
         return Channel(str(found.channel_id), shape, load, kind="no areal height on a uniform grid")
     lateral, sides = found.unit, None
     if sizes is not None:
-        sides = tuple(float(size) / n for size, n in zip(sizes, shape, strict=True))
-        header = found.info.get("raw_metadata", {})
+        sides = (float(sizes[0]) / shape[0], float(sizes[1]) / shape[1])
+        header = found.info.get("raw_metadata")
         if found.unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
             lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
             if lateral is not None and other != lateral:

@@ -1,7 +1,7 @@
-"""Formats of instrument makers that no library reads.
+"""Formats of instrument makers that no library reads, and the choice between formats of text.
 
-A text format is recognised by the first line, and its function takes the text of a file. Rows run along x and the first
-row is y = 0, unless the format states otherwise.
+A text of a maker is recognised by its content. Rows run along x and the first row is y = 0, unless the format states
+otherwise.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from roughvisc.errors import InputError
+from roughvisc.tables import read_text
 from roughvisc.topography.formats.libraries import read_with_surface_topography
-from roughvisc.topography.formats.registry import Channel, ScanFile
+from roughvisc.topography.formats.scan_file import Channel, ScanFile
+from roughvisc.topography.formats.text import read_numbers, read_table
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING = {0: 4096, 1: 32768, 2: 131072}, 2147483640
-#: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
-_TRUEMAP = b"Binary TrueMap Data File v2.0"
+#: First bytes of a Digital Surf file without and with compression.
 _DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
 #: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
 _HEADER, _SIZES = 512, 334
@@ -65,8 +66,8 @@ def read_wyko(text: str) -> ScanFile:
     """
     header, _, data = text.partition("RAW_DATA")
     lines = header.splitlines()
-    stated = {line.split()[0]: line.split()[-1] for line in lines[1:] if line.strip()}
-    columns, rows = (int(re.search(rf"^{axis} Size\s+(\d+)", header, re.MULTILINE)[1]) for axis in "XY")
+    stated = {line.split()[0]: line.split()[-1] for line in reversed(lines[1:]) if line.strip()}
+    columns, rows = int(stated["X"]), int(stated["Y"])  # X Size and Y Size
     words = data.split("\n", 1)[1].split()[: columns * rows]
     heights = np.array(["nan" if word.lower() == "bad" else word for word in words], dtype=float)
     heights = heights.reshape(columns, rows)
@@ -78,28 +79,29 @@ def read_wyko(text: str) -> ScanFile:
 
 def read_esri(text: str) -> ScanFile:
     """Read an ESRI ASCII grid: size of the cells and number of missing points in the header, first row on top."""
-    header = {
-        key.lower(): float(value) for key, value in re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
-    }
-    columns, rows = int(header["ncols"]), int(header["nrows"])
-    sides = tuple(header.get(name, header.get("cellsize", np.nan)) for name in ("dx", "dy"))
-    data = np.array(text.split()[2 * len(header) :], dtype=float).reshape(rows, columns)
+    found = re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
+    header = {key.lower(): float(value) for key, value in found}
+    data = np.array(text.split()[2 * len(header) :], dtype=float).reshape(int(header["nrows"]), int(header["ncols"]))
     heights = np.where(data == header.get("nodata_value", np.nan), np.nan, data).T
-    return _one("esri", heights, None, None, (sides[0], sides[1]))
+    side = header.get("cellsize", np.nan)
+    return _one("esri", heights, None, None, (header.get("dx", side), header.get("dy", side)))
 
 
-def read_keyence(heading: list[str], rows: np.ndarray) -> ScanFile:
+def read_keyence(text: str) -> ScanFile:
     """Read the CSV of a Keyence microscope: unit and spacing from its heading, blank cells are missing points."""
+    table = read_table(text)
+    heights = table.numbers().T
+    heading = text.splitlines()[: table.rows[0]]
     separator = max(";,", key="".join(heading).count)
     stated = {row[0]: row[1:] for row in csv.reader(heading, delimiter=separator) if row}
     shape = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
-    shown = stated.get("Output image data", ["Height"])[0]
-    if rows.T.shape != shape:
-        raise InputError(f"found {rows.shape[1]} x {rows.shape[0]} numbers: expected {shape[0]} x {shape[1]}")
-    side, lateral = float(stated["XY Calibration"][0].replace(",", ".")), stated["XY Calibration"][1]
+    if heights.shape != shape:
+        raise InputError(f"found {heights.shape[0]} x {heights.shape[1]} numbers: expected {shape[0]} x {shape[1]}")
+    shown, (side, lateral, *_) = stated.get("Output image data", ["Height"])[0], stated["XY Calibration"]
+    sides = (float(side.replace(",", ".")),) * 2
     kind = "height" if shown == "Height" else "no areal height"
-    channel = Channel(shown, shape, lambda: rows.T, stated["Unit"][0], lateral, (side, side), kind=kind)
-    return ScanFile("keyence", [channel], 0, stated.get("Model", [""])[0])
+    channel = Channel(shown, shape, lambda: heights, stated["Unit"][0], lateral, sides, kind=kind)
+    return ScanFile("keyence", [channel], instrument=stated.get("Model", [""])[0])
 
 
 def _one(
@@ -108,20 +110,47 @@ def _one(
     return ScanFile(format, [Channel("height", heights.shape, lambda: heights, unit, lateral, sides)])
 
 
+#: Pattern of the beginning of a text -> its reader.
+_TEXTS = {
+    r"\W*Zygo XYZ Data File": read_zygo_xyz,
+    r"\W*Zygo ASCII Data File": read_zygo_ascii,
+    r"\W*Wyko ASCII Data File": read_wyko,
+    r"\W*ncols": read_esri,
+    r"(?s:.{,4000})XY Calibration": read_keyence,
+}
+
+
+def read_text_file(path: Path, format: str) -> ScanFile:
+    """Read a text file: in the format of an instrument maker, points, or a matrix.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str
+        ``"zygo"``, ``"keyence"``, ``"wyko"`` or ``"esri"`` to refuse any other content; otherwise as in
+        :func:`~roughvisc.topography.formats.text.read_numbers`.
+    """
+    text = read_text(path)
+    for pattern, read in _TEXTS.items():
+        if re.match(pattern, text, re.IGNORECASE):
+            return read(text)
+    if format in ("zygo", "keyence", "wyko", "esri"):
+        raise InputError(f"its beginning differs: expected a text in the format {format}")
+    return read_numbers(text, format)
+
+
 def read_truemap(path: Path) -> ScanFile:
     """Read a TrueMap or GelSight file of version 2: a comment, then the grid in millimetres, top line first."""
     content = path.read_bytes()
-    if not content.startswith(_TRUEMAP):
-        raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
     comment = content.index(b"\0") + 1
     at = content.index(b"\0", comment) + 1
     columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
     if not (min(columns, rows) > 1 and width > 0 and height > 0):
         raise InputError(f"found {columns} x {rows} points over {width:g} x {height:g} mm: the file is damaged")
     heights = np.frombuffer(content, "<f4", columns * rows, at + 24).reshape(rows, columns).T.astype(float)
-    sides = (width / columns, height / rows)
-    instrument = content[comment : at - 1].decode("latin-1").strip()
-    return ScanFile("tmd", [Channel("Default", (columns, rows), lambda: heights, "mm", "mm", sides)], 0, instrument)
+    channel = Channel("Default", (columns, rows), lambda: heights, "mm", "mm", (width / columns, height / rows))
+    return ScanFile("tmd", [channel], instrument=content[comment : at - 1].decode("latin-1").strip())
 
 
 def read_digital_surf(path: Path) -> ScanFile:
@@ -130,17 +159,13 @@ def read_digital_surf(path: Path) -> ScanFile:
     A compressed file holds, after the comment and the private zone: the number of streams, the raw and the compressed
     size of each stream, and the zlib streams.
     """
-    with path.open("rb") as stream:
-        if stream.read(len(_COMPRESSED)) != _COMPRESSED:
-            return read_with_surface_topography(path, "sur")
     content = path.read_bytes()
+    if not content.startswith(_COMPRESSED):
+        return read_with_surface_topography(path, "sur")
     begin = _HEADER + sum(struct.unpack_from("<2H", content, _SIZES))
     (count,) = struct.unpack_from("<I", content, begin)
-    sizes = [struct.unpack_from("<2I", content, begin + 4 + 8 * i) for i in range(count)]
-    heights, at = b"", begin + 4 + 8 * count
-    for raw, packed in sizes:
-        heights += zlib.decompressobj().decompress(content[at : at + packed], raw)
+    expanded, at = _DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin], begin + 4 + 8 * count
+    for raw, packed in struct.iter_unpack("<2I", content[begin + 4 : at]):
+        expanded += zlib.decompressobj().decompress(content[at : at + packed], raw)
         at += packed
-    return read_with_surface_topography(
-        path, "sur", BytesIO(_DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin] + heights)
-    )
+    return read_with_surface_topography(BytesIO(expanded), "sur")
