@@ -238,14 +238,9 @@ class Body:
             raise InputError(key="kernel", found=self.kernel, expected="a kernel, derived from Kernel")
 
     @property
-    def separates(self) -> bool:
-        """Whether space and time separate: all waves creep equally, and kernel and material describe the body."""
-        return True
-
-    @property
     def can_crop(self) -> bool:
         """Whether a part of a surface suffices in free space: no cell deeper than the approach touches."""
-        return self.separates and not self.kernel.raises_surface
+        return not self.kernel.raises_surface
 
     @property
     def materials(self) -> tuple[Material, ...]:

@@ -30,7 +30,7 @@ BASE: Base = "bonded"
 # Distance in thicknesses beyond which the kernel is set to zero: it is below 1e-17 of its value at one thickness.
 _REACH = 46.0
 # Argument x from which 1 - S(x), which decreases as x^2 exp(-2 x), is below rounding.
-SHORTEST_WAVE = 24.0
+_SHORTEST_WAVE = 24.0
 # Nodes of the correction per thickness, and degree of the spline through them: error below 1e-14.
 _PER_THICKNESS, _DEGREE = 16, 9
 # Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13.
@@ -132,8 +132,7 @@ class Sheet(Kernel):
 
         It compares the sheet with a half-space, to first order in the contact radius over the thickness.
         """
-        s, weights = panels(96, SHORTEST_WAVE, 16)
-        return float(weights @ complement(s, self.poisson, self.base)) / (math.pi * self.thickness)
+        return float(_correction(self.poisson, self.base)(np.zeros(1))[0]) / self.thickness
 
     def described(self) -> dict[str, Any]:
         """Return thickness [m] and base."""
@@ -229,7 +228,7 @@ def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
 @lru_cache(maxsize=8)
 def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
     """Return the kernel of a half-space less the kernel of a sheet, by distance in thicknesses. [1/thickness]"""
-    s, weights = panels(96, SHORTEST_WAVE, 16)
+    s, weights = panels(96, _SHORTEST_WAVE, 16)
     amplitude = weights * complement(s, poisson, base) / math.pi
     # the function is even: the nodes begin before zero, so that zero is no end
     at = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))

@@ -43,13 +43,6 @@ def test_a_step_load__has_the_approach_of_the_compliance_then(curve):
     assert 0 < ds.attrs["series_error"] <= 1e-4
 
 
-def test_a_pair__takes_one():
-    both = rv.pair(of(CURVES["stretched"]), rv.zener(1e6, 1e6, 1e5))
-    t = np.array([0.0, 0.1, 2.0])
-    rest = rv.zener(1e6, 1e6, 1e5).contact_compliance(t)
-    assert both.contact_compliance(t) == pytest.approx(CURVES["stretched"](t) + rest)
-
-
 def test_a_compliance_of_no_passive_material__is_said_to_be_none():
     # a delay: no positive sum of exponentials
     ds = pressed(rv.creep(lambda t: 4e-7 + 4e-7 * np.clip((t - 0.1) / 0.01, 0, 1)))
@@ -62,7 +55,7 @@ def test_a_compliance_of_no_passive_material__is_said_to_be_none():
     ("function", "words"),
     [
         (lambda t: -4.0 - t, r"creep of .*lambda.* is -4 1/Pa at 0 s"),
-        (lambda t: 1 / (1 + t), "expected no less than before"),
+        (lambda t: 1 / (1 + t), r"is 0\.9\d* 1/Pa at .*no less than before"),
         (lambda t: 1e-7, "expected a number each"),
         (lambda t: 0 * t, "is 0 1/Pa at .* expected a positive compliance"),
     ],

@@ -136,6 +136,5 @@ def one_less_mean_decay(x: ArrayLike) -> Array:
     """Return ``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
     x = np.asarray(x, dtype=float)
     small, large = np.minimum(x, 0.3), np.maximum(x, 0.3)
-    return np.where(
-        x < 0.3, np.add.reduce(_SERIES * small[..., None] ** _POWERS, axis=-1), 1 + np.expm1(-large) / large
-    )
+    series = np.add.reduce(_SERIES * small[..., None] ** _POWERS, axis=-1)
+    return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)

@@ -150,7 +150,9 @@ def relaxation_series(
     The retardation rates are the zeros of ``G_e - sum G_i lambda / (r_i - lambda)``, found between
     consecutive rates ``r_i = 1/theta_i``.
     """
-    strengths, poles = _merged(moduli, times)
+    weights = np.asarray(moduli, dtype=float)
+    poles, place = np.unique(1 / np.asarray(times, dtype=float)[weights > 0], return_inverse=True)
+    strengths = np.bincount(place, weights[weights > 0], poles.size).astype(float)  # of equal times together
     glassy_modulus = equilibrium + float(np.sum(strengths))
     if glassy_modulus == 0:
         raise InputError(key="moduli", found=moduli, expected="a positive modulus, or a positive equilibrium modulus")
@@ -163,13 +165,6 @@ def relaxation_series(
     # 1/G~ has the residue J_k rate there, and d(G~)/ds is rate * sum strengths / offset^2
     compliances = 1 / (rates * rates * np.sum(strengths / offsets**2, axis=1))
     return Prony(1 / glassy_modulus, fluidity, tuple(compliances), tuple(1 / rates), poisson, **about)
-
-
-def _merged(weights: Sequence[float], times: Sequence[float]) -> tuple[Array, Array]:
-    """Return positive weights and rates ``1/time``, with ascending rates and equal rates merged."""
-    positive = np.asarray(weights, dtype=float) > 0
-    rates, place = np.unique(1 / np.asarray(times, dtype=float)[positive], return_inverse=True)
-    return np.bincount(place, np.asarray(weights, dtype=float)[positive], rates.size).astype(float), rates
 
 
 def _secular_roots(strengths: Array, poles: Array) -> tuple[Array, Array]:

@@ -20,7 +20,6 @@ from roughvisc.mechanics.materials.creep import Creep, Material, check_creep, pa
 from roughvisc.mechanics.materials.prony import Prony
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Number of times per decade at which a series is fitted, and at which its error is measured.
 _FITTED, _MEASURED = 30, 100
@@ -160,7 +159,7 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     return np.where(seen > _UNSEEN, weights / norms, 0.0)
 
 
-def complex_compliance(material: Material, frequency: ArrayLike) -> Complex:
+def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.complex128]:
     r"""Return the complex contact compliance: displacement over pressure if both oscillate as ``exp(i w t)``.
 
     Parameters
