@@ -424,10 +424,8 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
     """
     if not isinstance(load, Program):
         load = Program().load(number(load, "N", "load", above=0), over=0)
-    value = 0.0
-    for segment in load.segments:
-        end = value if segment.end is None else segment.end
-        if segment.control != "load" or segment.amplitude or segment.slide or end < value:
-            raise InputError(key="load", found=load, expected="a load that never falls, without cycles and slides")
-        value = end
+    ends = [0.0, *(one.end for one in load.segments if one.end is not None)]
+    is_load = all(one.control == "load" and not (one.amplitude or one.slide) for one in load.segments)
+    if not is_load or ends != sorted(ends):
+        raise InputError(key="load", found=load, expected="a load that never falls, without cycles and slides")
     return GrowingContact(sphere_radius, material, load)

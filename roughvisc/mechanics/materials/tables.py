@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
@@ -103,13 +103,12 @@ def creep_table(
     def columns(tau: Array) -> Array:
         return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
 
-    weights, tau, misfit, note = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
-    note += f", times {t[0]:g} to {t[-1]:g} s"
+    weights, tau, misfit, about = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
+    note = about["note"] + f", times {t[0]:g} to {t[-1]:g} s"
     if t[0] > 0:
         note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
-    terms = float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau)
-    misfit = misfit if misfit > noise else 0.0
-    return Prony(glassy, *terms, poisson, note, longest=float(t[-1]), warning=_gap("creep", rows), misfit=misfit)
+    about |= {"note": note, "longest": float(t[-1]), "misfit": misfit if misfit > noise else 0.0}
+    return Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau), poisson, **about)
 
 
 @quantities(times="s", moduli="Pa")
@@ -154,8 +153,9 @@ def relaxation_table(
     def columns(theta: Array) -> Array:
         return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
 
-    fit = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
-    return _relaxing(fit, poisson, f"times {t[0]:g} to {t[-1]:g} s", _gap("relaxation", t[later]))
+    weights, theta, _, about = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
+    about["note"] += f", times {t[0]:g} to {t[-1]:g} s"
+    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -210,8 +210,7 @@ def dynamic_table(
     omega = omega * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
     for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
         raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
-    factor = tensile_to_shear(kind, poisson)
-    elastic, viscous = elastic / factor, viscous / factor
+    elastic, viscous = (one / tensile_to_shear(kind, poisson) for one in (elastic, viscous))
     size, at = np.hypot(elastic, viscous), 1 / omega
     order = np.argsort(at, kind="stable")
     again = np.diff(np.log(at[order])) < _SAME_FREQUENCY
@@ -227,9 +226,9 @@ def dynamic_table(
         in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
         return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-    fit = _fitted(columns, at[order], size[order], target, scale, _MODULI)
-    span = f"frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return _relaxing(fit, poisson, span, _gap("dynamic", at[order]))
+    weights, theta, _, about = _fitted(columns, at[order], size[order], target, scale, _MODULI)
+    about["note"] += f", frequencies {omega.min():g} to {omega.max():g} rad/s"
+    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
 
 
 def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
@@ -271,8 +270,8 @@ def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool =
 
 def _fitted(
     columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, most: tuple[float, float]
-) -> tuple[Array, Array, float, str]:
-    """Return the non-negative weights of a series, its times [s], its largest relative misfit, and these in words.
+) -> tuple[Array, Array, float, dict[str, Any]]:
+    """Return the non-negative weights of a series, its times [s], its largest relative misfit, a note and a warning.
 
     Parameters
     ----------
@@ -307,17 +306,11 @@ def _fitted(
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
     rms, largest, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[3].size)
     count, misfits = np.count_nonzero(weights), f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
-    return weights, times, largest, f"{count} terms fitted to {target.size} values, {misfits}"
+    note = f"{count} terms fitted to {target.size} values, {misfits}"
+    return weights, times, largest, {"note": note, "warning": _gap(at)}
 
 
-def _relaxing(fit: tuple[Array, Array, float, str], poisson: float, span: str, warning: str) -> Prony:
-    """Return the material of a fit to a table of moduli."""
-    weights, theta, _, note = fit
-    about = {"note": f"{note}, {span}", "warning": warning}
-    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
-
-
-def _gap(kind: str, times: Array) -> str:
+def _gap(times: Array) -> str:
     """Return a warning of neighbouring rows more than a decade apart, else ''.
 
     Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones.
@@ -326,7 +319,7 @@ def _gap(kind: str, times: Array) -> str:
     if ratios.max(initial=1.0) <= _DECADE:
         return ""
     before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
-    what = f"The {kind} table has no row between {before} and {after}, more than a decade"
+    what = f"The table of the material has no row between {before} and {after}, more than a decade"
     return f"{what}: the material between is a guess that stated errors do not include. Use one row per decade."
 
 

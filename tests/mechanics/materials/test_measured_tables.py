@@ -265,6 +265,17 @@ def test_bad_input__is_named(make, message):
         make()
 
 
+@pytest.mark.parametrize("step", [10.0, 100.0])
+def test_rows_more_than_a_decade_apart__are_a_warning(step):
+    """Three rows over six decades of a power law gave approaches 0.74 to 1.16 times as large as the true ones."""
+    t = step ** np.arange(4.0)
+    tables = rv.creep_table(t, t**0.3), rv.relaxation_table(t, t**-0.3)
+    tables += (rv.dynamic_table(1 / t, *dynamic(1 / t), frequency_unit="rad/s"), rv.pair(tables[0], rv.elastic(1.0)))
+    for material in tables:
+        assert ("between 1 s and 100 s" in material.warning) == (step > 10)
+        assert bool(material.warning) == (step > 10)
+
+
 # --- several temperatures -------------------------------------------------------------------------------------------
 
 
