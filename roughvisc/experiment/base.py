@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.settings import GRID_ERROR_CELLS, OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.topography.borders import MIRRORED, is_mirrored, is_periodic, recipe_name
-from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.grid import checked
 from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.synthesis import BOUNDARIES
 
@@ -83,17 +83,13 @@ class Problem:
         Raises
         ------
         InputError
-            If the heights are invalid, the boundary must be stated, a setting has no meaning in the experiment, or the
-            kernel of the body is not accurate on the cells in free space. With periodic and mirror boundaries the
-            transfer function is exact on any cells.
+            If the heights are invalid, the boundary must be stated, or a setting has no meaning in the experiment.
         """
         height, settings = checked(self.height, "height", least=1), self.settings
         boundary = known_boundary(settings, experiment.boundary, partial(boundary_of, height))
         if boundary is None:
             name = height.attrs.get("source_file", "height")
             raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
-        if boundary == "free":
-            self.body.kernel.check_cells(spacing(height, "height"))
         grid_error, (fewest, most) = settings.grid_error, GRID_ERROR_CELLS
         if grid_error == "auto":  # only if no further field has to be kept
             needs_pressure = experiment.axis == "time" and "pressure" not in settings.fields

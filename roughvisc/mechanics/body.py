@@ -77,21 +77,6 @@ class Kernel(ABC):
             displacement is then left out, and the approach under periodic boundaries counts without it. [m]
         """
 
-    def check_cells(self, spacing: tuple[float, float]) -> None:
-        """Refuse cells on which :meth:`influence` is inaccurate. Default: accept all cells.
-
-        Parameters
-        ----------
-        spacing : tuple of float
-            Cell sides ``(dx, dy)``. [m]
-
-        Raises
-        ------
-        InputError
-            If the cells are too long.
-        """
-        return
-
     def described(self) -> dict[str, Any]:
         """Return the attributes of a result that describe the body: names and values."""
         return {"kernel": repr(self)}

@@ -16,7 +16,6 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
-from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body, Kernel, check_one_body
 from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.materials.creep import Material
@@ -35,8 +34,8 @@ _SHORTEST_WAVE = 24.0
 _PER_THICKNESS, _DEGREE = 16, 9
 # Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cell sides in thicknesses above which cells are long, and above which they are refused.
-_LONG, _LONGEST = 0.5, 50.0
+# Cell side in thicknesses above which cells are long.
+_LONG = 0.5
 # Below this x, sinh(2 x) - 2 x is computed from its series, with these coefficients.
 _SERIES_BELOW, _SERIES = 0.5, 1 / np.cumprod(np.arange(2.0, 27))[1::2]
 # Smallest x, below which the transfer function has the value of uniform pressure.
@@ -173,14 +172,6 @@ class Sheet(Kernel):
         qx, qy = (2 / side * np.sqrt(s + s**2 / 3) for s, side in zip(sines, spacing, strict=True))
         influence: Array = scipy.fft.idctn(self.transfer(qx[:, None], qy), type=1)
         return influence[: shape[0], : shape[1]]
-
-    def check_cells(self, spacing: tuple[float, float]) -> None:
-        """Refuse cells longer than fifty thicknesses."""
-        ratio = max(spacing) / self.thickness
-        if ratio > _LONGEST * (1 + 1e-9):
-            found = f"thickness is {self.thickness:.6g} m, and cells are {ratio:.4g} times the thickness"
-            advice = "take shorter cells or periodic boundaries"
-            raise InputError(f"{found}: expected cells of at most {_LONGEST:g} thicknesses in free space; {advice}")
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
