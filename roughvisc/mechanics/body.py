@@ -166,14 +166,12 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
     InputError
         If the transfer function is not positive.
     """
-    waves = periodic_waves(shape, spacing)
-    symbol = np.array(kernel.transfer(*waves), dtype=float)
+    symbol = np.array(kernel.transfer(*periodic_waves(shape, spacing)), dtype=float)
     wrong = ~(np.isfinite(symbol) & (symbol > 0))
     wrong[0, 0] = not 0 <= symbol[0, 0] < math.inf
-    for i, j in np.argwhere(wrong)[:1]:
-        at = f"wave numbers {waves[0][i, 0]:g} and {waves[1][0, j]:g} 1/m"
-        expected = "expected a positive number, or zero if both are zero"
-        raise InputError(f"the transfer function of {kernel!r} is {symbol[i, j]:g} m at {at}: {expected}")
+    if wrong.any():
+        expected = f"a positive transfer function, or zero at zero wave numbers, not {symbol[wrong][0]:g} m"
+        raise InputError(key="kernel", found=kernel, expected=expected)
     return symbol
 
 

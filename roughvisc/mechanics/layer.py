@@ -222,8 +222,6 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
     found = np.zeros(shape)
     for depth, weight in zip(depths, weights, strict=True):
         found[near] += weight / math.pi * corner_sum(x[rows, 0], y[0, columns], dx, dy, depth)
-    if near.all():
-        return found
     farthest = math.hypot(shape[0] * dx, shape[1] * dy)
     at = unit * np.geomspace(1, 1 + farthest / unit, math.ceil(_DISTANCES * math.log10(1 + farthest / unit)) + 8) - unit
     far = (weights / np.sqrt(at[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from samples import UNIT, Scaled
+from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
@@ -68,3 +69,13 @@ def test_springs_of_the_users_own__carry_a_ball():
     ds = rv.simulate(ball, springs, rv.Program().approach(depth, over=0), progress=False)
     assert float(ds.force[0]) == pytest.approx(math.pi * depth**2 / 0.1, rel=1e-3)
     assert float(ds.contact_area[0]) == pytest.approx(2 * math.pi * depth, rel=0.01)
+
+
+def test_kernel_that_pressure_lifts__is_refused():
+    class Lifting(Springs):
+        def transfer(self, qx, qy):
+            return -super().transfer(qx, qy)
+
+    height, program, settings = PATHS["periodic, grid error"]
+    with refused("kernel", Lifting(0.1)):
+        rv.simulate(height, rv.Body(UNIT, Lifting(0.1)), program, progress=False, **settings)

@@ -339,10 +339,9 @@ def shift(material: Material, factor: float) -> Material:
     >>> float(shift(rv.maxwell(1e6, 1e6), 10.0).creep_compliance(20.0))  # J(2 s) at the reference temperature
     3e-06
     """
-    if not (isinstance(factor, int | float | np.number) and 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT):
-        raise InputError(key="factor", found=factor, expected="a number from 1e-30 to 1e30")
+    factor = number(factor, "1", "factor", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT)
     note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
-    return check_material(material).scaled(float(factor), 1.0, note)
+    return check_material(material).scaled(factor, 1.0, note)
 
 
 def stiffened(material: Material, factor: float) -> Material:

@@ -96,8 +96,7 @@ def from_relaxation(
         equilibrium, moduli = instantaneous * (rest if rest > _ONE else 0.0), [instantaneous * one for one in ratios]
     equilibrium = number(equilibrium, "Pa", "equilibrium", least=0)
     if len(moduli) and 0 < max(moduli) <= 1 and sum(moduli) < _RATIOS * equilibrium:
-        expected = "moduli [Pa]; ratios without a unit belong to instantaneous= and ratios="
-        raise InputError(key="moduli", found=moduli, expected=expected)
+        raise InputError(key="moduli", found=moduli, expected="moduli [Pa]; for ratios, instantaneous= and ratios=")
     if bulk_modulus is not None and poisson is not None:
         raise InputError(key="bulk_modulus", found=bulk_modulus, expected="either poisson or bulk_modulus")
     constant = 0.5 if poisson is None else poisson
@@ -130,14 +129,10 @@ def _with_elastic_bulk(
     else:
         volume = relaxation_series(3 * bulk_modulus + equilibrium, moduli, times)
         glassy, later, times = found.glassy + 3 * volume.glassy, [3 * one for one in volume.compliances], volume.times
-    return Prony(
-        glassy,
-        found.fluidity,
-        (*found.compliances, *later),
-        (*found.times, *times),
-        note=f"effective compliance for an elastic bulk modulus of {bulk_modulus:g} Pa",
-        stands_for="a body with an elastic bulk modulus, whose Poisson ratio changes in time",
-    )
+    terms = (*found.compliances, *later), (*found.times, *times)
+    note = f"effective compliance for an elastic bulk modulus of {bulk_modulus:g} Pa"
+    stands_for = "a body with an elastic bulk modulus, whose Poisson ratio changes in time"
+    return Prony(glassy, found.fluidity, *terms, note=note, stands_for=stands_for)
 
 
 def relaxation_series(

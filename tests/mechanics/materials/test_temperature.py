@@ -74,7 +74,7 @@ def test_shifted__a_table_ends_later_in_the_cold():
         (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
         (lambda: rv.shift(MATERIALS["elastic"], 0.0), "factor"),
         (lambda: rv.shift(MATERIALS["elastic"], np.nan), "factor"),
-        (lambda: rv.shift(MATERIALS["elastic"], "2"), "factor"),
+        (lambda: rv.shift(MATERIALS["elastic"], "2 K"), "factor"),
         (lambda: rv.shift(3.0, 2.0), "material"),
         (lambda: stiffened(MATERIALS["elastic"], 0.0), "modulus_factor"),
         (lambda: stiffened(MATERIALS["elastic"], np.inf), "modulus_factor"),
