@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,6 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.errors import ConvergenceError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
@@ -124,22 +123,20 @@ def solve(
     InputError
         If the input is invalid; raised before anything is computed.
     ConvergenceError
-        If the result has no rows.
+        If the contact of a step or at a speed is not solved.
     """
     problem = problem.resolved(experiment)
     height, settings = problem.height, problem.settings
-    needed: tuple[str, ...] = ()
-    if settings.grid_error and isinstance(experiment, Loading) and "pressure" not in settings.fields:
-        needed = ("pressure",)
+    needed = () if "pressure" in settings.fields or not isinstance(experiment, Loading) else ("pressure",)
+    if settings.grid_error:
         problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
-    with fft.set_workers(threads_for(threads)):
-        with ExitStack() as bar:
-            report = progress if callable(progress) else None
-            if progress is True:
-                from roughvisc.progress import reporting  # slow to import
+    bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
+    if progress is True:
+        from roughvisc.progress import reporting  # slow to import
 
-                doing = "pressing" if experiment.axis == "time" else "sliding"
-                report = bar.enter_context(reporting(doing, experiment.progress))
+        bar = reporting("pressing" if experiment.axis == "time" else "sliding", experiment.progress)
+    with fft.set_workers(threads_for(threads)):
+        with bar as report:
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         for subject, text in warnings_of(dataset.attrs).items():
             if subject not in ISSUED:
@@ -203,16 +200,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     -------
     xarray.Dataset
         Over the axis of the experiment, not labelled yet.
-
-    Raises
-    ------
-    ConvergenceError
-        If there are no rows.
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = pd.DataFrame(recorder.plain)
-    if not len(steps) or not steps["kept"].any():
-        raise ConvergenceError("no step was accepted at a kept time: expected a program with at least one segment")
     kept = steps[steps["kept"]].sort_values("place", kind="stable")
     attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
     columns = {name: (axis, kept[name].to_numpy()) for name in kept if name not in ("kept", "place", axis)}

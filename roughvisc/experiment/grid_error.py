@@ -20,10 +20,11 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import RoughviscError
-from roughvisc.experiment.coarser import coarser, pressure_distance
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary
-from roughvisc.topography.indenters import is_indenter
+from roughvisc.topography.grid import cell_edges
+from roughvisc.topography.indenters import is_indenter, remade
+from roughvisc.topography.resampling import resample
 from roughvisc.variables import GRID_ERROR, axis_of
 
 log = logging.getLogger("roughvisc")
@@ -33,29 +34,15 @@ Array = NDArray[np.float64]
 #: converges like the number of cells at its edge. The contact area keeps the scatter of the count. Friction shows order
 #: 2 or more. With order 1.5 the stated error is at least 1.1 times the true error on 24 rough surfaces, and 10 times
 #: the true error in the median.
-ORDERS = {
-    "pressure": (1.0, 1.5),
-    "force": (1.0, 1.5),
-    "approach": (1.0, 2.0),
-    "contact_area": (1.5, 1.5),
-    "contact_area_counted": (0.5, 1.0),
-    "mean_gap": (1.0, 1.5),
-    "friction_force": (1.0, 1.5),
-    "friction_coefficient": (1.0, 1.5),
-    "leak_rate": (1.0, 1.5),
-    "thermal_conductance": (1.0, 1.5),
-}
+ORDERS = {"approach": (1.0, 2.0), "contact_area": (1.5, 1.5), "contact_area_counted": (0.5, 1.0)}
+#: Orders of the other quantities.
+_USUAL = 1.0, 1.5
 #: Safety factor and order for one coarser grid, from which the order cannot be estimated. On the 456 contacts of
 #: ``workflows/benchmarks/grid_accuracy.py`` the error is then below 0.8 of the true one in 1 of 446 pressures, 1 of 299
 #: approaches, 1 of 155 forces, 5 of 142 mean gaps and 16 of 454 areas; with a third grid in 1, 0, 1, 2 and 10.
-_ONE_COARSER = {
-    "pressure": (2.0, 1.5),
-    "force": (3.0, 1.5),
-    "approach": (3.0, 1.5),
-    "contact_area": (2.0, 1.5),
-    "mean_gap": (3.0, 1.0),
-    "friction_force": (3.0, 1.5),
-}
+_ONE_COARSER = {"pressure": (2.0, 1.5), "contact_area": (2.0, 1.5), "mean_gap": (3.0, 1.0)}
+#: The same for other quantities.
+_ONE_COARSER_USUAL = 3.0, 1.5
 #: The area of a sliding contact converges more slowly than the area of a contact at rest.
 _MOVING = {"contact_area": (1.0, 1.0)}
 #: Roache's safety factors: with three grids, and with two.
@@ -90,7 +77,8 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
     .. [1] P. J. Roache, Annu. Rev. Fluid Mech. 29 (1997) 123.
     """
     near, far = np.asarray(near, dtype=float), np.asarray(far, dtype=float)
-    lowest, expected = _MOVING.get(name, ORDERS[name]) if moving else ORDERS[name]
+    usual = ORDERS.get(name, _USUAL)
+    lowest, expected = _MOVING.get(name, usual) if moving else usual
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.log(far / near) / math.log(ratio)
     order = np.where(np.isnan(seen), expected, np.clip(seen, lowest, expected))
@@ -135,7 +123,7 @@ def with_grid_error(
     Errors are relative to the largest value of the quantity, the error of the pressure (L1) to the largest force.
     ``grid_error`` is the largest error of pressure, force and approach. All runs have an error in time within the
     tolerance, so the estimates are meaningless far below the tolerance. They are missing if the coarser run fails. The
-    coarser grid has all waves that it can resolve, see :func:`~roughvisc.experiment.coarser.coarser`.
+    coarser grid has all waves that it can resolve, see :func:`coarser`.
     """
     axis = axis_of(dataset.variables)
     places = dataset[axis].values.tolist()
@@ -157,7 +145,7 @@ def with_grid_error(
         apart["pressure"] = pressure_distance(coarse, dataset) / largest["force"]
         ratio = math.sqrt(height.size / few.size)
         for name, difference in apart.items():
-            safety, order = _ONE_COARSER[name]
+            safety, order = _ONE_COARSER.get(name, _ONE_COARSER_USUAL)
             found[name] = safety * difference / (ratio**order - 1)
         is_given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
         rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(places))]
@@ -307,3 +295,85 @@ def _edge(contact: Mask, free: Mask, boundary: Boundary) -> tuple[Mask, Mask, in
         at_end |= contact & ~material
         ends += int(np.count_nonzero(contact & ~material))
     return at_edge, at_end, faces, ends
+
+
+# ------------------------------------------------------------------------------------------------------ coarser grids
+
+
+def coarser_shape(shape: tuple[int, int], factor: float, same_parity: bool) -> tuple[int, int]:
+    """Return the shape of a grid with cells longer by about a factor, at least two cells along each axis.
+
+    The apex of an indenter lies in a cell if the number of cells is odd, and between cells if it is even;
+    ``same_parity`` keeps the position.
+
+    Examples
+    --------
+    >>> coarser_shape((31, 64), 2, True), coarser_shape((31, 64), 2, False), coarser_shape((8, 1), 2, True)
+    ((17, 32), (16, 32), (4, 1))
+    """
+    counts = []
+    for count in shape:
+        fewer = max(round(count / factor), min(2, count))
+        counts.append(fewer + (same_parity and (fewer - count) % 2 != 0))
+    return counts[0], counts[1]
+
+
+def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataArray:
+    """Return a surface on cells longer by about a factor. [m]
+
+    An indenter is generated again. Any other surface keeps the waves that the new cells can resolve.
+
+    Parameters
+    ----------
+    height : xarray.DataArray
+        Heights of the surface. [m]
+    factor : float
+        Ratio of the new cell side to the old one.
+    boundary : {"free", "periodic", "mirror"}
+        Boundary of the run. With "periodic" the surface repeats, with "mirror" it repeats with its mirror images.
+    """
+    shape = (height.sizes["x"], height.sizes["y"])
+    few = remade(height, coarser_shape(shape, factor, True))
+    periodic = {"periodic": True, "mirror": False}.get(boundary)
+    return resample(height, coarser_shape(shape, factor, False), periodic=periodic) if few is None else few
+
+
+def _shares(cells: Array, onto: Array) -> Array:
+    """Return the fraction of each new cell (rows) that lies in each old cell (columns)."""
+    common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
+    return np.asarray(np.maximum(common, 0.0) / np.diff(onto)[:, None])
+
+
+def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
+    """Return the L1 distance of the pressures on two grids, at each common time. [N]
+
+    Parameters
+    ----------
+    found, wanted : xarray.Dataset
+        Results at the same times with ``pressure``. Both pressures are averaged over the coarser cells.
+
+    Returns
+    -------
+    ndarray, shape (time,)
+        Integral of the absolute difference.
+    """
+    grids = [tuple(cell_edges(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
+    sides = [np.diff(grid[0])[0] for grid in grids]
+    common = grids[int(np.argmax(sides))]
+    low, high = ([reach(grid[axis][end] for grid in grids) for axis in (0, 1)] for end, reach in ((0, min), (-1, max)))
+    onto = (_extended(common[0], low[0], high[0]), _extended(common[1], low[1], high[1]))
+    means = []
+    for ds, grid in zip((found, wanted), grids, strict=True):
+        along_x, along_y = (_shares(a, b) for a, b in zip(grid, onto, strict=True))
+        means.append(along_x @ ds["pressure"].values @ along_y.T)
+    area = np.diff(onto[0])[:, None] * np.diff(onto[1])
+    return np.asarray((np.abs(means[0] - means[1]) * area).sum(axis=(-2, -1)))
+
+
+def _extended(edges: Array, low: float, high: float) -> Array:
+    """Return cell edges, extended by cells of the same side until they cover both limits."""
+    side = edges[1] - edges[0]
+    before, after = (max(0, math.ceil(gap / side - 1e-9)) for gap in (edges[0] - low, high - edges[-1]))
+    return np.concatenate(
+        [edges[0] - side * np.arange(before, 0, -1), edges, edges[-1] + side * np.arange(1, after + 1)]
+    )

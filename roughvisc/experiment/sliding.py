@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Experiment, Problem, Row, Rows
-from roughvisc.experiment.coarser import coarser_shape
-from roughvisc.experiment.grid_error import counting_error, grid_errors, grid_uncertainty, hidden_opening
+from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_errors, grid_uncertainty, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.warnings import (

@@ -78,13 +78,14 @@ def loading_warnings(
     wakes, pressure = [], dataset["pressure"][-1].values if "pressure" in dataset else None
     for axis in (0, 1):
         period = profile.height.shape[axis] * profile.spacing[axis]
-        strokes = [one for one in scene.program.segments if one.slide is not None and one.slide.axis == axis]
-        distances = [one.slide.distance for one in strokes if one.slide is not None]
+        path, left = 0.0, dict[float, float]()
+        for segment in scene.program.segments:
+            if segment.slide is not None and segment.slide.axis == axis:
+                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
+                crept = scene.memory.compliance(min(period / speed, end))
+                left[speed] = unrecovered(crept, scene.memory.compliance(end))
         # on a shorter path the contact does not reach the next wake
-        if sum(distances) >= period / 2 and stands_alone(profile.height, pressure, axis):
-            speeds = [distance / one.duration for distance, one in zip(distances, strokes, strict=True)]
-            creep, final = scene.memory.compliance, scene.memory.compliance(end)
-            left = {speed: unrecovered(creep(min(period / speed, end)), final) for speed in speeds}
+        if path >= period / 2 and stands_alone(profile.height, pressure, axis):
             wakes.append(wake_warning(left, period))
 
     approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell

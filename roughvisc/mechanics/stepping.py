@@ -149,9 +149,12 @@ class Scene:
     def __post_init__(self) -> None:
         self.can_jump = self.memory.compliance(0.0) > 0
         self.stated = STATED_SOFT if self.is_soft(self.program.duration) else STATED
-        slides = [segment.slide for segment in self.program.segments]
-        motion = next(filter(None, slides), None)
-        self.motions = [motion := slide or motion for slide in slides]
+        motion, self.motions = None, []
+        for segment in reversed(self.program.segments):
+            motion = segment.slide or motion
+        for segment in self.program.segments:
+            motion = segment.slide or motion
+            self.motions.append(motion)
 
     def lowest(self, values: Array) -> float:
         """Return the least value over the present cells."""
@@ -246,9 +249,8 @@ class Difference:
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
         """Return the larger error of each kind, of this difference and a part of the other, without shared errors."""
-        theirs = vars(other)
-        larger = {name: max(own, part * theirs[name]) for name, own in vars(self).items()}
-        return Difference(**larger | {"shared": 0.0})
+        larger = np.maximum(list(vars(self).values()), part * np.array(list(vars(other).values())))
+        return replace(Difference(*larger.tolist()), shared=0.0)
 
 
 @dataclass(frozen=True)
@@ -405,7 +407,7 @@ def entered(scene: Scene, state: State, load: float | None = None) -> State:
         is_late = load is not None or (jumps and point.force > 0)
         points.append(replace(without_past(point), start=start, is_late=is_late))
     # a corner of the histories without a jump: the pairs may keep their length
-    lasting = all(segment.duration > 0 and segment.slide is None for segment in (last, following))
+    lasting = last.duration > 0 and last.slide is None and following.duration > 0 and following.slide is None
     length = state.length if lasting and not changes and not jumps and state.fine.force > 0 else 0.0
     twice = points[1] if state.twice else None
     return replace(state, fine=points[0], twice=twice, segment=index, length=length)
@@ -419,16 +421,18 @@ def without_past(point: Point) -> Point:
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine, coarse, number = state.fine, state.coarse, state.segment
-    rules: list[Rule | None] = ["linear" if one.is_open else None for one in (fine, coarse)]  # exact without contact
-    new = other = take_step(scene, fine, time, number, rule=rules[0])
+    rule: Rule | None = "linear" if fine.is_open else None  # exact while the surfaces are apart
+    new = other = take_step(scene, fine, time, number, rule=rule)
     if coarse is not fine:
-        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rules[1])
+        rule = "linear" if coarse.is_open else None
+        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
     shared = state.difference.shared * scene.memory.remaining(time - fine.time)
     apart, work = replace(difference(scene, new, other), shared=shared), work_of_step(scene, fine, new)
-    ends = [new] if other is new else [new, other]
+    reached, coarse = new, other
     if fine.is_open and new.force == 0:
-        ends = [without_past(point) for point in ends]
-    after = after_steps(scene, state, ends[:1], ends[-1], difference=apart, work=state.work + work)
+        reached = without_past(new)
+        coarse = reached if other is new else without_past(other)
+    after = after_steps(scene, state, [reached], coarse, difference=apart, work=state.work + work)
     return Step(new, replace(apart, pressure=apart.pressure + shared), number, after)
 
 
@@ -487,7 +491,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         if lands and not is_soft:
             creep = memory.compliance(taken) / memory.compliance(0.0) - 1
-            shared += min(SHARED * creep**2, SHARED_AT_MOST) * entered_force(scene, fine, second)
+            entered_pressure = float(second.pressure[fine.pressure == 0].sum())
+            shared += min(SHARED * creep**2, SHARED_AT_MOST) * (entered_pressure * scene.grid.cell_area)
         # Errors are relative to the largest values, but an approach counts as at least its rounding error: a flat
         # surface with periodic boundaries has no larger approach.
         force = max(state.largest_force, first.force, second.force, 1e-300)
@@ -528,13 +533,13 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     if slide is not None and scene.keeps(last):
         apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
-    sums: list[dict[str, Any]] = [
-        {"work": state.work + work, "work_curved": math.hypot(state.work_curved, error)}
-        for work, error in zip(*work_of_pair(scene, fine, first, second), strict=True)
-    ]
+    (early, mean), (early_error, error) = work_of_pair(scene, fine, first, second)
+    work, curved = state.work + mean, math.hypot(state.work_curved, error)
     kept = replace(apart, shared=shared)
-    after = after_steps(scene, state, [first, second], once, length=length, difference=kept, **sums[1])
-    inside = replace(state, work_apart=max(state.work_apart, after.work_apart, key=abs), **sums[0])
+    after = after_steps(scene, state, [first, second], once, length, difference=kept, work=work, work_curved=curved)
+    work, curved = state.work + early, math.hypot(state.work_curved, early_error)
+    work_apart = max(state.work_apart, after.work_apart, key=abs)
+    inside = replace(state, work=work, work_curved=curved, work_apart=work_apart)
     unsure += carried * memory.remaining(middle - fine.time)
     return [
         Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
@@ -691,12 +696,7 @@ def entering(scene: Scene, before: Point, after: Point) -> float:
     """Return the uncertain force of cells that have entered during the first step of a pair. [N]"""
     compliance = scene.memory.compliance(after.time - before.time)
     creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
-    return ENTERED * creeping * entered_force(scene, before, after)
-
-
-def entered_force(scene: Scene, before: Point, after: Point) -> float:
-    """Return the force of the cells that have entered the contact. [N]"""
-    return float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
+    return ENTERED * creeping * (float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area)
 
 
 def after_steps(
@@ -725,8 +725,8 @@ def after_steps(
         fine=fine,
         twice=None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
         length=length,
-        largest_force=max(state.largest_force, *(point.force for point in points)),
-        largest_approach=max(state.largest_approach, *(abs(point.approach) for point in points)),
+        largest_force=max(state.largest_force, points[0].force, fine.force),
+        largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
         work_apart=state.work_apart + apart,
         convolutions=scene.grid.convolutions,
         **totals,

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from roughvisc.experiment.coarser import coarser
+from roughvisc.experiment.grid_error import coarser
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import contact_area

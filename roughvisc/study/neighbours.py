@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.coarser import coarser_shape
+from roughvisc.experiment.grid_error import coarser_shape
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder

@@ -11,8 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.coarser import pressure_distance
-from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty
+from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty, pressure_distance
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.rows import kept_times
 from roughvisc.labels import cost_of

@@ -6,7 +6,7 @@ from samples import QUICK_RUBBER as RUBBER
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.experiment.coarser import pressure_distance
+from roughvisc.experiment.grid_error import pressure_distance
 from roughvisc.experiment.rows import kept_times
 
 SIDE = 1e-3

@@ -13,7 +13,7 @@ import itertools
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.experiment.coarser import pressure_distance
+from roughvisc.experiment.grid_error import pressure_distance
 
 UNIT, SLOPE = rv.elastic(0.25), 0.01  # contact modulus 1
 LOADS = {"sphere": 4 / 3 * SLOPE, "cone": np.pi / 2 * SLOPE, "punch": SLOPE}  # to a contact radius of one
