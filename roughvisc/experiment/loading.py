@@ -17,13 +17,7 @@ from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import require_loading
-from roughvisc.experiment.rows import (
-    area_error,
-    error_columns,
-    kept_times,
-    length_of,
-    memory_of,
-)
+from roughvisc.experiment.rows import area_error, error_columns, kept_times, length_of, memory_of
 from roughvisc.experiment.warnings import loading_warnings, table_warning
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
@@ -40,14 +34,11 @@ from roughvisc.variables import STATUS_MEANINGS
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
-#: Times and loads whose squares and products stay far from overflow. [s], [N]
+#: Times whose squares and products stay far from overflow. [s]
 LARGEST = 1e100
 #: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: adding a millionth
 #: of its length, the shortest time step, must change the time.
 LEAST_ROUNDINGS = 4e6
-#: Largest ratio of displacements to heights of a periodic surface: beyond, the rounding of the displacements exceeds a
-#: tenth of the heights.
-MOST_HEIGHTS = 1e15
 
 
 @dataclass(frozen=True)
@@ -367,20 +358,6 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
             f"time_step is {settings.time_step!r} s and the program ends at {duration:g} s, which has a resolution of "
             f"{math.ulp(duration):.2g} s: expected a longer step"
         )
-    load, heights = program.largest_load, float(np.ptp(profile.gap[profile.present]))
-    if load > LARGEST:
-        raise InputError(f"the load reaches {load:g} N: expected at most {LARGEST:g} N")
-    if boundary != "free" and heights > 0:
-        # estimate: the displacement of a punch with the longer side of the surface
-        compliance = float(body.material.contact_compliance(duration))
-        sides = profile.gap.shape[0] * profile.spacing[0], profile.gap.shape[1] * profile.spacing[1]
-        displaced = load / math.prod(sides) * compliance * max(sides)
-        if displaced > MOST_HEIGHTS * heights:
-            raise InputError(
-                f"the load reaches {load:g} N, which would close gaps {displaced / heights:.1g} times as high as this "
-                f"surface has: rounding would hide the variation of the pressure; expected at most "
-                f"{load * MOST_HEIGHTS * heights / displaced:.1g} N"
-            )
     # Beyond full contact the approach does not determine the pressure. If cells are absent, the body bulges into
     # them, and every approach has a definite force.
     if boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):

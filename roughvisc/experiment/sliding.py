@@ -19,14 +19,7 @@ from roughvisc.experiment.base import Experiment, Problem, Row, Rows
 from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_errors, grid_uncertainty, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
-from roughvisc.experiment.warnings import (
-    border_warning,
-    slope_warning,
-    stands_alone,
-    table_warning,
-    unrecovered,
-    wake_warning,
-)
+from roughvisc.experiment.warnings import border_warning, slope_warning, stands_alone, table_warning, wake_warning
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import contact_area, faces_between
@@ -253,9 +246,9 @@ class SlidingRows(Rows):
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, states)
             if stands_alone(self._profile.height, found.pressure, 0):
-                for one in law.materials:
+                for one in law.materials:  # without an end of the creep nothing counts as recovered
                     crept = float(one.contact_compliance(grid.period / speed))
-                    creep = max(creep, unrecovered(crept, float(one.contact_compliance(math.inf))))
+                    creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
             row["convolutions"] = convolutions
             row["creep_left"] = creep  # left when the next contact arrives
             yield Row(speed, row, fields, place=int(place), state=done, done=float(done))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -83,7 +82,7 @@ def loading_warnings(
             if segment.slide is not None and segment.slide.axis == axis:
                 path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
                 crept = scene.memory.compliance(min(period / speed, end))
-                left[speed] = unrecovered(crept, scene.memory.compliance(end))
+                left[speed] = 1.0 - crept / scene.memory.compliance(end)
         # on a shorter path the contact does not reach the next wake
         if path >= period / 2 and stands_alone(profile.height, pressure, axis):
             wakes.append(wake_warning(left, period))
@@ -162,24 +161,13 @@ def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> boo
     return bool(free.max() >= _FREE * count)
 
 
-def unrecovered(after_a_period: float, in_the_end: float) -> float:
-    """Return the unrecovered part of the creep after a period; 1 for a material that creeps without end.
-
-    Parameters
-    ----------
-    after_a_period, in_the_end : float
-        Contact compliance after a period, and at the end of the creep. [1/Pa]
-    """
-    return 1.0 - after_a_period / in_the_end if math.isfinite(in_the_end) else 1.0
-
-
 def wake_warning(left: Mapping[float, float], period: float) -> str:
     """Return a warning if contacts slide into each other's wake, else ''.
 
     Parameters
     ----------
     left : mapping
-        Speed of a single contact [m/s] -> unrecovered part of the creep, see :func:`unrecovered`.
+        Speed of a single contact [m/s] -> unrecovered part of the creep after a period.
     period : float
         Period along the motion. [m]
     """

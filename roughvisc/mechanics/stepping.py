@@ -569,7 +569,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     for number in range(1, count + 1):
         here, time = points[-1], instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
-        works.append(works[-1] + straight_work(scene, here, points[-1]))
+        works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     last = points[-1]
     once = last
     if coarse is not fine or count == 2:
@@ -752,8 +752,7 @@ def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple
     too unequal, or the force would not fall steadily to zero, the force is linear over the approach in each step.
     """
     forces = [middle.force if start.is_late else start.force, middle.force, end.force]
-    of_first = straight_work(scene, start, middle)
-    straight = np.array([of_first, of_first + straight_work(scene, middle, end)])
+    straight = np.cumsum([work_of_step(scene, start, middle), work_of_step(scene, middle, end)])
     begin = np.array([forces[0], touch(scene, start)])
     early = np.array([middle.force, touch(scene, middle)]) - begin
     mean = np.array([end.force, touch(scene, end)]) - begin
@@ -772,18 +771,17 @@ def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple
     return curved.tolist(), (straight - curved).tolist()
 
 
-def work_of_step(scene: Scene, before: Point, after: Point) -> float:
-    """Return the work between two points, exact for a jump and an elastic body, otherwise along a straight path. [J]"""
+def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:
+    """Return the work between two points. [J]
+
+    In a jump, and if an elastic body does not slide, the instantaneous compliance stores all work. Otherwise the force
+    is linear over the approach; after a jump it is constant.
+    """
     memory = scene.memory
-    if not (memory.is_elastic or after.time == before.time):
-        return straight_work(scene, before, after)
-    # the instantaneous compliance stores all work
-    stored = [float((point.pressure * memory.at_once(point.history)).sum()) for point in (before, after)]
-    return 0.5 * stored[1] * scene.grid.cell_area - 0.5 * stored[0] * scene.grid.cell_area
-
-
-def straight_work(scene: Scene, before: Point, after: Point) -> float:
-    """Return the work of a force that is linear over the approach between two points, constant after a jump. [J]"""
+    if after.time == before.time or (memory.is_elastic and not slides):
+        first = float((before.pressure * memory.at_once(before.history)).sum())
+        last = float((after.pressure * memory.at_once(after.history)).sum())
+        return 0.5 * last * scene.grid.cell_area - 0.5 * first * scene.grid.cell_area
     if before.force == 0 == after.force:
         return 0.0
     force = after.force if before.is_late else before.force
@@ -864,19 +862,12 @@ def take_step(
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
     pressure, unit = guess or extrapolated(scene, here, step)
     guess = None  # frees its memory while the contact is solved
-    pressure, unit = alpha * pressure, None if unit is None else alpha * unit
+    start = {"start": alpha * pressure, "start_displacement": None if unit is None else alpha * unit}
+    del pressure, unit
+    given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
+    tolerance = max(SOLVER_SHARE * scene.tolerance * share, 1e-10)
     try:
-        found = solve_contact(
-            grid,
-            gap,
-            load=value * alpha / area if by_load else None,
-            approach=None if by_load else value,
-            tolerance=max(SOLVER_SHARE * scene.tolerance * share, 1e-10),
-            start=pressure,
-            start_displacement=unit,
-            overwrite=True,
-            present=scene.present,
-        )
+        found = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
