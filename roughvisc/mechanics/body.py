@@ -140,8 +140,7 @@ def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[fl
     as a preconditioner.
     """
     offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
-    symbol: Array = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
-    return symbol
+    return np.asarray(fft.dctn(kernel.influence(offsets, spacing), type=1))  # the transform of the even extension
 
 
 def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:

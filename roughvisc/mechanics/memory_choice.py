@@ -57,8 +57,8 @@ class LayerMemory(Memory):
         self.waves, self.grid = waves, cast(Grid, grid)
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
-            kernels = map(waves.kernel, np.eye(len(waves.compliances)))
-            self.weights = [grid.xp.asarray(grid.symbol_of(kernel)) for kernel in kernels]
+            alone = np.eye(len(waves.compliances))
+            self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one))) for one in alone]
 
     def remaining(self, time: float) -> float:
         """Return one: a common rate of decay does not exist."""
@@ -81,10 +81,7 @@ class LayerMemory(Memory):
     def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
         """Return the elastic problem of a step, with its kernel; its compliance is one, or zero if it is rigid."""
         *symbols, at_once = self.weights
-        symbol = at_once.copy()
-        for part, one in zip(new, symbols, strict=True):
-            if part:
-                symbol += part * one
+        symbol = sum((part * one for part, one in zip(new, symbols, strict=True) if part), at_once)
         answering = self.grid.answering(symbol, self.waves.kernel(np.append(new, 1.0)))
         return Prediction(float(symbol.any()), self.grid.field_of(carried), modes, new, step, answering)
 

@@ -6,7 +6,6 @@ With a constant Poisson's ratio space and time separate, as in a half-space: ``u
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal, get_args
@@ -165,13 +164,11 @@ class Sheet(Kernel):
         transform is then smooth at the shortest wave, so that the kernel decays exponentially. Its relative error of
         long waves is below ``(q dx)^4 / 90``.
         """
-        counts = [
-            max(n, math.ceil(_REACH * self.thickness / side) + 16) for n, side in zip(shape, spacing, strict=True)
-        ]
+        h = self.thickness
+        counts = [max(n, math.ceil(_REACH * h / side) + 16) for n, side in zip(shape, spacing, strict=True)]
         sines = [np.sin(np.pi / 2 * np.arange(count) / (count - 1)) ** 2 for count in counts]
         qx, qy = (2 / side * np.sqrt(s + s**2 / 3) for s, side in zip(sines, spacing, strict=True))
-        influence: Array = scipy.fft.idctn(self.transfer(qx[:, None], qy), type=1)
-        return influence[: shape[0], : shape[1]]
+        return np.asarray(scipy.fft.idctn(self.transfer(qx[:, None], qy), type=1))[: shape[0], : shape[1]]
 
 
 def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
@@ -217,8 +214,8 @@ def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
 
 
 @lru_cache(maxsize=8)
-def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
-    """Return the kernel of a half-space less the kernel of a sheet, by distance in thicknesses. [1/thickness]"""
+def _correction(poisson: float, base: Base) -> Any:
+    """Return a function of the distance in thicknesses: half-space kernel less sheet kernel. [1/thickness]"""
     s, weights = panels(96, _SHORTEST_WAVE, 16)
     amplitude = weights * complement(s, poisson, base) / math.pi
     # the function is even: the nodes begin before zero, so that zero is no end
@@ -226,5 +223,4 @@ def _correction(poisson: float, base: Base) -> Callable[[Array], Array]:
     values = np.array([amplitude @ scipy.special.j0(r * s) for r in at])
     spline = scipy.interpolate.make_interp_spline(at, values, _DEGREE)
     powers = [spline(at[:-1], order) / math.factorial(order) for order in range(_DEGREE, -1, -1)]
-    correction: Callable[[Array], Array] = scipy.interpolate.PPoly(powers, at)  # quicker than a B-spline
-    return correction
+    return scipy.interpolate.PPoly(powers, at)  # quicker than a B-spline
