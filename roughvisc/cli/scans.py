@@ -25,7 +25,7 @@ def _sides(text: str) -> Any:
 def _reading(command: Any) -> Any:
     """Add the options of :func:`roughvisc.open_scan` to a command."""
     for option in (
-        click.option("--format", help="Format, if the suffix is ambiguous; auto: detect it."),
+        click.option("--format", help="Format, if the suffix does not tell it."),
         click.option("--channel", help="Name or number of the channel. [default: the height]"),
         click.option(
             "--height-scale", type=float, help="Factor of the heights, if the file states a wrong unit: 1e-6."

@@ -6,23 +6,17 @@ imported when a scan is opened.
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 from xarray.backends import BackendEntrypoint
-
-#: Suffixes that only scans have.
-_SUFFIXES = "x3p sdf al3d sur frt opd opdx datx plux os3d nms vk3 vk4 vk6 vk7 zmg zon ezd nid bcrf gwy lext poir jpk"
-_OPTIONS = ("format", "channel", "unit", "height_unit", "spacing", "grid", "no_data", "height_scale")
 
 
 class RoughviscBackend(BackendEntrypoint):
     """Scan files and surface cards as a Dataset with the variable ``height`` over (x, y)."""
 
     description = "Scans of surfaces: X3P, SDF and the instrument formats that SurfaceTopography reads"
-    open_dataset_parameters = ("filename_or_obj", "drop_variables", *_OPTIONS)
+    open_dataset_parameters = ("filename_or_obj", "drop_variables")
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, **options: Any) -> xr.Dataset:
         """Read a scan with the options of :func:`roughvisc.open_scan`, and drop `drop_variables`."""
@@ -30,8 +24,3 @@ class RoughviscBackend(BackendEntrypoint):
 
         dataset = open_scan(filename_or_obj, **options).to_dataset(name="height")
         return dataset.drop_vars(drop_variables or [], errors="ignore")
-
-    def guess_can_open(self, filename_or_obj: Any) -> bool:
-        """Return whether only scan files have the suffix."""
-        is_path = isinstance(filename_or_obj, str | os.PathLike)
-        return is_path and Path(filename_or_obj).suffix.lower().removeprefix(".") in _SUFFIXES.split()

@@ -60,14 +60,14 @@ def crop(
             raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
         chosen[axis] = (float(limits[0]), float(limits[1]))
     h = checked(h, "crop")
-    whole, first = h.shape, h
-    h = h.sel({axis: slice(*limits) for axis, limits in chosen.items()})
+    part = h.sel({axis: slice(*limits) for axis, limits in chosen.items()})
     for axis, limits in chosen.items():
-        if h.sizes[axis] < 2:
-            held = f"{float(first[axis][0]):.6g} to {float(first[axis][-1]):.6g}"
+        if part.sizes[axis] < 2:
+            held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
             raise InputError(key=axis, found=limits, expected=f"limits that hold at least two cells of {held} m")
-    line = f"cropped to {h.shape[0]} x {h.shape[1]} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
-    return noted(h, line, **({} if h.shape == whole else {"period": None}))
+    nx, ny = part.shape
+    line = f"cropped to {nx} x {ny} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
+    return noted(part, line, **({} if part.shape == h.shape else {"period": None}))
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
@@ -185,15 +185,15 @@ def combine(
         expected = "one grid, or align='centre' (see also resample and crop)"
         raise InputError(f"combine: found {described[0]} and {described[1]}: expected {expected}")
     both = like(h1, h1.values + h2.values)
-    lost = {"recipe", "highest", "missing"} | (set() if repeats else {"period"})
-    both.attrs = {key: value for key, value in h1.attrs.items() if key not in lost}
     solid = all(h.attrs.get("missing") == "absent" or np.isfinite(h.values).all() for h in (h1, h2))
-    if solid and np.isnan(both.values).any():
-        both.attrs["missing"] = "absent"
+    attrs = {"recipe": None, "highest": None} | ({} if repeats else {"period": None})
+    attrs["missing"] = "absent" if solid and np.isnan(both.values).any() else None
     masks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
     both = with_filled_points(both, np.logical_or.reduce(masks) if masks else None)
-    methods = ", ".join(sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})) or None
-    return noted(both, line + (f"; the second face: {about}" if about else ""), fill_method=methods)
+    attrs["fill_method"] = (
+        ", ".join(sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})) or None
+    )
+    return noted(both, line + (f"; the second face: {about}" if about else ""), **attrs)
 
 
 def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr.DataArray, xr.DataArray]:

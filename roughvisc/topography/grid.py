@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.arguments import DataNeeded, NoData
-from roughvisc.errors import InputError, short_repr
-from roughvisc.units import is_quantity, number
+from roughvisc.errors import InputError
+from roughvisc.units import number
 from roughvisc.variables import VARIABLES
 
 #: 16384 squared: a field of doubles takes 2 GB.
@@ -60,14 +60,13 @@ def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] |
 def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     """Check a height grid and return it as float64 in metres over ``("x", "y")``; all heights pass this function.
 
-    Heights and coordinates with the attribute ``units`` are converted to metres; without it, they are in metres. A
-    Dataset is replaced by its variable ``height``. Masked points become NaN. Any order of the dimensions and any type
-    of real numbers is accepted.
+    Heights and coordinates with the attribute ``units`` are converted to metres; without it, they are in metres. Masked
+    points become NaN. Any order of the dimensions and any type of real numbers is accepted.
 
     Parameters
     ----------
-    h : xarray.DataArray or xarray.Dataset
-        Heights over x and y, or a Dataset that holds them as ``height``.
+    h : xarray.DataArray
+        Heights over x and y.
     step : str
         Name of the calling step, for messages.
     least : int
@@ -84,32 +83,19 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     """
     if isinstance(h, NoData):
         raise DataNeeded(step)
-    if isinstance(h, xr.Dataset):
-        if "height" not in h.data_vars:
-            held = ", ".join(map(str, h.data_vars)) or "nothing"
-            raise InputError(f"{step}: found a Dataset that holds {held}: expected one that holds 'height'")
-        h = h["height"]
-    if not isinstance(h, xr.DataArray):
-        raise InputError(f"{step}: found {type(h).__name__}: expected an xarray.DataArray of heights (see from_array)")
-    if set(h.dims) != {"x", "y"}:
-        raise InputError(f"{step}: found dimensions {tuple(map(str, h.dims))}: expected heights over ('x', 'y')")
+    if not isinstance(h, xr.DataArray) or set(h.dims) != {"x", "y"}:
+        found = f"{type(h).__name__} over {tuple(map(str, getattr(h, 'dims', ())))}"
+        expected = "an xarray.DataArray of heights over ('x', 'y') (see from_array)"
+        raise InputError(f"{step}: found {found}: expected {expected}")
     h = h.transpose("x", "y").compute()
     h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
     spacing(h, step)
     for axis in ("x", "y"):
         centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
         h = h.assign_coords({axis: (axis, centres, h[axis].attrs | {"units": "m"})})
-    for axis in ("x", "y"):
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
     return h
-
-
-def metres_in(unit: str, name: str) -> float:
-    """Return the length of a unit in metres; raise :class:`InputError` if the unit of `name` is not a length."""
-    if not is_quantity(f"1 {unit}", "m"):
-        raise InputError(f"{name} has the unit {unit!r}: expected a length, such as 'm' or 'um'")
-    return number(f"1 {unit}", "m")
 
 
 def in_metres(numbers: Any, name: str) -> np.ndarray:
@@ -139,7 +125,7 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     if held.dtype.kind not in "fiu":
         raise InputError(f"{name} is of {held.dtype}: expected real numbers")
     values = np.ma.filled(held.astype(float, copy=False), np.nan)
-    return values if unit == "m" else values * metres_in(unit, name)
+    return values if unit == "m" else values * number(f"1 {unit}", "m", name)
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
@@ -199,14 +185,12 @@ def cell_side(centres: Any, name: str = "the coordinate") -> float:
     at = np.asarray(centres)
     if at.dtype.kind not in "fiu" or at.ndim != 1 or not at.size or not np.isfinite(at).all():
         raise InputError(f"{name} has {at.size} point(s) of {at.dtype}: expected finite numbers")
-    if at.size == 1:
-        if not at[0] > 0:
-            raise InputError(f"{name} has its only cell centred at {at[0]:g} m: expected half its side")
+    if at.size == 1 and at[0] > 0:
         return 2 * float(at[0])
-    d, steps = float(at[-1] - at[0]) / (at.size - 1), np.diff(at)
-    if not d > 0 or np.abs(steps - d).max() > 1e-4 * d:
-        found = f"steps from {steps.min():.6g} to {steps.max():.6g} m"
-        raise InputError(f"{name} has {found}: expected a uniform, ascending grid")
+    d = float(at[-1] - at[0]) / max(at.size - 1, 1)
+    if not d > 0 or (np.abs(np.diff(at) - d) > 1e-4 * d).any():
+        found = f"{at.size} centres from {at[0]:.6g} to {at[-1]:.6g} m, not in equal, ascending steps"
+        raise InputError(f"{name} has {found}: expected a uniform, ascending grid, or half the side of a single cell")
     return float(f"{d:.15g}")
 
 
@@ -265,12 +249,11 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     """Return two whole numbers of cells; one number counts for both axes."""
     both = _both(value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
-    if not whole:
-        expected = f"a whole number of cells of at least {low}, or a pair of them"
+    if not whole or both[0] * both[1] > MOST_CELLS:
+        expected = (
+            f"a whole number of cells of at least {low}, or a pair of them, at most {MOST_CELLS:.3g} cells in all"
+        )
         raise InputError(key=name, found=value, expected=expected)
-    if both[0] * both[1] > MOST_CELLS:
-        text = f"{name} is {short_repr(value)}, {both[0] * both[1]:.3g} cells: expected at most {MOST_CELLS:.3g}"
-        raise InputError(text, key=name, found=value, expected=f"at most {MOST_CELLS:.3g} cells")
     return int(both[0]), int(both[1])
 
 

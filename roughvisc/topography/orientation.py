@@ -8,18 +8,10 @@ _GWYDDION = "the reader matches the map of Gwyddion, whose first line is the top
 _TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
     "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
-    "di": _GWYDDION,
     "esri": "verified: the definition of the format, whose first row is the top one",
-    "ezd": _GWYDDION,
-    "frt": _GWYDDION,
     "gwy": "Gwyddion's own format, whose first line is the top one; by no feature in a real file",
-    "ibw": _GWYDDION,
-    "jpk": _GWYDDION,
-    "mdt": _GWYDDION,
-    "mi": _GWYDDION,
     "opd": "two programs draw the same line at the top; by no feature in a real file",
-    "ps": _GWYDDION,
-    "wsxm": _GWYDDION,
+    **dict.fromkeys(("di", "ezd", "frt", "ibw", "jpk", "mdt", "mi", "ps", "wsxm"), _GWYDDION),
 }
 #: Formats that define the direction of y.
 _STATED = {

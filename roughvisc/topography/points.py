@@ -46,14 +46,10 @@ def laid_out(
         if empty:
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
-    found = lattice(points)
-    if found is None:
+    if (found := lattice(points)) is None:
         proposed = 2e6 * metres * math.sqrt(spread[0] * spread[1] / len(points))
-        raise InputError(
-            f'its {len(points)} points lie on no regular lattice: expected grid = "{proposed:.2g} um", or similar',
-            key="grid",
-            expected="the side of the cells into which the points are sorted",
-        )
+        text = f'its {len(points)} points lie on no regular lattice: expected grid = "{proposed:.2g} um", or similar'
+        raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
     return found
 
 
@@ -72,7 +68,7 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     steps : tuple of float
         Along x and y, in the unit of the points.
     """
-    if len(points) < 4 or not np.isfinite(points[:, :2]).all():
+    if len(points) < 4:
         return None
     at, nodes = points[:, :2], np.empty((len(points), 2))
     for axis in (0, 1):
@@ -91,14 +87,12 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     off, oblique = np.abs(at - centred @ fit).max(axis=0), np.abs([fit[1, 1], fit[2, 0]])
     if (off > _OFF * steps).any() or (oblique > _OBLIQUE * steps).any():
         return None
-    nodes = (nodes - nodes.min(axis=0)).astype(int).T
-    shape = (int(nodes[0].max()) + 1, int(nodes[1].max()) + 1)
-    if shape[0] * shape[1] > _SPARSE * len(points):
-        return None
-    if np.unique(np.ravel_multi_index(tuple(nodes), shape)).size < len(points):
+    i, j = (nodes - nodes.min(axis=0)).astype(int).T
+    shape = (int(i.max()) + 1, int(j.max()) + 1)
+    if shape[0] * shape[1] > _SPARSE * len(points) or np.unique(i * shape[1] + j).size < len(points):
         return None
     heights = np.full(shape, np.nan)
-    heights[nodes[0], nodes[1]] = points[:, 2]
+    heights[i, j] = points[:, 2]
     return heights, (float(f"{steps[0]:.12g}"), float(f"{steps[1]:.12g}"))
 
 

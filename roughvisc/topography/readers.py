@@ -40,6 +40,8 @@ FARTHEST = 1e3
 #: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
 _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
+#: What a file without a size needs.
+_SIZE = 'spacing = "1 um", or another length'
 _READER = threading.RLock()
 
 
@@ -56,38 +58,30 @@ class Reading(NamedTuple):
 
 def read_file(path: Path, format: str | None, channel: int | str | None, how: Reading) -> xr.DataArray:
     """Read one channel of an instrument or grid file, see :func:`roughvisc.open_scan`."""
-    for key, unit in (("unit", how.unit), ("height_unit", how.height_unit)):
-        if unit is not None:
-            number(f"1 {unit}", "m", key)
-    if how.no_data is not None:
-        number(how.no_data, "1", "no_data")
-    how = how._replace(spacing=None if how.spacing is None else pair("spacing", how.spacing))
+    if how.spacing is not None:
+        how = how._replace(spacing=pair("spacing", how.spacing))
     with _reading(path), closing(open_file(path, format)) as file:
         chosen = _chosen(file, channel)
-        h = _in_metres(file, chosen, how)
+        h = _labelled(file, chosen, how)
     for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
-    if min(h.shape) < 2:
-        raise InputError(f"{path}: it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
-    for axis, d, n in zip(("x", "y"), cell_sides(h, str(path)), h.shape, strict=True):
-        if n * d > WIDEST or d < FINEST:
-            limits = f"which is not plausible (at most {WIDEST:g} m, at least {FINEST:g} m)"
-            expected = "another unit or spacing, and height_scale if its heights are in another unit too"
-            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m"
-            raise InputError(f"{path}: {found}, {limits}: expected {expected}")
-    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
-    attrs["orientation"] = orientation(file.format)
-    attrs["instrument"] = file.instrument or None
-    attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not chosen) or None
     given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
     stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
-    h = noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
-    finite(h, str(path), HIGHEST)
-    return h
+    return noted(
+        h,
+        f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}",
+        source_file=path.name,
+        source_sha256=sha256(path),
+        format=file.format,
+        channel=chosen.name,
+        orientation=orientation(file.format),
+        instrument=file.instrument or None,
+        other_channels=", ".join(other.name for other in file.channels if other is not chosen) or None,
+    )
 
 
-def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
-    """Return the heights of a channel over x and y. [m]"""
+def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
+    """Return the heights of a channel over x and y; refuse implausible ones. [m]"""
     xy, z = _metres(channel, how)
     if how.grid is not None and (channel.kind != "points" or how.spacing is not None):
         raise InputError(key="grid", found=how.grid, expected="none for a map, or with a spacing")
@@ -98,59 +92,61 @@ def _in_metres(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
         values, sides = laid_out(points, None if how.grid is None else how.grid / xy, xy, file.complaints)
     else:
         values = _without_no_data(np.asarray(raw, dtype=float), how.no_data, file.complaints)
-    values = values * z * (1.0 if how.height_scale is None else how.height_scale)
+    values = values * z * (how.height_scale or 1.0)
     if top_line_first(file.format):
         values = values[:, ::-1]
     if channel.positions is None or how.spacing is not None:
         spacing = how.spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
         if not all(math.isfinite(d) and d > 0 for d in spacing):
-            raise InputError('it states no size: expected spacing = "1 um", or another length', key="spacing")
+            raise InputError(f"it states no size: expected {_SIZE}", key="spacing")
         h = labelled(values, spacing)
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
-        masks = {name: one.variable for name, one in raw.coords.items() if set(one.dims) == {"x", "y"}}
-        h = h.assign_coords({name: (("x", "y"), one.transpose("x", "y").values) for name, one in masks.items()})
+        h = h.assign_coords({name: (("x", "y"), one.values) for name, one in raw.coords.items() if one.ndim == 2})
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
-    h = h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]})
-    return checked(h, "grid", least=1)
+    h = checked(h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]}), "grid", 1)
+    if min(h.shape) < 2:
+        raise InputError(f"it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
+    for axis, d, n in zip(("x", "y"), cell_sides(h), h.shape, strict=True):
+        if n * d > WIDEST or d < FINEST:
+            limits = f"which is not plausible (at most {WIDEST:g} m, at least {FINEST:g} m)"
+            expected = "another unit or spacing, and height_scale if its heights are in another unit too"
+            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m"
+            raise InputError(f"{found}, {limits}: expected {expected}")
+    finite(h, HIGHEST)
+    return h
 
 
 def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
-    sizes = (channel.spacing, channel.positions, how.spacing)
-    is_sized = channel.kind == "points" or any(size is not None for size in sizes)
+    is_sized = channel.kind == "points" or any((channel.spacing, channel.positions, how.spacing))
     needs_xy = is_sized and channel.lateral_unit is None and how.spacing is None
     needs_z = channel.unit is None
     is_used = {"unit": needs_xy or (needs_z and how.height_unit is None), "height_unit": needs_z}
-    for key in (key for key, used in is_used.items() if not used and getattr(how, key) is not None):
-        given = getattr(how, key)
-        for stated in filter(None, (channel.unit, channel.lateral_unit)):
-            factor = number(f"1 {given}", "m") / number(f"1 {stated}", "m")
+    for key, given in (("unit", how.unit), ("height_unit", how.height_unit)):
+        for stated in filter(None, (channel.unit, channel.lateral_unit)) if given and not is_used[key] else ():
+            factor = number(f"1 {given}", "m", key) / number(f"1 {stated}", "m")
             if not math.isclose(factor, 1.0):
-                hint = f"; height_scale = {factor:.6g} if its numbers are in {given}" if channel.unit else ""
-                text = f"it states its unit as {stated!r}: expected no {key} = {given!r}{hint}"
-                raise InputError(text, key=key, found=given, expected="none")
-    lacks = {
-        "unit of its heights": needs_z and how.unit is how.height_unit is None,
-        "unit of x and y": needs_xy and how.unit is None,
-        "size": not is_sized,
-    }
-    if any(lacks.values()):
-        no_unit = lacks["unit of its heights"] or lacks["unit of x and y"]
-        expected = ['unit = "um", and height_unit if heights have another unit'] if no_unit else []
-        expected += ['spacing = "1 um", or another length'] if lacks["size"] else []
-        what = " and no ".join(name for name, is_absent in lacks.items() if is_absent)
-        text = f"it states no {what}: expected {'; and '.join(expected)}"
-        raise InputError(text, key="unit" if no_unit else "spacing", expected=expected[0])
-    xy = channel.lateral_unit or how.unit or "m"
-    return number(f"1 {xy}", "m"), number(f"1 {channel.unit or how.height_unit or how.unit}", "m")
+                expected = f"no {key} = {given!r}, or height_scale = {factor:.6g} if its heights are in {given}"
+                text = f"it states its unit as {stated!r}: expected {expected}"
+                raise InputError(text, key=key, found=given, expected=expected)
+    expected = {}
+    if (needs_xy and how.unit is None) or (needs_z and how.unit is how.height_unit is None):
+        expected["unit"] = 'unit = "um", and height_unit if heights have another unit'
+    if not is_sized:
+        expected["spacing"] = _SIZE
+    for key in expected:
+        text = f"it states no {' and no '.join(expected)}: expected {'; and '.join(expected.values())}"
+        raise InputError(text, key=key, expected=expected[key])
+    xy, z = channel.lateral_unit or how.unit or "m", channel.unit or how.height_unit or how.unit
+    return number(f"1 {xy}", "m", "unit"), number(f"1 {z}", "m", "height_unit" if how.height_unit else "unit")
 
 
 def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
     """Return heights with NaN at missing points, which a given number or an outlying number marks."""
     if no_data is not None:
-        return np.where(np.isclose(values, no_data, rtol=1e-6, atol=0.0), np.nan, values)
+        return np.where(np.isclose(values, number(no_data, "1", "no_data"), rtol=1e-6, atol=0.0), np.nan, values)
     if values.size < _FEWEST:
         return values
     extremes = sorted({float(np.nanmin(values)), float(np.nanmax(values))})
@@ -171,7 +167,7 @@ def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
     """Return the channel of a name or a number; the default height if None."""
     named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
     heights = [i for i, c in enumerate(file.channels) if c.is_height]
-    if channel is None and not heights:
+    if not heights:
         raise InputError(f"it holds no heights over x and y (channels {named or 'none'}): expected an areal scan")
     if channel is None:
         return file.channels[file.default if file.default in heights else heights[0]]
@@ -208,7 +204,7 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     if values.ndim != 2 or min(values.shape) < 2:
         raise InputError(f"heights has shape {values.shape}: expected (nx, ny) of at least 2 x 2")
     h = labelled(values, pair("spacing", spacing))
-    finite(h, "heights")
+    finite(h)
     return noted(h, "from an array")
 
 
@@ -259,14 +255,11 @@ def sha256(path: Path) -> str:
 
 def existing(path: Any) -> Path:
     """Return the path of an existing file; raise :class:`~roughvisc.errors.InputError` otherwise."""
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f"path is {type(path).__name__}: expected the name of a file")
     path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path}: the file does not exist")
     regular(path)
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder: expected a scan file or a surface card")
+    if not path.is_file():
+        found = "this is a folder" if path.is_dir() else "the file does not exist"
+        raise InputError(f"{path}: {found}: expected a scan file or a surface card")
     return path
 
 
@@ -276,8 +269,6 @@ def _reading(path: Path) -> Iterator[None]:
 
     Only one reader runs at a time in a process: netCDF and the filters of warnings are not thread-safe.
     """
-    if path.is_file() and not path.stat().st_size:
-        raise InputError(f"{path}: the file is empty")
     with _READER, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -290,17 +281,18 @@ def _reading(path: Path) -> Iterator[None]:
             raise InputError(text) from error
 
 
-def finite(h: xr.DataArray, source: str, highest: float = FARTHEST) -> None:
+def finite(h: xr.DataArray, highest: float = FARTHEST) -> None:
     """Refuse heights that are all missing or implausibly far from zero.
 
     Heights of metres are accepted in a file of a dozen points, which is an example.
     """
-    values = h.values
-    if np.isnan(values).all():
-        raise InputError(f"{source}: all {h.size} points are missing: expected heights")
-    beyond = values[np.abs(values) > (highest if h.size >= _FEWEST else FARTHEST)]
+    if np.isnan(h.values).all():
+        raise InputError(f"all {h.size} points are missing: expected heights")
+    beyond = h.values[np.abs(h.values) > (highest if h.size >= _FEWEST else FARTHEST)]
     if beyond.size:
         limit = f"which is not plausible (at most {highest:g} m from zero)"
         expected = "height_scale = 1e-6, or another factor, if they are in another unit than stated; "
         expected += "no_data = the number in the file, or NaN in an array, if it marks missing points"
-        raise InputError(f"{source}: {beyond.size} heights are like {beyond[0]:.6g} m, {limit}: expected {expected}")
+        raise InputError(
+            f"{beyond.size} heights are like {beyond[0]:.6g} m, {limit}: expected {expected}", key="heights"
+        )

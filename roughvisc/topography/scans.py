@@ -19,7 +19,7 @@ from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
 from roughvisc.topography.framing import combine
-from roughvisc.topography.readers import Reading, existing, finite, read_file, sha256
+from roughvisc.topography.readers import Reading, existing, read_file, sha256
 from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, quantities
 
@@ -47,8 +47,8 @@ def open_scan(
     path : path
         X3P, SDF, NetCDF, CSV, a surface card (``.toml``), or any format that SurfaceTopography reads.
     format : str, optional
-        A key of :func:`~roughvisc.supported_formats`, or ``"auto"`` to guess the format from the content. Default: by
-        the suffix.
+        A key of :func:`~roughvisc.supported_formats`. Default: by the suffix; texts of some makers are recognised by
+        their content.
     channel : int or str, optional
         Number or name of the channel, see :func:`~roughvisc.list_channels`. Default: the height channel, or the default
         of the library if there are several; the attribute ``other_channels`` then lists the others.
@@ -97,18 +97,19 @@ def open_scan(
     if named := ", ".join(f"{key}=" for key, value in given.items() if value is not None):
         raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
     about, table = read_card(path)
-    stated = about.pop("sha256", None)
     try:
         one_key("the card", table, ("file", "generate"))
-        if "file" in table and stated is not None:
+        if "file" in table:
             found = sha256(existing(table["file"]))
+            stated = about.pop("sha256", found)
             if stated.lower() != found:
-                name = Path(table["file"]).name
-                raise InputError(f"the checksum of {name} is {found}, not {stated}: the file was changed or damaged")
+                expected = (
+                    f"{found}, the checksum of {Path(table['file']).name}, or a file that was not changed or damaged"
+                )
+                raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
         raise error.prefixed(str(path)) from error
-    finite(h, str(path))
     return h.assign_attrs(card=path.name, **about)
 
 
@@ -165,15 +166,8 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        line = 1 + error.object[: error.start].count(b"\n")
-        where = f"line {line} contains a byte that is not UTF-8"
-        found = "it is in UTF-16" if error.object[:2] in (b"\xff\xfe", b"\xfe\xff") else where
-        raise InputError(f"{path}: is not {wanted}: {found}: expected a text in UTF-8") from error
-    except ValueError as error:  # wrong TOML, or an integer of thousands of digits
-        raise InputError(f"{path}: is not {wanted}: {error}") from error
-    except RecursionError as error:
-        raise InputError(f"{path}: is not {wanted}: it is nested too deeply") from error
+    except (ValueError, RecursionError) as error:  # no TOML, another encoding, or an integer of thousands of digits
+        raise InputError(f"{path}: is not {wanted}: {error}: expected TOML in UTF-8") from error
 
 
 def surface_height(table: Mapping[str, Any]) -> xr.DataArray:

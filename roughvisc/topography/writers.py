@@ -21,6 +21,8 @@ from roughvisc.units import unit_for
 
 #: Suffixes that :func:`save_scan` writes.
 WRITABLE = (".nc", ".x3p", ".sdf")
+#: Keys of a table ``[surface]`` with lengths, and the digits of these.
+_LENGTHS = {"spacing": 15, "grid": 15, "filter": 6, "crop": 6}
 
 
 def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
@@ -107,20 +109,9 @@ def surface_table(
 
 def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of a table ``[surface]`` and their values as TOML."""
-
-    def lengths(value: Any, digits: int = 6) -> str:
-        if isinstance(value, tuple | list):
-            return f"[{', '.join(lengths(one, digits) for one in value)}]"
-        return _toml(written_quantity(float(value), "m", digits))
-
     given = {key: value for key, value in options.items() if value is not None}
-    entries = {key: _toml(value) for key, value in {"file": file.as_posix(), **given, **steps}.items()}
-    entries |= {key: lengths(given[key], 15) for key in ("spacing", "grid") if key in given}
-    if "filter" in steps:
-        entries["filter"] = lengths(steps["filter"])
-    if "crop" in steps:
-        entries["crop"] = "{ " + ", ".join(f"{axis} = {lengths(at)}" for axis, at in steps["crop"].items()) + " }"
-    return entries
+    table = {"file": file.as_posix(), **given, **steps}
+    return {key: _toml(value, _LENGTHS.get(key)) for key, value in table.items()}
 
 
 def written_quantity(value: float, unit: str, digits: int = 6) -> str:
@@ -135,6 +126,11 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
     return f"{value / shown.factor:.{digits}g} {shown.symbol}".replace("µ", "u")
 
 
-def _toml(value: Any) -> str:
-    """Return a text, a number or a truth value as TOML, which equals JSON except for one character."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+def _toml(value: Any, digits: int | None = None) -> str:
+    """Return a value as TOML, with its numbers as lengths of so many digits, unless `digits` is None."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(one, digits)}" for key, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_toml(one, digits) for one in value)}]"
+    text = value if digits is None else written_quantity(float(value), "m", digits)
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML equals JSON but for this character

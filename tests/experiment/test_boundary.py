@@ -23,7 +23,7 @@ def test_auto__is_what_the_surface_was_made_for(height, word):
     found, said = pressed(height), pressed(height, boundary=word)
     assert found.attrs["boundary"] == word
     xr.testing.assert_equal(found.pressure, said.pressure)
-    assert pressed(height.to_dataset(name="height").chunk()).attrs["boundary"] == word, "also of what is read late"
+    assert pressed(height.chunk()).attrs["boundary"] == word, "also of what is read late"
 
 
 def test_auto__with_an_accepted_edge_is_free(caplog):

@@ -34,7 +34,7 @@ def test_save_scan__refuses(tmp_path):
     h = rv.from_array(tilted(), CELL)
     with pytest.raises(InputError, match=r"\.stl'.*\.nc, \.x3p, \.sdf"):
         save_scan(h, tmp_path / "scan.stl")
-    with pytest.raises(InputError, match="save_scan: found dimensions"):
+    with pytest.raises(InputError, match="save_scan: found DataArray over"):
         save_scan(h.rename(x="z"), tmp_path / "scan.nc")
     assert list(tmp_path.iterdir()) == []
 

@@ -97,7 +97,7 @@ def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str)
     from SurfaceTopography.IO import lookup_reader_by_format  # slow to import
 
     if format not in lookup_reader_by_format:
-        raise InputError(key="format", found=format, expected="a key of supported_formats, or 'auto'")
+        raise InputError(key="format", found=format, expected="a key of supported_formats")
     reader = lookup_reader_by_format[format](str(source) if isinstance(source, Path) else source)
     channels = [_channel(found) for found in reader.channels]
     described = reader.channels[0].info.get("instrument") if channels else None

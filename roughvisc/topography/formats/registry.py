@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -30,16 +29,18 @@ _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5"), "tif": ("ps",)}
 
 
 def open_file(path: Path, format: str | None) -> ScanFile:
-    """Read the header of a scan file; find its format by name, by content (``"auto"``) or by suffix (None)."""
-    if format == "auto":
-        format = _detected(path)
-    *others, last = _formats_of(path) if format is None else _SHARED.get(format, (format,))
-    for name in others:
-        with suppress(Exception):  # readers raise many types, such as struct.error and KeyError
+    """Read the header of a scan file; find its format by name, or else by suffix."""
+    names, failures = _formats_of(path) if format is None else _SHARED.get(format, (format,)), []
+    for name in names:
+        try:
             file = _read(path, name)
-            if any(channel.is_height for channel in file.channels):
+            if name == names[-1] or any(channel.is_height for channel in file.channels):
                 return file
-    return _read(path, last)
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - readers raise many types, such as struct.error and KeyError
+            failures.append(f"as {name}: {str(error) or type(error).__name__}")
+    raise ValueError("; ".join(failures))
 
 
 def _read(path: Path, name: str) -> ScanFile:
@@ -83,16 +84,4 @@ def _formats_of(path: Path) -> Sequence[str]:
     if found := [name for name, theirs in known.items() if wanted in theirs]:
         return found
     listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))
-    expected = f'expected format, or "auto" to detect it; known suffixes are {listed}'
-    raise InputError(f"the suffix {path.suffix!r} is not known: {expected}", key="format")
-
-
-def _detected(path: Path) -> str:
-    """Return the format of a file by its content."""
-    from SurfaceTopography.Exceptions import CannotDetectFileFormat
-    from SurfaceTopography.IO import detect_format
-
-    try:
-        return detect_format(str(path))
-    except CannotDetectFileFormat as error:
-        raise InputError("no reader recognises its content: expected the name of its format", key="format") from error
+    raise InputError(f"the suffix {path.suffix!r} is not known: expected format, or a suffix of {listed}", key="format")

@@ -44,11 +44,6 @@ class Table(NamedTuple):
     lines: list[str]
     rows: list[int]
 
-    @property
-    def header(self) -> list[str]:
-        """Lines above the rows."""
-        return self.lines[: self.rows[0]] if self.rows else self.lines
-
     def numbers(self) -> np.ndarray:
         """Return the rows as a matrix."""
         return np.loadtxt([self.lines[at] for at in self.rows], ndmin=2)
