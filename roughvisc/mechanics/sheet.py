@@ -218,7 +218,7 @@ def _correction(poisson: float, base: Base) -> Any:
     """Return a function of the distance in thicknesses: half-space kernel less sheet kernel. [1/thickness]"""
     s, weights = panels(96, _SHORTEST_WAVE, 16)
     amplitude = weights * complement(s, poisson, base) / math.pi
-    # the function is even: the nodes begin before zero, so that zero is no end
+    # the function is even: nodes before zero keep the end of the spline away from zero
     at = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))
     values = np.array([amplitude @ scipy.special.j0(r * s) for r in at])
     spline = scipy.interpolate.make_interp_spline(at, values, _DEGREE)

@@ -3,6 +3,9 @@
 The terms are positive, so that the series is a passive material. It has the instantaneous compliance of the material,
 so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less than the
 creep up to this time.
+
+Under oscillating pressure a material has a complex compliance. Series and power laws have it in closed form. Any other
+material is replaced by a certified series.
 """
 
 from __future__ import annotations
