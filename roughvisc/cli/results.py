@@ -21,7 +21,7 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
     Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
     the figures of the sweep: quantities against the varied settings, and the histories of all cases. --all also draws
-    section and surface, and the figures of each case. File names and titles state the varied settings.
+    section and surface, and the figures of each case. File names state the varied settings.
 
     \b
     Example:

@@ -4,13 +4,10 @@ In a notebook a figure shows itself; elsewhere ``figure.savefig("name.pdf")`` wr
 readable prefixes. Matplotlib's global state is not changed.
 """
 
-from roughvisc.plot.animate import animate
+from roughvisc.plot.fields import animate, maps, section, surface
 from roughvisc.plot.history import area_against_load, friction, history
-from roughvisc.plot.maps import maps
 from roughvisc.plot.save import FIGURES as FIGURES
 from roughvisc.plot.save import save_figures, save_sweep_figures
-from roughvisc.plot.section import section
-from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep
 from roughvisc.plot.trade import budget, trade
 

@@ -7,12 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 
 from roughvisc.errors import InputError
 from roughvisc.observables import history as steps_of
@@ -21,14 +17,16 @@ from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import Unit, quantities, unit_for
-from roughvisc.variables import VARIABLES, axis_of
+from roughvisc.units import quantities, unit_for
+from roughvisc.variables import GRID_ERROR, VARIABLES, axis_of
 
 #: Quantities that are drawn if the result holds them.
 _QUANTITIES = (
     *("force", "approach", "contact_area", "mean_gap", "work", "friction_coefficient"),
     *("leak_rate", "thermal_conductance", "electrical_conductance"),
 )
+#: Quantity -> its relative error by the grid.
+_GRID_ERROR = GRID_ERROR | {"contact_fraction": "grid_error_area", "friction_coefficient": "grid_error_friction"}
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
@@ -37,8 +35,8 @@ _DOTS = 40
 def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, *, over: str | None = None) -> Figure:
     """Draw quantities over time, over the distance slid, over the speed, or over each other.
 
-    Lines pass through every time step in the result, dots mark the kept times. The axis is logarithmic if the largest
-    value exceeds thirty times the smallest.
+    Lines pass through every time step in the result, dots mark the kept times, and bands show the error of the grid, if
+    it is in the result. The axis is logarithmic if the largest value exceeds thirty times the smallest.
 
     Parameters
     ----------
@@ -72,40 +70,45 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
         raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
-    places = (steps if over in steps else kept)[over]
-    columns = 1 if len(names) <= 3 else 2
-    size = (3.7, 1.1) if columns == 1 else (2.8, 1.05)
-    figure, axes = style.new_panels(len(names), columns, *size, shared="x", left=0.8)
+    columns, height = 1 if len(names) <= 3 else 2, 1.1 if len(names) > 2 else 1.7
+    figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x", left=0.8)
+    across = style.row_axis(axes, (steps if over in steps else kept)[over])
     for ax, name in zip(axes, names, strict=True):
         line = steps if name in steps and over in steps else kept
-        _draw_history(ax, name, line, kept, over, style.row_unit(places))
-    style.row_axis(axes, places)
-    style.letter_panels(axes)
-    style.align(axes)
-    named = style.named_in(*axes)
-    if steps.sizes[axis] > kept.sizes[axis] and kept.sizes[axis] <= _DOTS:
-        dots = Line2D([], [], color="0.3", ls="", marker="o")
-        named = {"time steps": Line2D([], [], color="0.3"), "kept times": dots} | named
-    style.legend_above(figure, named)
+        _draw_history(ax, name, (across(line[over]), line[name]), (across(kept[over]), kept))
+    figure.align_ylabels()
+    style.legend_above(figure, style.named_in(*axes))
     return figure
 
 
-def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over: str, across: Unit) -> None:
-    """Draw a quantity as a line through the steps and dots at the kept rows, with Persson's theory if known."""
-    label, si = style.described(kept[name])
-    look = {"color": style.CONTACT if name == "contact_area" else style.BLUE}
-    line, dots = (one[name].where(np.isfinite(one[name])) for one in (steps, kept))
-    if name == "leak_rate":  # a logarithmic axis has no zero
-        line, dots = line.where(line > 0), dots.where(dots > 0)
-    unit = unit_for(line, si)
-    ax.plot(across(steps[over]), unit(line), **look)
-    if dots.size <= _DOTS:
-        ax.plot(across(kept[over]), unit(dots), "o", **look)
+def _draw_history(ax: Axes, name: str, line: tuple[Any, xr.DataArray], dots: tuple[Any, xr.Dataset]) -> None:
+    """Draw a quantity as a line through the steps and dots at the kept rows, with the theory and the error of the grid.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Panel to draw in.
+    name : str
+        Quantity.
+    line, dots : tuple
+        Places in the unit of the axis, with values of the quantity at the steps, and with the kept rows.
+    """
+    (places, steps), (at, kept) = (line[0], style.drawable(line[1])), dots
+    values = style.drawable(kept[name])
+    (label, si), colour = style.described(kept[name]), style.CONTACT if "contact" in name else style.BLUE
+    unit, is_finer = unit_for(steps, si), steps.size > values.size
+    ax.plot(places, unit(steps), color=colour, label="time steps" if is_finer else None)
+    if values.size <= _DOTS:
+        ax.plot(at, unit(values), "o", color=colour, label="kept times" if is_finer else None)
+    error = _GRID_ERROR.get(name, "")
+    if name != "force" and error in kept and kept[error].notnull().any():
+        ends = (unit(values * (1 + sign * kept[error])) for sign in (-1, 1))
+        ax.fill_between(at, *ends, color=colour, alpha=0.18, lw=0, label="error of the grid")
     if f"persson_{name}" in kept:
-        ax.plot(across(kept[over]), unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
-    style.value_axis(ax, *(one.get_ydata() for one in ax.lines))
+        ax.plot(at, unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
+    style.value_axis(ax, np.concatenate([one.get_ydata() for one in ax.lines]), unit)
     if ax.get_yscale() == "linear":
-        ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+        ax.locator_params("y", nbins=4, steps=[1, 2, 2.5, 5, 10])
     ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label).rstrip())
 
 
@@ -144,12 +147,12 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     for dataset in results.values():
         expect_result(dataset, "time", "force", "contact_area")
     lines = {str(label): steps_of(dataset) for label, dataset in results.items()}
-    loads, areas = (np.concatenate([one[name].values for one in lines.values()]) for name in ("force", "contact_area"))
+    loads, areas = (np.concatenate([one[name] for one in lines.values()]) for name in ("force", "contact_area"))
     across, up = unit_for(loads, "N"), unit_for(areas, "m^2")
-    figure, (ax,) = style.new_panels(1, 1, 3.4, 2.6, lines=0)
-    for (label, one), colour in zip(lines.items(), style.CYCLE * len(lines), strict=False):
-        look = {"marker": "o" if one["force"].size <= _DOTS else "", "color": colour}
-        ax.plot(across(one["force"]), up(one["contact_area"]), label=style.verbatim(label), **look)
+    figure, (ax,) = style.new_panels(1, 1, (3.4, 2.6), lines=0)
+    for label, one in lines.items():
+        marker = "o" if one["force"].size <= _DOTS else ""
+        ax.plot(across(one["force"]), up(one["contact_area"]), marker=marker, label=style.verbatim(label))
     if contact_modulus is not None and loads.max() > 0:
         named = contact_modulus if isinstance(contact_modulus, Mapping) else {"": contact_modulus}
         first = next(iter(results.values()))
@@ -161,17 +164,15 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
                 area = nominal * theory(forces / (nominal * modulus * slope))
                 look = {"color": shade, "ls": dash, "lw": 0.9, "label": f"{label}, {name}" if name else label}
                 ax.plot(across(forces[area <= nominal]), up(area[area <= nominal]), **look)
-    style.value_axis(ax, up(areas))
+    style.value_axis(ax, up(areas), up)
     if style.is_logarithmic(loads):
         style.log_axis(ax.xaxis, across(loads))
         style.log_axis(ax.yaxis, up(areas))
     style.label_panels([ax], across.label(VARIABLES["force"].label), up.label(VARIABLES["contact_area"].label))
-    if len(ax.lines) > 1:
-        style.legend_above(figure, style.named_in(ax))
+    style.legend_above(figure, style.named_in(ax))
     return figure
 
 
-@style.apply
 def friction(dataset: xr.Dataset) -> Figure:
     """Draw friction coefficient and contact fraction against the logarithm of the speed.
 
@@ -181,7 +182,7 @@ def friction(dataset: xr.Dataset) -> Figure:
     ----------
     dataset : xarray.Dataset
         Result of :func:`roughvisc.friction`, or of a study of friction. If it is merged with the result of
-        :func:`roughvisc.observables.persson`, the theory is drawn as dotted lines. :func:`sweep` draws several cases.
+        :func:`roughvisc.observables.persson`, the theory is drawn as dashed lines. :func:`sweep` draws several cases.
 
     Returns
     -------
@@ -192,29 +193,6 @@ def friction(dataset: xr.Dataset) -> Figure:
     InputError
         If the Dataset does not hold friction over the speed.
     """
-    panels = {"friction_coefficient": "grid_error_friction", "contact_fraction": "grid_error_area"}
-    for name in panels:
-        if not isinstance(dataset, xr.Dataset) or name not in dataset or dataset[name].dims != ("speed",):
-            raise InputError(f"expected a result of rv.friction, with {name!r} over the speed")
-    ordered = dataset[[name for name in dataset.data_vars if dataset[name].dims == ("speed",)]].sortby("speed").load()
-    across = unit_for(ordered["speed"].values, "m/s")
-    speed = across(ordered["speed"].values)
-    figure, axes = style.new_panels(2, 2, 2.4, 2.0)
-    named: dict[str, Artist] = {}
-    for ax, (name, error), colour in zip(axes, panels.items(), (style.BLUE, style.CONTACT), strict=True):
-        values, theory = ordered[name].values, f"persson_{name}"
-        ax.plot(speed, values, "o-", ms=3, color=colour)
-        if error in ordered and np.isfinite(ordered[error]).any():
-            half = ordered[error].values * values
-            ax.fill_between(speed, np.maximum(values - half, 0), values + half, color=colour, alpha=0.18, lw=0)
-            named["error of the grid"] = Patch(color="0.3", alpha=0.25, lw=0)
-        if theory in ordered:
-            ax.plot(speed, ordered[theory].values, ":", color=colour)
-            named["Persson (2001): waves stressed as in full contact"] = Line2D([], [], color="0.3", ls=":")
-        ax.set_xscale("log")
-        ax.set_ylim(bottom=0)
-        style.label_panels([ax], across.label(VARIABLES["speed"].label), VARIABLES[name].label)
-        ax.grid()
-    style.letter_panels(axes)
-    style.legend_above(figure, {"computed": Line2D([], [], color="0.3", marker="o", ms=3)} | named if named else {})
-    return figure
+    names = ("friction_coefficient", "contact_fraction")
+    expect_result(dataset, "speed", *names)
+    return history(dataset, names)

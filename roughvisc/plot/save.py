@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import matplotlib
 import xarray as xr
@@ -17,20 +17,19 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
+from roughvisc.plot.fields import maps, section, surface
 from roughvisc.plot.history import friction, history
-from roughvisc.plot.maps import maps
-from roughvisc.plot.section import section
-from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
-from roughvisc.study.case_text import case_words, file_stems
+from roughvisc.progress import reporting
+from roughvisc.study.case_text import file_stems
 from roughvisc.study.storage.folder import atomic_write
-
-_Result = TypeVar("_Result")
+from roughvisc.study.storage.netcdf import open_result
+from roughvisc.study.storage.sweep_data import open_results
 
 #: Name -> function of a result, variables that it needs, and a caption.
 FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {
     "friction": (friction, ("speed", "friction_coefficient"), "Friction coefficient and contact fraction."),
-    "history": (history, ("time", "force", "approach"), "Histories; dots mark the kept times."),
+    "history": (history, ("time", "force", "approach"), "Histories. Dots: kept times; bands: error of the grid."),
     "maps": (maps, ("x", "y", "pressure"), "Pressure and gap between the bodies."),
     "leakage": (partial(maps, fields="flux"), ("leak_rate", "gap", "x"), "Flux of the fluid, integrated over the gap."),
     "section": (section, ("height", "pressure", "gap"), "Section through the contact at its largest area."),
@@ -51,7 +50,7 @@ def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Ite
 
 
 @matplotlib.rc_context(style.STYLE)
-def write_figure(figure: Figure, path: Path, title: str = "") -> Path:
+def write_figure(figure: Figure, path: Path) -> Path:
     """Write a figure to a file in the format of its suffix, complete or not at all.
 
     Parameters
@@ -60,8 +59,6 @@ def write_figure(figure: Figure, path: Path, title: str = "") -> Path:
         Figure to write.
     path : Path
         File to write.
-    title : str
-        Text above the figure, such as its case.
 
     Raises
     ------
@@ -71,16 +68,12 @@ def write_figure(figure: Figure, path: Path, title: str = "") -> Path:
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is not a picture format: expected one of .png, .pdf, .svg")
-    if title:
-        style.text_above(figure, title)
     with atomic_write(path) as temporary:
         figure.savefig(temporary, format=kind, dpi=DPI)
     return path
 
 
-def save_figures(
-    dataset: xr.Dataset, folder: Any, stem: str, *, title: str = "", names: Collection[str] | None = None
-) -> list[Path]:
+def save_figures(dataset: xr.Dataset, folder: Any, stem: str, *, names: Collection[str] | None = None) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
     Parameters
@@ -91,8 +84,6 @@ def save_figures(
         Folder for the files; created if absent.
     stem : str
         First part of every file name.
-    title : str
-        Text above each figure, such as its case.
     names : collection of str, optional
         Only these figures, such as ``["history", "maps"]``.
 
@@ -108,7 +99,7 @@ def save_figures(
     """
     expect_result(dataset)
     figures = figures_of(dataset, names)
-    written = [write_figure(figure, Path(folder, f"{stem}-{name}.png"), title) for name, _, figure in figures]
+    written = [write_figure(figure, Path(folder, f"{stem}-{name}.png")) for name, _, figure in figures]
     if not written:
         stored = ", ".join(str(known) for known in dataset.variables)
         raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")
@@ -123,7 +114,7 @@ def save_figures_of_files(
     Parameters
     ----------
     paths : sequence of Path
-        Results. For several results, file names and titles state the varied settings.
+        Results. For several results, the file names state the varied settings.
     folder : Path, optional
         Folder for the figures. Default: the folder of each result.
     every : bool
@@ -132,8 +123,6 @@ def save_figures_of_files(
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
     """
-    from roughvisc.study.storage.netcdf import open_result  # slow to import
-
     cases: dict[str, Any] = {}
     for path in paths:
         with open_result(path) as dataset:
@@ -143,7 +132,7 @@ def save_figures_of_files(
         case, stem = cases[path.stem], path.stem if is_one else stems[path.stem]
         names = set(FIGURES if every else DEFAULT)
         names -= set() if not jobs or varies_surface(case) else {"surface"}
-        jobs.append((path, folder or path.parent, stem, "" if is_one else case_words(case), names))
+        jobs.append((path, folder or path.parent, stem, names))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
 
 
@@ -152,18 +141,14 @@ def varies_surface(case: Mapping[str, Any]) -> bool:
     return any(key.startswith("surface.") for key in case.get("varied", {}))
 
 
-def _save_file(job: tuple[Path, Path, str, str, Collection[str]]) -> list[Path]:
-    from roughvisc.study.storage.netcdf import open_result  # slow to import
-
-    path, folder, stem, title, names = job
+def _save_file(job: tuple[Path, Path, str, Collection[str]]) -> list[Path]:
+    path, folder, stem, names = job
     with open_result(path) as dataset:
-        return save_figures(dataset, folder, stem, title=title, names=names)
+        return save_figures(dataset, folder, stem, names=names)
 
 
-def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: int, label: str) -> list[_Result]:
+def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int, label: str) -> list[Any]:
     """Return the results of a function of some jobs, in order; several processes compute, with a progress bar."""
-    from roughvisc.progress import reporting  # slow to import
-
     processes = min(processes, len(jobs))
     context = multiprocessing.get_context("spawn")  # a process that is forked while threads run may hang
     with (
@@ -179,8 +164,6 @@ def in_parallel(work: Callable[[Any], _Result], jobs: Sequence[Any], processes: 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
     """Return the results of the last sweep in a folder; None if there are fewer than two."""
-    from roughvisc.study.storage.sweep_data import open_results  # slow to import
-
     try:
         results = open_results(folder)
     except InputError:

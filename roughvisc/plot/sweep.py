@@ -3,113 +3,60 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import matplotlib
 import numpy as np
 import pandas as pd
 import xarray as xr
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.study.case_text import names_of, value_text
 from roughvisc.study.realisations import statistics
 from roughvisc.study.sweep_table import ITSELF, REALISATION
-from roughvisc.units import in_si, unit_for
+from roughvisc.units import in_si
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
 #: Largest number of panels, and of values of a key in a legend.
-_MOST_PANELS, _MOST_NAMED = 12, 8
-#: Viridis without its light end, which is hard to see on a white page.
-_SHADES = ListedColormap(matplotlib.colormaps["viridis"](np.linspace(0, 0.88, 256)))
-#: Entries of the legend for realisations.
-_BAND = Patch(color="0.3", alpha=0.22, lw=0)
-_ITSELF_LINE = {"ls": (0, (4, 1.5)), "lw": 1.1}
+_MOST_PANELS, _MOST_NAMED = 12, 12
 
 
-@dataclass(frozen=True)
-class Key:
-    """Swept key.
+def swept_keys(results: xr.Dataset) -> dict[str, pd.Series]:
+    """Return coordinate -> values of each swept key for all cases, under its label.
 
-    Attributes
-    ----------
-    column, name, symbol : str
-        Column in a table of cases, name in words, and symbol of the unit.
-    levels : list of float or str
-        Numbers in this unit, ascending, or texts in the order of the cases.
+    Categories are ascending numbers in the unit of the label, or texts in the order of the cases. Keys with most
+    numbers come first. Of keys that vary together only the first one is kept.
     """
-
-    column: str
-    name: str
-    symbol: str
-    levels: list[Any]
-
-    @property
-    def is_numeric(self) -> bool:
-        """Whether the levels are numbers."""
-        return isinstance(self.levels[0], float)
-
-    @property
-    def label(self) -> str:
-        """Label of an axis or a legend."""
-        return f"{self.name} [{self.symbol}]" if self.symbol else self.name
-
-    @property
-    def texts(self) -> list[str]:
-        """The levels as texts without unit."""
-        return [f"{level:.4g}" if self.is_numeric else level for level in self.levels]
-
-    @property
-    def norm(self) -> Normalize:
-        """Scale of the colours of numbers: logarithmic if they span decades."""
-        return (LogNorm if style.is_logarithmic(self.levels) else Normalize)(self.levels[0], self.levels[-1])
-
-    def colour(self, level: Any) -> Any:
-        """Return the colour of a level."""
-        return _SHADES(self.norm(level)) if self.is_numeric else style.CYCLE[self.levels.index(level) % 8]
-
-
-def swept_keys(results: xr.Dataset) -> tuple[xr.Dataset, list[Key]]:
-    """Return results with the values of their swept keys as they are shown, and these keys.
-
-    Keys with most numbers come first. A key that depends on another key is left out.
-    """
-    names = [name for name, one in results.coords.items() if one.dims == ("case",)]
+    names = [str(name) for name, one in results.coords.items() if one.dims == ("case",)]
     cases = pd.DataFrame({name: results[name].values for name in names if name not in ("case", "case_key", ROWS)})
-    counts, varied = cases.nunique(dropna=False), []
-    for name in cases:
-        pairs = {other: len(cases[[name, other]].drop_duplicates()) for other in varied}
-        if counts[name] > 1 and not any(counts[name] == counts[other] == both for other, both in pairs.items()):
-            varied.append(name)
+    numbered = {tuple(pd.factorize(cases[name], use_na_sentinel=False)[0]): name for name in reversed(cases.columns)}
+    varied = [name for codes, name in reversed(numbered.items()) if any(codes)]
     dotted = {name: str(results[name].attrs.get("long_name", name)) for name in varied}
-    words, keys = names_of(list(dotted.values())), []
+    words, keys = names_of(list(dotted.values())), {}
     for name, key in dotted.items():
-        values, symbol = cases[name], ""
+        values, label = cases[name], words[key]
         if values.dtype.kind in "iuf" and np.isfinite(values).all() and not key.endswith("seed"):
-            middle = [np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values
-            unit = unit_for(middle, str(results[name].attrs.get("units", "")))
-            shown, symbol = unit(values).tolist(), unit.symbol
-            levels = sorted(set(shown))
+            unit = style.middle_unit(values, str(results[name].attrs.get("units", "")))
+            shown, label = pd.Categorical(unit(values)), unit.label(label)
         else:
-            texts = (textwrap.shorten(value_text(key, value) or "none", 40, placeholder="…") for value in values)
-            shown = [style.verbatim(text) for text in texts]
-            levels = list(dict.fromkeys(shown))
-        keys.append(Key(str(name), words[key], symbol, levels))
-        results = results.assign_coords({name: ("case", shown)})
-    return results, sorted(keys, key=lambda key: (not key.is_numeric, -len(key.levels)))
+            texts = [style.verbatim(value_text(key, value) or "none") for value in values]
+            texts = [text if len(text) <= 40 else f"{text[:20]}…{text[-19:]}" for text in texts]
+            shown = pd.Categorical(texts, dict.fromkeys(texts))
+        keys[name] = pd.Series(shown, results["case"].values, name=label)
+    return dict(sorted(keys.items(), key=lambda item: (_is_text(item[1]), -len(item[1].cat.categories))))
+
+
+def _is_text(column: pd.Series) -> bool:
+    """Return whether the categories of a column are texts."""
+    return isinstance(column.cat.categories[0], str)
 
 
 @style.apply
-def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None = None, times: Any = None) -> Figure:
+def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None = None, times: Any = -1) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
     The key with the next most numbers colours the lines, all others make panels, up to twelve. Realisations are drawn
@@ -125,9 +72,8 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     along : str, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
         ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the speed.
-    times : float or str, or a list, optional
-        The nearest kept times are drawn; negative whole numbers count from the end. Default: the last time at which the
-        cases differ by at least half of their largest difference. [s]
+    times : float or str, or a list, default -1
+        The nearest kept times are drawn; negative whole numbers count from the end. [s]
 
     Returns
     -------
@@ -146,119 +92,129 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     curves = [str(name) for name, one in results.variables.items() if row in one.dims and not {"x", "y"} & {*one.dims}]
     if quantity not in curves:
         raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
-    dotted = {str(one.attrs.get("long_name", name)): str(name) for name, one in results.coords.items()}
-    results, keys = swept_keys(results)
-    along = along or ("speed" if axis == "speed" else keys[0].column if keys else "")
+    keys = swept_keys(results)
+    cases = pd.DataFrame({one.name: one for one in keys.values()})
+    along = along or ("speed" if axis == "speed" else next(iter(keys), ""))
     if along in curves:
-        table = _known(results[[quantity, along]].load().to_dataframe().reset_index(), quantity)
-        return _draw(table, results[quantity], keys, over=results[along])
-    chosen = [key for key in keys if key.column in (along, dotted.get(along))]
-    if not chosen:
-        known = ", ".join([*(key.column for key in keys), *curves])
-        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=known)
-    table, others = _at_times(results, quantity, times), [key for key in keys if key is not chosen[0]]
-    at = Key("at", "", "", table["at"].unique().tolist())
-    return _draw(table, results[quantity], [*chosen, *others[:1], at, *others[1:]])
+        table = results[[quantity, along]].load().to_dataframe().reset_index()
+        table = table.join(cases, on="case") if keys else table
+        return _draw(table, results[quantity], [along, *cases.columns], over=results[along])
+    if along.replace(".", "_") not in keys:
+        expected = ", ".join([*keys, *curves])
+        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=expected)
+    columns = [keys.pop(along.replace(".", "_")).name, *(one.name for one in keys.values())]
+    table = _at_times(results[quantity], times).join(cases, on="case")
+    return _draw(table, results[quantity], [*columns[:2], "", *columns[2:]])
 
 
-def _known(table: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Return the lines of a table that can be drawn."""
-    known = np.isfinite(table[quantity])
-    if quantity == "leak_rate":  # a logarithmic axis has no zero
-        known &= table[quantity] > 0
-    if not known.any():
-        raise InputError(f"{quantity} has no value to draw")
-    return table[known]
-
-
-def _at_times(results: xr.Dataset, quantity: str, times: Any = None) -> pd.DataFrame:
-    """Return a table of a quantity of all cases at some times, with the text of the time as column ``at``."""
-    values, axis = results[quantity].load(), axis_of(results.variables)
-    rows, row = values[axis], ROW if ROW in values.dims else axis
-    places = np.atleast_1d(in_si(-1 if times is None else times, VARIABLES[axis].units, "times"))
-    if times is None and row == axis:
-        others = [dim for dim in values.dims if dim != axis]
-        spread = (values.max(others) - values.min(others)).fillna(0).values
-        places = rows.values[spread >= 0.5 * spread.max()][-1:]
-    if not 0 < len(places) <= _MOST_PANELS:
-        raise InputError(key="times", found=f"{len(places)} of them", expected=f"1 to {_MOST_PANELS}")
-    parts = []
+def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
+    """Return a table of a quantity of all cases at some times, with the time as text in a column without a name."""
+    axis = axis_of(values.coords)
+    table = values.load().to_dataframe().reset_index().dropna(subset=axis)
+    places = np.atleast_1d(in_si(times, VARIABLES[axis].units, "times"))
+    rows = values.sizes[ROW if ROW in values.dims else axis]
+    if not 0 < len(places) <= _MOST_PANELS or not places.min() >= -rows:
+        expected = f"1 to {_MOST_PANELS} {axis}s, or -1 to -{rows} to count from the end"
+        raise InputError(key="times", found=places.tolist(), expected=expected)
+    parts, who = [], [dim for dim in ("case", REALISATION) if dim in values.dims]
     for place in places:
         if place < 0:
-            number = int(place) + (results[ROWS].fillna(1).astype(int) if row == ROW else rows.size)
+            part = table.groupby(who).nth(int(place))
         else:
-            number = np.abs(rows - place).fillna(np.inf).argmin(row)
-        table = values.isel({row: number}).to_dataframe().reset_index()
-        near = table[axis].dropna().unique()
+            off = table.assign(off=(table[axis] - place).abs()).groupby(who)["off"]
+            part = table.loc[off.idxmin()]
+        near = part[axis].unique()
         text = AXES[axis].place(near[0], 3)
-        parts.append(table.assign(at=text if near.size == 1 else "at the end" if place == -1 else f"near {text}"))
-    return _known(pd.concat(parts), quantity)
+        text = text if near.size == 1 else "at the end" if place == -1 else f"near {text}"
+        parts.append(part.assign(**{"": text}))
+    table = pd.concat(parts)
+    return table.assign(**{"": pd.Categorical(table[""], table[""].unique())})
 
 
-def _draw(table: pd.DataFrame, quantity: xr.DataArray, keys: list[Key], over: xr.DataArray | None = None) -> Figure:
-    """Draw a table of cases: the first key, or `over`, across; the next key as colours; the others as panels."""
-    label, units = style.described(quantity)
-    values = table[str(quantity.name)].to_numpy()
-    unit = unit_for([np.sqrt(values.min() * values.max())] if style.is_logarithmic(values) else values, units)
-    table = table.assign(shown=unit(values))
-    across, rest = (None, keys) if over is not None else (keys[0], keys[1:])
-    second, rest = (rest[0], rest[1:]) if rest else (None, [])
-    families = [second.column] if second else []  # columns that tell the lines of a panel apart
-    while rest and table.groupby([key.column for key in rest]).ngroups > _MOST_PANELS:
-        families.append(rest.pop().column)
-    if over is not None:
-        places = xr.DataArray(np.unique(table[str(over.name)]), name=over.name, attrs=over.attrs)
-        table["across"] = style.row_unit(places)(table[str(over.name)])
-    else:
-        table["across"] = table[across.column] if across.is_numeric else table[across.column].map(across.levels.index)
-    groups = {key.column: table[key.column].map(key.levels.index) for key in rest}
-    panels = list(table.groupby(list(groups.values()))) if rest else [((), table)]
-    titles = []
-    for found, _ in panels:
-        parts = (f"{key.name} {key.texts[i]} {key.symbol}".strip() for key, i in zip(rest, found, strict=True))
-        titles.append(textwrap.fill(", ".join(parts), 26))
-    columns = 1 if not rest else len(rest[-1].levels) if len(rest[-1].levels) <= 4 else 3
-    width, height = (3.4, 2.0) if columns == 1 else (2.1, 1.7)
-    is_text = across is not None and not across.is_numeric
-    is_turned = is_text and style.LETTER * len(" ".join(across.texts)) > width
-    bottom = 0.45 + style.LETTER * max(map(len, across.texts)) if is_turned else 0.5
-    look: dict[str, Any] = {"shared": "xy", "bottom": bottom, "lines": max(len(one.splitlines()) for one in titles)}
-    figure, axes = style.new_panels(len(panels), columns, width, height, **look)
-    for ax, (_, panel) in zip(axes, panels, strict=True):
-        for _, line in panel.groupby(families) if families else [((), panel)]:
-            colour = second.colour(line[second.column].iloc[0]) if second else style.BLUE
-            _draw_line(ax, line.sort_values("across"), colour, joined=not is_text)
-        style.value_axis(ax, table["shown"])
-    if over is not None:
-        style.row_axis(axes, places)
-    elif is_text:
-        axes[0].set_xticks(range(len(across.texts)), across.texts)
-        axes[0].set_xlim(-0.5, len(across.texts) - 0.5)
-        for ax in axes:
-            ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
-    elif style.is_logarithmic(across.levels):
-        style.log_axis(axes[0].xaxis, across.levels)
-    style.label_panels(axes, axes[0].get_xlabel() if over is not None else across.label, unit.label(label))
-    style.letter_panels(axes, titles)
-    named: dict[str, Artist] = {}
-    if second and second.is_numeric and len(second.levels) > _MOST_NAMED:
-        style.colour_bar(ScalarMappable(second.norm, _SHADES), axes, second.label)
-    elif second and len(second.levels) <= 2 * _MOST_NAMED:
-        colours = (second.colour(level) for level in second.levels)
-        named = {text: Line2D([], [], color=one, marker="o") for text, one in zip(second.texts, colours, strict=True)}
-    if REALISATION in table:
-        has_scan = (table[REALISATION] == ITSELF).any()
-        count = table.loc[table[REALISATION] != ITSELF, REALISATION].nunique()
-        kind = "Gaussian surrogates" if has_scan else "realisations"
-        named |= {f"mean of {count} {kind}": Line2D([], [], color="0.3"), "95 % prediction interval": _BAND}
-        named |= {"measured scan": Line2D([], [], color="0.3", **_ITSELF_LINE)} if has_scan else {}
-    style.legend_above(figure, named, second.label if second else "")
+def _draw(table: pd.DataFrame, quantity: xr.DataArray, columns: list[str], over: xr.DataArray | None = None) -> Figure:
+    """Draw a table of cases: the first column, or `over`, across; the next one as colours; the others as panels."""
+    name, (label, si) = str(quantity.name), style.described(quantity)
+    table = table[style.drawable(table[name]).notna()]
+    if table.empty:
+        raise InputError(f"{name} has no value to draw")
+    unit = style.middle_unit(table[name], si)
+    table = table.assign(shown=unit(table[name]))
+    across, families, rest = columns[0], columns[1:2], columns[2:]  # families tell the lines of a panel apart
+    while len(panels := _grouped(table, rest)) > _MOST_PANELS:
+        families.append(rest.pop())
+    titles = [_title(rest, levels) for levels, _ in panels]
+    count = len(table[rest[-1]].cat.categories) if rest else 1
+    size, room = (2.1, 1.7) if count > 1 else (3.4, 2.0), {}
+    texts = list(table[across].cat.categories) if over is None and _is_text(table[across]) else []
+    is_turned = style.LETTER * len(" ".join(texts)) > size[0]
+    if is_turned:
+        room["bottom"] = 0.45 + style.LETTER * max(map(len, texts))
+    lines = max(len(title.splitlines()) for title in titles)
+    figure, axes = style.new_panels(len(panels), count if count <= 4 else 3, size, shared="xy", lines=lines, **room)
+    table = _placed(axes, table, across, over)
+    looks = _looks(table[families[0]]) if families else {None: {"color": style.BLUE}}
+    for ax, (_, panel), title in zip(axes, _grouped(table, rest), titles, strict=True):
+        for (level, *_), line in _grouped(panel, families):
+            _draw_line(ax, line.sort_values("across"), looks[level], joined=not texts)
+        style.value_axis(ax, table["shown"], unit)
+        ax.set_title(title)
+        ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
+    style.label_panels(axes, y=unit.label(label))
+    named = style.named_in(*axes)
+    in_order = {look["label"]: named.pop(look["label"]) for look in looks.values() if look.get("label") in named}
+    style.legend_above(figure, in_order | named, families[0] if families else "")
     return figure
 
 
-def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> None:
+def _grouped(table: pd.DataFrame, columns: list[str]) -> list[tuple[tuple[Any, ...], pd.DataFrame]]:
+    """Return the values of some columns and the lines with them; the whole table without columns."""
+    return list(table.groupby(columns, observed=True)) if columns else [((None,), table)]
+
+
+def _title(columns: list[str], levels: tuple[Any, ...]) -> str:
+    """Return the title of a panel, with one line or more for each column."""
+    lines = []
+    for column, level in zip(columns, levels, strict=False):
+        name, _, symbol = column.rstrip("]").partition(" [")
+        lines.append(textwrap.fill(f"{name} {_text(level)} {symbol}".strip(), 26))
+    return "\n".join(lines)
+
+
+def _text(level: Any) -> str:
+    """Return a level as text without unit."""
+    return level if isinstance(level, str) else f"{level:.4g}"
+
+
+def _looks(column: pd.Series) -> dict[Any, dict[str, Any]]:
+    """Return level of a column -> colour and label of its lines; of many levels only some have a label."""
+    levels = column.cat.categories
+    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.88, len(levels)))  # the light end is hard to see on white
+    looks = {level: {"color": style.CYCLE[number % 8]} for number, level in enumerate(levels)}
+    if not _is_text(column):
+        looks = {level: {"color": shade} for level, shade in zip(levels, shades, strict=True)}
+    for level in levels[:: -(-len(levels) // _MOST_NAMED)]:
+        looks[level]["label"] = _text(level)
+    return looks
+
+
+def _placed(axes: Sequence[Axes], table: pd.DataFrame, column: str, over: xr.DataArray | None) -> pd.DataFrame:
+    """Scale and label the horizontal axis; return a table with the places on it as column ``across``."""
+    if over is not None:
+        return table.assign(across=style.row_axis(axes, over)(table[column]))
+    style.label_panels(axes, column)
+    levels = table[column].cat.categories
+    if _is_text(table[column]):
+        axes[0].set_xticks(range(len(levels)), levels)
+        axes[0].set_xlim(-0.5, len(levels) - 0.5)
+        return table.assign(across=table[column].cat.codes)
+    if style.is_logarithmic(levels):
+        style.log_axis(axes[0].xaxis, levels)
+    return table.assign(across=table[column].astype(float))
+
+
+def _draw_line(ax: Axes, line: pd.DataFrame, look: dict[str, Any], *, joined: bool) -> None:
     """Draw one line of a panel; of realisations the mean, the prediction interval, and the measured scan."""
-    look: dict[str, Any] = {"color": colour, "marker": "o" if len(line) <= 100 else "", "ls": "-" if joined else ""}
+    look = {"marker": "o" if len(line) <= 100 else "", "ls": "-" if joined else ""} | look
     if REALISATION not in line:
         ax.plot(line["across"], line["shown"], **look)
         return
@@ -267,14 +223,16 @@ def _draw_line(ax: Axes, line: pd.DataFrame, colour: Any, *, joined: bool) -> No
     itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else None
     found = statistics(wide.to_numpy().T)
     ends = wide.index, found["patch_lower"], found["patch_upper"]
+    kind = f"{wide.shape[1]} {'realisations' if itself is None else 'surrogates'}"
+    band = {"color": look["color"], "label": f"mean and 95 % prediction interval, {kind}"}
     if joined and len(wide) > 1:
-        ax.fill_between(*ends, color=colour, alpha=0.22, lw=0)
+        ax.fill_between(*ends, alpha=0.22, lw=0, **band)
     else:
-        ax.vlines(*ends, color=colour, alpha=0.35, lw=5)
-    if itself is not None:
-        dashed = _ITSELF_LINE if joined else {"ls": ""}
-        ax.plot(itself.index, itself, marker="D", mfc="w", ms=4, color=colour, **dashed)
+        ax.vlines(*ends, alpha=0.35, lw=5, **band)
     ax.plot(wide.index, found["mean"], **look)
+    if itself is not None:
+        dashed = {"marker": "D", "mfc": "w", "ms": 4, "lw": 1.1, "ls": "--" if joined else "", "label": "measured scan"}
+        ax.plot(itself.index, itself, **(look | dashed))
 
 
 def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
@@ -283,22 +241,21 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     A quantity that is the same in all cases, or equal to a swept key, is left out.
     """
     axis = axis_of(results.variables)
+    curves, ending = ("contact_area", "leak_rate", *CONDUCTANCES), "-histories"
     if axis == "speed":
-        for name in ("friction_coefficient", "contact_fraction"):
-            yield name, f"{VARIABLES[name].label} against speed, for each case.", sweep(results, name)
-        if "reduced_speed" in results and not np.allclose(results["reduced_speed"], results["speed"], equal_nan=True):
-            caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
-            yield "master", caption, sweep(results, along="reduced_speed")
-        return
-    keys = swept_keys(results)[1]
-    for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES):
-        if name not in results or not results[name].any():
-            continue
-        table = _at_times(results, name)
-        stated = [table[name].iloc[0], *(table[key.column] for key in keys if key.is_numeric)]
-        small = 1e-6 * table[name].abs().max()
-        if keys and not any(np.allclose(table[name], one, rtol=0, atol=small) for one in stated):
-            yield name, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)
-        if name in ("contact_area", "leak_rate", *CONDUCTANCES):
+        curves, ending = ("friction_coefficient", "contact_fraction"), ""
+    for name in curves:
+        if name in results and results[name].any():
             caption = f"{VARIABLES[name].label} over {axis}, for each case."
-            yield f"{name}-histories", caption, sweep(results, name, along=axis)
+            yield f"{name}{ending}", caption, sweep(results, name, along=axis)
+    if "reduced_speed" in results and not np.allclose(results["reduced_speed"], results["speed"], equal_nan=True):
+        caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
+        yield "master", caption, sweep(results, along="reduced_speed")
+    keys = swept_keys(results)
+    for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES) if keys and axis == "time" else ():
+        if name in results:
+            table = _at_times(results[name])
+            stated = [table[name].iloc[0], *(table[key] for key in keys if results[key].dtype.kind in "iuf")]
+            small = 1e-6 * table[name].abs().max()
+            if not any(np.allclose(table[name], one, rtol=0, atol=small) for one in stated):
+                yield name, f"{VARIABLES[name].label} against the swept settings.", sweep(results, name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,10 +11,11 @@ from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
 from roughvisc.plot import style
+from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: Markers of the grids, from the finest on.
+#: Markers of the grids, from the coarsest on.
 _MARKERS = "o^vsDP"
 
 
@@ -52,42 +52,35 @@ def trade(dataset: xr.Dataset, quantity: str | Sequence[str] | None = None) -> F
     shown = [name for name in wanted if np.isfinite(dataset["error"].sel(quantity=name)).any()]
     if not shown:
         raise InputError("the trade holds no measured setting: nothing to draw")
-    figure, axes = style.new_panels(len(shown), len(shown), 2.7, 2.6)
+    figure, axes = style.new_panels(len(shown), len(shown), (2.7, 2.6))
     for ax, name in zip(axes, shown, strict=True):
         _draw_trade(ax, dataset, name)
-    style.letter_panels(axes)
     style.legend_above(figure, style.named_in(*axes))
     return figure
 
 
 def _draw_trade(ax: Axes, dataset: xr.Dataset, quantity: str) -> None:
     """Draw the settings of one quantity."""
-    from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty  # slow to import
-
-    time, error = dataset["run_time"].values, 100 * dataset["error"].sel(quantity=quantity).values
+    table = dataset[["run_time", "tolerance", "cells_x", "cells_y"]].to_dataframe()
+    table["error"] = 100 * dataset["error"].sel(quantity=quantity).values
     unsure = float(np.nan_to_num(100 * uncertainty(dataset, quantity)))
-    known = np.isfinite(time) & np.isfinite(error)
-    front = np.flatnonzero(pareto_front(dataset, quantity) & (error > unsure))
-    front = front[np.argsort(time[front], kind="stable")]
-    style.log_axis(ax.xaxis, time[known])
-    style.log_axis(ax.yaxis, error[known])
-    ax.plot(time[front], error[front], color="0.35", lw=1.0, zorder=1, label="Pareto front")
-    grids = list(zip(dataset["cells_x"].values, dataset["cells_y"].values, strict=True))
-    order = sorted({grids[i] for i in np.flatnonzero(known)}, reverse=True)
-    for grid, marker, colour in zip(order, itertools.cycle(_MARKERS), itertools.cycle(style.CYCLE)):
-        chosen = [i for i in np.flatnonzero(known) if grids[i] == grid]
-        look = {"color": colour, "ms": 5, "mew": 0, "label": f"{grid[0]} × {grid[1]} cells", "zorder": 3}
-        ax.plot(time[chosen], error[chosen], marker, **look)
+    front = table[pareto_front(dataset, quantity) & (table["error"] > unsure)].sort_values("run_time", kind="stable")
+    table = table[np.isfinite(table["run_time"]) & np.isfinite(table["error"])]
+    style.log_axis(ax.xaxis, table["run_time"])
+    style.log_axis(ax.yaxis, table["error"])
+    ax.plot(front["run_time"], front["error"], color="0.35", lw=1.0, zorder=1, label="Pareto front")
+    for number, (grid, own) in enumerate(table.groupby(["cells_x", "cells_y"], sort=True)):
+        look = {"color": style.CYCLE[number % len(style.CYCLE)], "label": f"{grid[0]} × {grid[1]} cells"}
+        ax.plot(own["run_time"], own["error"], _MARKERS[number % len(_MARKERS)], ms=5, mew=0, zorder=3, **look)
     ax.margins(0.15)
     ax.set_ylim(ax.get_ylim())
     if unsure > ax.get_ylim()[0]:
         ax.axhspan(ax.get_ylim()[0], unsure, color="0.93", zorder=0, label="uncertainty of the reference")
-    for i in front:
-        text = format_tolerance(float(dataset["tolerance"][i]))
-        ax.annotate(text, (time[i], error[i]), (5, 3), textcoords="offset points", fontsize=6.5, color="0.25")
+    for place in zip(front["run_time"], front["error"], front["tolerance"], strict=True):
+        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25"}
+        ax.annotate(format_tolerance(place[2]), place[:2], (5, 3), **look)
     ax.set_xlabel(f"{VARIABLES['wall_time'].label} [s]")
     ax.set_ylabel(f"Error of {VARIABLES[quantity].label.lower()} [%]")
-    ax.grid()
 
 
 @style.apply
@@ -116,7 +109,9 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
     axis = axis_of(dataset.variables)
     rows, quantity = dataset[axis], str(dataset["quantity"].values)
-    names = [*dataset["source"].values.tolist(), "all together"]
+    unknown = dataset.attrs["open"].split("; ")
+    names = [f"{name} (open)" if name in unknown else str(name) for name in dataset["source"].values]
+    names.append("all together")
     at = dataset.isel({axis: row})
     half, towards = at["half_width"].values, at["direction"].values
     low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
@@ -124,27 +119,18 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     ends = 100 * (np.nan_to_num([*np.exp(np.c_[low, high]), whole], nan=1.0) - 1)
     count = min(rows.size, 2)
     left = 0.2 + style.LETTER * max(map(len, names))
-    figure, axes = style.new_panels(count, count, 2.1, 2.1, left=left, between=0.75)
-    ax, places = axes[0], np.arange(len(names))[::-1]
-    colours = [*np.where(towards == 0, style.BLUE, style.ORANGE), "0.35"]
-    ax.barh(places, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
-    for place, name in zip(places, names, strict=True):
-        if name in dataset.attrs["open"].split("; "):
-            ax.text(0.0, place, " open", va="center", fontsize=7.5, color="0.35")
+    figure, axes = style.new_panels(count, count, (2.1, 2.1), left=left, between=0.75)
+    ax = axes[0]
+    colours = [*[style.BLUE] * half.size, "0.35"]
+    ax.barh(names, ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
+    ax.invert_yaxis()
     ax.axvline(0.0, color="black", lw=0.7)
     ax.set_xlabel(f"Error at {AXES[axis].place(float(rows[row]))} [%]")
-    ax.set_yticks(places, names)
-    ax.tick_params(axis="y", length=0)
     ax.use_sticky_edges = False  # else a bar ends at the frame
     ax.margins(x=0.15, y=0.06)
-    if (towards != 0).any():
-        ax.set_title("orange: one direction only", loc="right", fontsize=8)
     for curve in axes[1:]:
-        unit = unit_for(dataset["upper"].values, VARIABLES[quantity].units)
-        over = style.row_unit(rows)(rows)
+        unit, over = unit_for(dataset["upper"].values, VARIABLES[quantity].units), style.row_axis([curve], rows)(rows)
         curve.fill_between(over, unit(dataset["lower"]), unit(dataset["upper"]), color=style.BLUE, alpha=0.25, lw=0)
         curve.plot(over, unit(dataset["value"]), "o-", color=style.BLUE)
-        style.row_axis([curve], rows)
         curve.set_ylabel(unit.label(quantity.replace("_", " ").capitalize()))
-    style.letter_panels(axes)
     return figure

@@ -21,8 +21,8 @@ from roughvisc.errors import InputError
 from roughvisc.labels import cost_of, warnings_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
+from roughvisc.plot.fields import surface
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
-from roughvisc.plot.surface import surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.audit import audit
 from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts

@@ -23,25 +23,25 @@ def curve():
 
 
 def test_friction__draws_both_in_the_order_of_the_speed():
-    left, right = rv.plot.friction(curve()).axes
+    above, below = rv.plot.friction(curve()).axes
     for ax, name, expected in (
-        (left, "Friction coefficient", [0.01, 0.2, 0.3]),
-        (right, "Contact fraction", [0.2, 0.1, 0.02]),
+        (above, "Friction coefficient", [0.01, 0.2, 0.3]),
+        (below, "Contact fraction", [0.2, 0.1, 0.02]),
     ):
         speed, drawn = ax.lines[0].get_data()
         np.testing.assert_allclose(speed, [0.02, 0.2, 2.0])
         assert drawn.tolist() == expected
         assert ax.get_ylabel() == name
-        assert ax.get_ylim()[0] == 0
-        assert ax.get_ylim()[1] > max(expected)
-    assert left.get_xlabel() == "Speed [mm/s]"
-    assert left.get_xscale() == "log"
+        assert ax.get_yscale() == "linear"
+        assert ax.get_ylim()[0] <= 0 < max(expected) < ax.get_ylim()[1]
+    assert below.get_xlabel() == "Speed [mm/s]"
+    assert below.get_xscale() == "log"
 
 
 def test_friction__draws_the_theory():
     figure = rv.plot.friction(curve())
-    dotted = [line for ax in figure.axes for line in ax.lines if line.get_linestyle() == ":"]
-    assert [line.get_ydata().tolist() for line in dotted] == [[0.02, 0.3, 0.5], [0.18, 0.09, 0.01]]
+    dashed = [line for ax in figure.axes for line in ax.lines if line.get_label() == "Persson"]
+    assert [line.get_ydata().tolist() for line in dashed] == [[0.02, 0.3, 0.5], [0.18, 0.09, 0.01]]
     assert figure.axes[0].get_ylim()[1] > 0.5
 
 
@@ -83,8 +83,8 @@ def test_maps_of_friction__at_speeds_that_are_asked_for():
     figure = rv.plot.maps(sliding(), ["1.5 mm/s", 3e-5])
     drawn = [np.ma.getdata(ax.images[0].get_array()) for ax in figure.axes if ax.images]
     assert [int((one > 0).sum()) for one in drawn] == [4, 12]
-    for speeds in ([], [1.0] * 25):
-        with pytest.raises(rv.InputError, match="1 to 24"):
+    for speeds in ([], [1.0] * 9):
+        with pytest.raises(rv.InputError, match="1 to 8"):
             rv.plot.maps(sliding(), speeds)
     with pytest.raises(rv.InputError, match="holds no 'pressure'"):
         rv.plot.maps(sliding().drop_vars("pressure"))

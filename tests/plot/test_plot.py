@@ -14,7 +14,7 @@ from support import lines, refused
 import roughvisc as rv
 from roughvisc import observables, plot
 from roughvisc.errors import InputError
-from roughvisc.plot import style
+from roughvisc.plot import fields, style
 from roughvisc.topography.parameters import levelled_parameters
 
 
@@ -41,7 +41,6 @@ DRAWN = {
 def test_every_figure__is_drawn_without_a_warning_and_leaves_no_global_state(draw, make):
     before = dict(matplotlib.rcParams)
     figure = DRAWN[draw](make())
-    style.text_above(figure, "Load 5 mN, and a title that is long enough for several lines " * 2)
     FigureCanvasAgg(figure).draw()
     assert dict(matplotlib.rcParams) == before
     assert all(ax.lines or ax.images or ax.collections or ax.patches or not ax.axison for ax in figure.axes)
@@ -127,12 +126,29 @@ def test_maps__of_the_times_and_fields_requested():
     assert len(images(plot.maps(ds.drop_vars("pressure")))) == 4
     (displaced,) = images(plot.maps(ds, times=5.0, fields=["displacement"]))
     np.testing.assert_allclose(displaced.get_array(), 1e6 * ds["displacement"].sel(time=5.0, method="nearest").T)
-    with refused("times", "30 times"):
-        plot.maps(ds, times=ds["time"].values)
+    for wrong in (ds["time"].values[:9].tolist(), [], [-31.0], [-0.5], [np.inf]):
+        with refused("times", wrong):
+            plot.maps(ds, times=wrong)
     with refused("fields", "stress"):
         plot.maps(ds, fields=["stress"])
     with pytest.raises(InputError, match="'pressure'"):
         plot.maps(ds.drop_vars(["pressure", "gap", "displacement"]))
+
+
+def test_maps__of_many_cells_keep_the_extremes_of_every_block(monkeypatch):
+    monkeypatch.setattr(fields, "MOST_CELLS", 16)
+    ds = made.rough_creep((50, 37), 2, absent=False)
+    ds["height"][:4, :4] = ds["height"][6, 7] = np.nan
+    ds["pressure"] = ds["pressure"].where(ds["height"].notnull())
+    kept = {"pressure": np.max, "gap": np.min, "displacement": np.mean}
+    for image, (name, reduction) in zip(images(plot.maps(ds, -1, list(kept))), kept.items(), strict=True):
+        drawn = image.get_array().filled(np.nan).T
+        whole = ds[name].isel(time=-1).where(ds["height"].notnull()).values
+        blocks = {(i, j): whole[4 * i : 4 * i + 4, 4 * j : 4 * j + 4] for i, j in np.ndindex(13, 10)}
+        expected = np.array(
+            [reduction(one[np.isfinite(one)]) if (i, j) != (0, 0) else np.nan for (i, j), one in blocks.items()]
+        )
+        np.testing.assert_allclose(drawn.ravel() / np.nanmax(drawn), expected / np.nanmax(expected), rtol=1e-12)
 
 
 def test_maps__of_the_flux_show_the_largest_one():
@@ -199,10 +215,10 @@ def test_save_figures__writes_what_the_result_allows(tmp_path, coarse_pictures):
 @pytest.mark.parametrize("make", [made.rough_creep, made.one_frame])
 def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
     ds = make()
-    path = plot.animate(ds, tmp_path / "contact.gif", frames=3)
+    path = plot.animate(ds, tmp_path / "contact.gif")
     assert list(tmp_path.iterdir()) == [path]
     with Image.open(path) as picture:
-        assert getattr(picture, "n_frames", 1) == min(3, ds.sizes["time"])
+        assert getattr(picture, "n_frames", 1) == ds.sizes["time"]
 
 
 def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import sample_results as made
 import scipy.stats
 import xarray as xr
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgba
 from support import BALL, refused
 
 import roughvisc as rv
@@ -65,8 +66,6 @@ def test_sweep__of_one_key_has_a_line_for_each_time():
         np.testing.assert_allclose(line.get_xdata(), [10, 20, 40])
         np.testing.assert_allclose(line.get_ydata(), share * LOADS**0.9)
     assert legend(plot.sweep(ds)) == ["t = 10 s"]
-    released = ds.assign(contact_area=ds.contact_area * xr.DataArray([1.0, 1.0, 0.0], dims="time"))
-    assert legend(plot.sweep(released)) == ["t = 1 s"], "the cases do not differ at the end"
     with refused():
         plot.sweep(ds.assign(contact_area=np.nan * ds.contact_area))
 
@@ -74,7 +73,7 @@ def test_sweep__of_one_key_has_a_line_for_each_time():
 def test_sweep__of_two_keys_has_a_panel_for_each_time():
     ds = stacked(by_both, program__0__load=LOADS, material__kelvin_viscosity=VISCOSITIES)
     figure = plot.sweep(ds, along="program.0.load", times=[1.0, -1])
-    assert [ax.get_title(loc="left").partition("  ")[2] for ax in figure.axes] == ["t = 1 s", "t = 10 s"]
+    assert [ax.get_title(loc="left") for ax in figure.axes] == ["t = 1 s", "t = 10 s"]
     assert legend(figure) == ["1", "10", "100", "1000"]
     assert figure.legends[0].get_title().get_text() == "Kelvin viscosity [kPa s]"
     for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
@@ -91,19 +90,18 @@ def test_sweep__along_words_and_an_infinite_number_draws_every_case():
 
 
 @pytest.mark.parametrize("count", [2, 100])
-def test_sweep__over_time_names_its_lines_in_a_legend_or_a_colour_bar(count):
+def test_sweep__over_time_has_a_line_for_each_case_and_names_some(count):
     loads = np.geomspace(0.01, 1.0, count)
     figure = plot.sweep(stacked(by_load, program__0__load=loads), along="time")
-    ax = figure.axes[0]
+    (ax,) = figure.axes
     assert len(ax.lines) == count
     for line, load in zip(ax.lines, loads, strict=True):
         np.testing.assert_allclose(line.get_ydata() / line.get_ydata()[-1], [0.25, 0.5, 1.0])
         assert line.get_ydata()[-1] / ax.lines[0].get_ydata()[-1] == pytest.approx((load / loads[0]) ** 0.9)
-    if count == 2:
-        assert legend(figure) == ["10", "1000"]
-    else:
-        assert figure.axes[1].get_yscale() == "log"
-        assert figure.axes[1].get_ylabel() == "Load [mN]"
+    assert figure.legends[0].get_title().get_text() == "Load [mN]"
+    step = 1 if count == 2 else 9
+    assert legend(figure) == [f"{1e3 * load:.4g}" for load in loads[::step]]
+    assert len({tuple(to_rgba(line.get_color())) for line in ax.lines}) == count
 
 
 def test_sweep__refuses_what_cannot_be_drawn():
@@ -148,7 +146,7 @@ def band_at_end(ax, number):
 def test_figures__draw_the_mean_of_the_realisations_their_band_and_the_scan(along):
     figure = plot.sweep(patches(), along=along)
     (ax,) = figure.axes
-    assert legend(figure)[-3:] == ["mean of 4 Gaussian surrogates", "95 % prediction interval", "measured scan"]
+    assert legend(figure)[-2:] == ["mean and 95 % prediction interval, 4 surrogates", "measured scan"]
     top = 1e-7 * LOADS[-1] * 3 * (1e12 if "µm²" in ax.get_ylabel() else 1e6)
     assert band_at_end(ax, -1) == pytest.approx([top * end for end in interval(FACTORS[1:])])
     ends = [line.get_ydata()[-1] for line in ax.lines]
@@ -191,7 +189,7 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
         "a panel for each hold"
     )
     names = [name for name, _, _ in sweep_figures(results)]
-    assert names == ["contact_area", "contact_area-histories", "approach"], "the force is known"
+    assert names == ["contact_area-histories", "contact_area", "approach"], "the force is known"
     written = plot.save_sweep_figures(results, tmp_path / "figures")
     assert [path.name for path in written] == [f"sweep-{name}.png" for name in names]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)

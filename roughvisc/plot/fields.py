@@ -1,0 +1,449 @@
+"""Maps of the fields of a result, a section through its contact, an animation of a map, and a surface."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import Patch
+
+from roughvisc.arguments import one_of
+from roughvisc.errors import InputError
+from roughvisc.observables import contact, leakage
+from roughvisc.observables.deformed import deformed
+from roughvisc.observables.frames import expect_result
+from roughvisc.plot import style
+from roughvisc.study.storage.folder import atomic_write
+from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.grid import cell_edges, cell_side, checked, spacing
+from roughvisc.topography.missing_points import fill
+from roughvisc.topography.spectrum import psd
+from roughvisc.units import Quantity, Unit, in_si, quantities, unit_for
+from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
+
+#: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
+#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure and flux darken as
+#: they rise.
+_LOOK = {
+    "pressure": ("viridis_r", "max", style.NO_CONTACT, "no contact"),
+    "gap": ("cividis", "min", style.CONTACT, "contact"),
+    "displacement": ("viridis", "mean", None, ""),
+    "flux": ("cividis_r", "max", style.NO_CONTACT, "below 0.1 % of the scale"),
+    "height": ("cividis", "mean", None, ""),
+}
+#: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
+MOST_CELLS, _MOST_FRAMES = 1024, 8
+#: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
+_SHOWN, _SPIKE = 99.8, 1.2
+#: Direction of the motion -> arrow on a map.
+_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
+
+
+def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
+    """Return the numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
+    axis = axis_of(dataset.variables)
+    rows, unit = dataset[axis].values, VARIABLES[axis].units
+    wanted = np.atleast_1d(np.asarray(in_si(places, unit, f"{axis}s"), dtype=float)).ravel()
+    from_end = (wanted < 0) & (wanted == np.floor(wanted)) & (-wanted <= rows.size)
+    if not 0 < wanted.size <= _MOST_FRAMES or not (from_end | ((wanted >= 0) & np.isfinite(wanted))).all():
+        expected = f"1 to {_MOST_FRAMES} {axis}s [{unit}], or -1 to -{rows.size} to count from the end"
+        raise InputError(key=f"{axis}s", found=wanted.tolist(), expected=expected)
+    nearest = np.abs(rows - wanted[:, None]).argmin(axis=1)
+    return np.where(from_end, rows.size + wanted, nearest).astype(int).tolist()
+
+
+def largest_contact(dataset: xr.Dataset) -> int:
+    """Return the number of the last row with the largest contact area, or of the last row if areas are not known."""
+    if "contact_area" not in dataset:
+        return dataset.sizes[axis_of(dataset.variables)] - 1
+    area = np.nan_to_num(dataset["contact_area"].values)
+    return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
+
+
+def representative_frames(dataset: xr.Dataset) -> list[int]:
+    """Return up to four rows, evenly spread and with the largest contact; for friction, the ends and the maximum."""
+    axis = axis_of(dataset.variables)
+    rows, key = dataset[axis].values, AXES[axis].telling
+    if key in dataset:
+        chosen = {int(rows.argmin()), int(np.nanargmax(dataset[key].values)), int(rows.argmax())}
+        return sorted(chosen, key=rows.__getitem__)
+    spread, largest = np.linspace(0, rows.size - 1, 4).round().astype(int), largest_contact(dataset)
+    spread[np.abs(spread - largest).argmin()] = largest
+    return np.unique(spread).tolist()
+
+
+def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
+    """Return one frame of a field to draw; the gap in contact is exactly zero."""
+    at = dataset.isel({axis_of(dataset.variables): frame})
+    field = at[name] if "height" not in at else at[name].where(at["height"].notnull())
+    if name == "gap" and "pressure" in at:
+        field = field.where(at["pressure"].isnull() | (at["pressure"] <= 0), 0.0)
+    return drawn(field.rename(name))
+
+
+def drawn(field: xr.DataArray) -> xr.DataArray:
+    """Return the map to draw: for a large one, blocks of cells with their largest pressure and smallest gap."""
+    every = -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS)
+    if every > 1:
+        blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
+        to_centre = {axis: (every - 1) / 2 * cell_side(field[axis]) for axis in ("x", "y")}
+        field = getattr(blocks, _LOOK[str(field.name)][1])()
+        field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
+    return field.load()
+
+
+def plane_unit(field: xr.DataArray | xr.Dataset) -> Unit:
+    """Return the unit for both sides of a map."""
+    return unit_for([np.ptp(cell_edges(field[axis])) for axis in ("x", "y")], "m")
+
+
+def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> tuple[float, float]:
+    """Return the size of the panel of a map, of the shape of the map unless it is a narrow strip. [inch]"""
+    ratio = float(np.clip(np.ptp(cell_edges(field["y"])) / np.ptp(cell_edges(field["x"])), 0.1, 10.0))
+    return min(width, height / ratio), min(height, width * ratio)
+
+
+def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
+    """Return unit and colour scale of a field at some rows; few values far beyond all others are above the scale."""
+    begins_at_zero, ends = _LOOK[name][2] is not None, []
+    for frame in frames:
+        known = frame.values[frame.values > 0 if begins_at_zero else np.isfinite(frame.values)]
+        if known.size:
+            ends.append(np.percentile(known, (0, _SHOWN, 100)))
+    lowest, high, most = np.transpose(ends or [(0.0, 1.0, 1.0)])
+    high = most.max() if most.max() < _SPIKE * high.max() else high.max()
+    unit = unit_for([lowest.min(), high], VARIABLES[name].units)
+    low, high = float(unit(lowest.min())), float(unit(high))
+    if name == "flux":
+        return unit, LogNorm(1e-3 * high, high)
+    return unit, Normalize(1e-12 * high if begins_at_zero else low, high)
+
+
+def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> AxesImage:
+    """Draw a map with x to the right and y upwards.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Panel to draw in, of the shape of the map.
+    field : xarray.DataArray, dims (x, y)
+        Field, missing where the profile is missing. [SI]
+    unit : Unit
+        Unit of the colour bar.
+    norm : matplotlib.colors.Normalize
+        Colour scale, in this unit.
+    """
+    plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
+    x, y = plane(cell_edges(field["x"])), plane(cell_edges(field["y"]))
+    bad = style.CONTACT if field.name == "flux" else style.MISSING
+    image = ax.imshow(
+        np.ma.masked_invalid(unit(field.transpose("y", "x"))),
+        origin="lower",
+        extent=(x[0], x[-1], y[0], y[-1]),
+        cmap=matplotlib.colormaps[colours].with_extremes(bad=bad, under=below),
+        norm=norm,
+        aspect="auto",
+    )
+    ax.grid(visible=False)
+    for axis, side in (("x", ax.bbox.width), ("y", ax.bbox.height)):
+        most = int(np.clip(2.5 * side / ax.figure.dpi, 1, 4))
+        ax.locator_params(axis, nbins=most, steps=[1, 2, 5, 10])
+    style.label_panels([ax], plane.label("x"), plane.label("y"))
+    return image
+
+
+def _draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Sequence[int]) -> dict[str, Patch]:
+    """Draw one field at some rows on one colour scale; return the entries of its legend."""
+    shown = [frame_of(dataset, name, frame) for frame in frames]
+    unit, norm = colour_scale(name, shown)
+    for ax, one in zip(axes, shown, strict=True):
+        image = draw_map(ax, one, unit, norm)
+    values = unit(np.concatenate([one.values.ravel() for one in shown]))
+    named, (_, _, below, word) = {}, _LOOK[name]
+    if below and (values < norm.vmin).any():
+        named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
+    if np.isnan(values).any():
+        bad = {"contact": style.CONTACT} if name == "flux" else {"missing": style.MISSING}
+        named |= {label: Patch(color=colour) for label, colour in bad.items()}
+    extend = "max" if np.nanmax(values) > norm.vmax else "neither"
+    style.colour_bar(image, axes, unit.label(VARIABLES[name].label), extend=extend)
+    return named
+
+
+def frame_title(dataset: xr.Dataset, frame: int) -> str:
+    """Return the time of a row, or its speed with the direction and the friction coefficient."""
+    axis = axis_of(dataset.variables)
+    at = dataset.isel({axis: frame})
+    text = AXES[axis].place(float(at[axis]), 3)
+    if axis == "speed":
+        arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
+        return f"{arrow} {text}\nµ = {float(at['friction_coefficient']):.2g}"
+    return text
+
+
+@style.apply
+def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
+    """Draw maps of fields at some times or speeds, with one colour scale for each field.
+
+    Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
+    the flux. Above 1024 cells a side, one drawn cell
+    shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
+    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. For
+    friction, an arrow shows the direction of motion of the profile.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result; if its fields are on Dask, only the drawn frames are loaded.
+    times : float or str, or a list, optional
+        The nearest kept times [s], or speeds [m/s], are drawn; negative whole numbers count from the end. Default: up
+        to four times, with that of the largest contact; for friction, the lowest speed, the speed of the largest
+        friction, and the highest.
+    fields : sequence of str
+        Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
+        ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else
+        with the defaults of :func:`roughvisc.observables.leakage`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the result holds none of the fields, or more than 8 times are requested.
+    """
+    expect_result(dataset, "x", "y")
+    fields = [fields] if isinstance(fields, str) else list(fields)
+    for name in fields:
+        one_of("fields", name, (*FIELDS, "flux"))
+    if "flux" in fields:
+        expect_result(dataset, "gap")
+        dataset = dataset.assign(flux=_flux_of(dataset))
+    stored = [name for name in fields if name in dataset]
+    if not stored:
+        expect_result(dataset, *fields)
+    frames = representative_frames(dataset) if times is None else frames_at(dataset, times)
+    columns = count = len(frames)
+    size = map_size(dataset, max(1.3, 2.9 - 0.45 * count), 3.25)
+    if size[0] > 3 * size[1]:  # strips are stacked
+        columns, size = 1, map_size(dataset, 4.5, 4.0)
+    titles, named = [frame_title(dataset, frame) for frame in frames], {}
+    look: dict[str, Any] = {"shared": "xy", "lines": len(titles[0].splitlines()), "left": 0.65, "right": style.BAR}
+    figure, panels = style.new_panels(count * len(stored), columns, size, between=max(0.3, 1.5 - size[0]), **look)
+    for number, name in enumerate(stored):
+        named |= _draw_field(panels[number * count :][:count], dataset, name, frames)
+    for ax, title in zip(panels, titles * len(stored), strict=True):
+        ax.set_title(title)
+    style.legend_above(figure, named)
+    return figure
+
+
+def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
+    stated = dataset["leak_rate"].attrs if "leak_rate" in dataset else {}
+    options = {name: value for name, value in stated.items() if name in ("along", "viscosity", "pressure_drop")}
+    gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)
+    found = leakage(gap, flow=True, **options)
+    size = np.hypot(found["flux_x"], found["flux_y"]).clip(1e-300)  # zero has no logarithm
+    return size.where(gap["gap"] > 0)
+
+
+@style.apply
+@quantities(at="m")
+def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", at: Quantity | None = None) -> Figure:
+    """Draw a cut through the contact: the pressure above, below it the profile and the deformed surface.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``height``, ``pressure``, and ``gap`` or ``displacement``.
+    time : float or str, optional
+        The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
+        the largest contact area. [s]
+    axis : {"x", "y"}
+        Direction of the cut.
+    at : float or str, optional
+        Coordinate of the cut along the other axis. Default: the line that carries most of the load. [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    expect_result(dataset, "x", "y", "height", "pressure")
+    one_of("axis", axis, ("x", "y"))
+    rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
+    frame = largest_contact(dataset) if time is None else frames_at(dataset, time)[0]
+    whole = dataset.isel({rows: frame})
+    load, places = whole["pressure"].sum(axis).values, dataset[across].values
+    index = int(load.argmax() if at is None else np.abs(places - at).argmin())
+    cut = whole.isel({across: index}).load()
+    height, surface = cut["height"], deformed(dataset, float(whole[rows])).isel({across: index})
+    plane, pressure = plane_unit(dataset), unit_for(cut["pressure"], "Pa")
+    edges, x = plane(cell_edges(dataset[axis])), plane(dataset[axis])
+    figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x", left=0.7)
+    top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
+    top.set_ylim(bottom=0)
+    top.set_ylabel(pressure.label(VARIABLES["pressure"].label))
+    known = np.concatenate([height, surface])
+    known = known[np.isfinite(known)] if np.isfinite(known).any() else np.zeros(1)
+    unit, margin = unit_for(np.ptp(known), "m"), 0.12 * np.ptp(known)
+    low, high = float(unit(known.min() - margin)), float(unit(known.max() + 2 * margin))
+    bottom.fill_between(x, unit(height), low, color="0.72", lw=0, label="profile")
+    bottom.fill_between(x, unit(surface), high, color=style.BLUE, alpha=0.16, lw=0, label="body")
+    bottom.plot(x, unit(height), color="0.25", lw=1)
+    bottom.plot(x, unit(surface), color=style.BLUE, lw=1)
+    look = {"color": style.CONTACT, "lw": 2.4, "ms": 2.4, "mew": 0, "label": "contact"}
+    bottom.plot(x, np.where(contact(cut), unit(height), np.nan), "o-", **look)
+    level = unit(float(dataset["height"].attrs.get("highest", dataset["height"].max())) - cut.get("approach", np.nan))
+    if low < level < high:
+        bottom.axhline(float(level), color=style.BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
+    bottom.set(xlim=(edges[0], edges[-1]), ylim=(low, high) if low < high else None, xlabel=plane.label(axis))
+    bottom.set_ylabel(unit.label(VARIABLES["height"].label))
+    place = f"{across} = {plane.text(float(dataset[across][index]))}"
+    top.set_title(f"{AXES[rows].place(float(whole[rows]), 3)},  {place}")
+    figure.align_ylabels()
+    style.legend_above(figure, style.named_in(bottom))
+    return figure
+
+
+@style.apply
+@quantities(rate="1/s > 0")
+def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Quantity = 12.0) -> Path:
+    """Write an animation of a map, whose title states the time or speed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result; if its fields are on Dask, one frame is in memory at a time.
+    path : path-like
+        File to write: ``.gif`` or ``.webp``, or ``.mp4`` if ffmpeg is installed. It appears only when complete.
+    field : {"pressure", "gap", "displacement"}, optional
+        Field that the map shows. Default: pressure, or gap if the result holds no pressure.
+    rate : float
+        Kept times per second of the animation. [1/s]
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not supported, ffmpeg is missing, or the result does not hold the field.
+    """
+    path = Path(path)
+    name = field or ("pressure" if "pressure" in dataset else "gap")
+    one_of("field", name, FIELDS)
+    expect_result(dataset, "x", "y", name)
+    writer = {".gif": PillowWriter, ".webp": PillowWriter, ".mp4": FFMpegWriter}.get(path.suffix.lower())
+    if writer is None or not writer.isAvailable():
+        raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or, if ffmpeg is installed, .mp4")
+    dataset = dataset.sortby(axis_of(dataset.variables))
+    count = dataset.sizes[axis_of(dataset.variables)]
+    unit, norm = colour_scale(name, (frame_of(dataset, name, frame) for frame in range(count)))
+    figure, (ax,) = style.new_panels(1, 1, map_size(dataset, 3.2, 4.2), lines=2, right=style.BAR)
+    image = draw_map(ax, frame_of(dataset, name, 0), unit, norm)
+    style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
+
+    def draw(frame: int) -> None:
+        ax.set_title(frame_title(dataset, frame))
+        image.set_data(np.ma.masked_invalid(unit(frame_of(dataset, name, frame).transpose("y", "x"))))
+
+    with atomic_write(path) as temporary:
+        FuncAnimation(figure, draw, count, cache_frame_data=False).save(temporary, writer(fps=rate), dpi=100)
+    return path
+
+
+def robust_limits(values: np.ndarray) -> tuple[float, float]:
+    """Return the limits of the heights without spikes: at most five robust standard deviations from the median. [m]"""
+    lower, median, upper = np.nanpercentile(values, (25, 50, 75))
+    reach = 5 * (upper - lower) / 1.349  # quartiles of the normal distribution are 1.349 deviations apart
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return (max(low, float(median - reach)), min(high, float(median + reach))) if reach > 0 else (low, high)
+
+
+@style.apply
+def surface(height: xr.DataArray | xr.Dataset) -> Figure:
+    """Draw a surface: map, profile through its middle, distribution of heights, power spectrum.
+
+    Parameters
+    ----------
+    height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
+        Heights, peaks up; missing points are grey. The colour scale covers at most five robust standard deviations, so
+        that a spike does not flatten the rest; an arrow at the colour bar marks heights beyond it. [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Notes
+    -----
+    Map and profile show the given heights. Distribution and spectrum show the heights minus their mean plane. The
+    distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
+    a Hann window, after missing points are filled.
+    """
+    height = checked(height, "surface", least=1).rename("height")
+    if not np.isfinite(height).any():
+        raise InputError("the surface is all missing: nothing to draw")
+    low, high = robust_limits(height.values)
+    unit, plane = unit_for([high - low, low, high], "m"), plane_unit(height)
+    ratio = float(np.ptp(cell_edges(height["y"])) / np.ptp(cell_edges(height["x"])))
+    figure, axes = style.new_panels(4, 2, (2.4, 2.4 * float(np.clip(ratio, 0.6, 1.6))), between=1.65)
+    on_map, profile, heights, spectrum = axes
+    image = draw_map(on_map, drawn(height), unit, Normalize(float(unit(low)), float(unit(high))))
+    beyond = int((height < low).any()) + 2 * int((height > high).any())
+    style.colour_bar(image, [on_map], unit.label("Height"), extend=("neither", "min", "max", "both")[beyond])
+    line = height.isel(y=height.sizes["y"] // 2)
+    profile.plot(plane(line["x"]), unit(line), lw=0.9)
+    on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
+    profile.set_title(f"y = {plane.text(float(line['y']))}")
+    profile.set(xlabel=plane.label("x"), ylabel=unit.label("Height"))
+    levelled = off_plane(height)
+    _draw_heights(heights, levelled.values[np.isfinite(levelled.values)])
+    _draw_spectrum(spectrum, levelled)
+    return figure
+
+
+def _draw_heights(ax: Axes, known: np.ndarray) -> None:
+    """Draw the histogram of the levelled heights, with the normal distribution of the same deviation."""
+    low, high = robust_limits(known)
+    unit = unit_for([low, high], "m")
+    if high > low:
+        bins = int(np.clip(np.sqrt(known.size) / 1.5, 8, 100))
+        look = {"color": style.BLUE, "alpha": 0.45, "histtype": "stepfilled", "label": "measured"}
+        ax.hist(unit(known), bins, range=(float(unit(low)), float(unit(high))), density=True, **look)
+        z, middle, deviation = unit(np.linspace(low, high, 200)), unit(known.mean()), float(unit(known.std()))
+        normal = np.exp(-(((z - middle) / deviation) ** 2) / 2) / (deviation * np.sqrt(2 * np.pi))
+        ax.plot(z, normal, color=style.VERMILION, lw=1, label=f"normal, Sq = {deviation:.3g} {unit.symbol}")
+        ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
+        ax.legend(loc="upper left")
+    ax.set(xlabel=unit.label("Height, levelled"), ylabel=f"Density [1/{unit.symbol}]")
+
+
+def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
+    """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
+    symbol, scale = "µm", 1e-6
+    if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
+        gaps = bool(levelled.isnull().any())
+        found = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
+        found = found.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings inside the square of wavevectors
+        q, density = found["wavevector"].values, found["psd"].values
+        symbol, scale = ("nm", 1e-9) if q[-1] > 1e8 else ("µm", 1e-6) if q[-1] > 1e4 else ("mm", 1e-3)
+        telling = density > 1e-14 * density.max()  # the rest is rounding
+        q, density = q[telling] * scale, density[telling] / scale**4
+        ax.plot(q, density, lw=1)
+        style.log_axis(ax.xaxis, q)
+        style.log_axis(ax.yaxis, density)
+        ax.set_title("missing points filled" if gaps else "")
+    ax.set(xlabel=f"Wavevector [rad/{symbol}]", ylabel=f"Power spectral density\n[{symbol}⁴]")
