@@ -25,7 +25,7 @@ from roughvisc.plot.fields import surface
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.audit import audit
-from roughvisc.study.case_text import case_words, names_of, study_text, varied_texts
+from roughvisc.study.case_text import case_words, study_text
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
@@ -33,8 +33,8 @@ from roughvisc.topography.parameters import levelled_parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, IN_TABLE, VARIABLES, axis_of
 
-#: Largest numbers of cases with figures, audit and study, which are evenly spread, and of cases with every figure.
-_SHOWN, _DRAWN = 6, 3
+#: Largest number of cases with figures, audit and study, which are evenly spread.
+_SHOWN = 6
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
 #: Attributes that state how a result was computed and where its surface came from.
@@ -69,38 +69,34 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         If there are zero results, or a Dataset comes without `out`.
     """
     page: dict[str, Any] = {"failures": [], "figures": []}
-    numbers: dict[str, int] = {}
-    sources: list[Any] = [results]
+    sources, numbers = [results], {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError("out is None: expected the name of the page, if a Dataset is given")
     elif (folder := Path(results)).is_dir():
         out = out or folder / "report.html"
-        sources, cases = result_files(folder), read_sweep(folder)
-        page["failures"] = _failures(folder)
+        sources, page["failures"] = result_files(folder), _failures(folder)
         if not sources and not page["failures"]:
             raise no_results(folder)
-        numbers = numbers_of(cases)
+        numbers = numbers_of(read_sweep(folder))
         sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
         if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
     else:
         out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
     shown = set(np.linspace(0, len(sources) - 1, min(len(sources), _SHOWN)).astype(int).tolist())
-    drawn = set(FIGURES if len(sources) <= _DRAWN else DEFAULT) - {"surface"}
-    jobs = [(one, i, drawn if i in shown else set()) for i, one in enumerate(sources)]
-    page["cases"] = in_parallel(_case, jobs, processes, "report")
+    page["cases"] = in_parallel(_case, [(one, i, i in shown) for i, one in enumerate(sources)], processes, "report")
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
-    page["title"], page["headings"], page["rows"] = _table(page["cases"])
-    environment = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
-    environment.lstrip_blocks = True
-    written = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    text = environment.get_template("report.html.jinja").render(
-        page, version=metadata.version("roughvisc"), written=written
-    )
+    titles = list(dict.fromkeys(case["title"] for case in page["cases"]))
+    page["title"] = f"{len(page['cases'])} results" if len(titles) > 1 else titles[0] if titles else "No result"
+    page["headings"] = list(dict.fromkeys(heading for case in page["cases"] for heading in case["cells"]))
+    page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    page["version"] = metadata.version("roughvisc")
+    options = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    template = Environment(loader=PackageLoader("roughvisc.reports", "."), **options).get_template("report.html.jinja")
     with atomic_write(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(template.render(page), encoding="utf-8")
     return Path(out)
 
 
@@ -110,9 +106,9 @@ def _failures(folder: Path) -> list[dict[str, str]]:
     for path in sorted(folder.glob("*.failed.json")):
         key = path.name.partition(".")[0]
         record = recorded_failure(folder, key)
-        case = record.get("case", {})
-        title = ": ".join(filter(None, (case.get("title", ""), case_words(case))))
-        found.append({"key": key, "title": title, "message": record.get("message", "the record cannot be read")})
+        words = record.get("case", {}).get("title", ""), case_words(record.get("case", {}))
+        message = record.get("message", "the record cannot be read")
+        found.append({"key": key, "title": ": ".join(filter(None, words)), "message": message})
     return found
 
 
@@ -125,24 +121,18 @@ def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     return {"caption": caption, "src": src, "wide": figure.get_figwidth() > _WIDE}
 
 
-def _case(job: tuple[Path | xr.Dataset, int, set[str]]) -> dict[str, Any]:
-    """Return one case of the page: its row in the table, figures, assumptions, surface and study."""
-    source, number, names = job
+def _case(job: tuple[Path | xr.Dataset, int, bool]) -> dict[str, Any]:
+    """Return one case of the page: its row in the table and, if shown, figures, assumptions, surface and study."""
+    source, number, is_shown = job
     if isinstance(source, Path):
         with open_result(source) as dataset:
-            return _case((dataset, number, names))
+            return _case((dataset, number, is_shown))
     expect_result(source, "x", "y")
-    case = json.loads(source.attrs.get("case", "{}"))
+    case, history = json.loads(source.attrs.get("case", "{}")), str(source.attrs.get("history", "")).splitlines()
     title = str(case.get("title") or source.attrs.get("title") or f"case {number}")
-    history = str(source.attrs.get("history", "")).splitlines()
-    found: dict[str, Any] = {
-        "title": title,
-        "name": case_words(case) or title,
-        "key": str(source.attrs.get("case_key", "")),
-        "varied": varied_texts(case),
-        "cells": _cells(source),
-    }
-    if not names:
+    found: dict[str, Any] = {"title": title, "name": case_words(case) or title, "cells": _cells(source)}
+    found["key"] = str(source.attrs.get("case_key", ""))
+    if not is_shown:
         return found
     attributes = {**(source["height"].attrs if "height" in source else {}), **source.attrs}
     found["stated"] = {
@@ -151,17 +141,15 @@ def _case(job: tuple[Path | xr.Dataset, int, set[str]]) -> dict[str, Any]:
         "history": history,
         "text": study_text(case) if case else "",
     }
-    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(source, names)]
+    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(source, DEFAULT)]
     if "height" in source and (number == 0 or varies_surface(case)):
         parameters = levelled_parameters(source["height"].load())
+        rows = [(name.replace("_", " "), parameters[name].attrs["long_name"], parameters[name]) for name in _PARAMETERS]
         found["surface"] = {
             "name": str(source["height"].attrs.get("source_file") or title),
             "picture": _picture(FIGURES["surface"][2], surface(source)),
             "steps": [line for line in history if line and ": run of " not in line],
-            "parameters": [
-                (name.replace("_", " "), parameters[name].attrs["long_name"], _text(parameters[name]))
-                for name in _PARAMETERS
-            ],
+            "parameters": [(name, words, _text(value)) for name, words, value in rows],
         }
     with suppress(InputError):  # a Dataset that lacks the variables of an audit
         found["audit"] = list(audit(source))
@@ -169,21 +157,15 @@ def _case(job: tuple[Path | xr.Dataset, int, set[str]]) -> dict[str, Any]:
 
 
 def _text(value: xr.DataArray) -> str:
-    """Return a number with a suitable unit; fractions in percent."""
-    if str(value.name).endswith("fraction"):
-        return f"{100 * float(value):.3g} %"
-    unit = str(value.attrs.get("units", getattr(VARIABLES.get(str(value.name)), "units", "")))
-    return unit_for([float(value)], unit).text(float(value))
+    """Return a number with a suitable unit."""
+    return unit_for([float(value)], str(value.attrs.get("units", ""))).text(float(value))
 
 
 def _cells(dataset: xr.Dataset) -> dict[str, str]:
     """Return heading -> cell of one case in the table of cases."""
     axis = AXES[axis_of(dataset)]
     telling = dataset.isel({axis.name: axis.telling_row(dataset)})
-    cells = {
-        "Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}",
-        axis.rows.capitalize(): str(dataset[axis.name].size),
-    }
+    cells = {"Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}"}
     cells |= {VARIABLES[name].label: _text(telling[name]) for name in IN_TABLE if name in telling}
     if "stated_error" in dataset and dataset["stated_error"].notnull().any():
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
@@ -195,19 +177,3 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     if warnings := warnings_of(dataset.attrs):
         cells["Warnings"] = ", ".join(warnings)
     return cells
-
-
-def _table(cases: list[dict[str, Any]]) -> tuple[str, list[str], list[list[Any]]]:
-    """Return the title of the page, the headings of the table of cases, and its rows."""
-    titles = dict.fromkeys(case["title"] for case in cases)
-    keys = names_of(list(dict.fromkeys(key for case in cases for key in case["varied"])))
-    headings = list(dict.fromkeys(heading for case in cases for heading in case["cells"]))
-    has_titles = not keys and len(titles) > 1
-    rows = [
-        [case["number"], *([case["title"]] if has_titles else [])]
-        + [case["varied"].get(key, "") for key in keys]
-        + [case["cells"].get(heading, "") for heading in headings]
-        for case in cases
-    ]
-    title = f"{len(cases)} results" if len(titles) > 1 else next(iter(titles), "No result")
-    return title, ["Case", *(["Title"] if has_titles else []), *keys.values(), *headings], rows

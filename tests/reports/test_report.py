@@ -51,7 +51,7 @@ def test_page__numbers_the_cases_as_their_table(folder, page):
     table = re.search(r'<table id="table">.*?</table>', page, re.S)[0]
     loads = to_table(folder)["program.0.load [N]"]
     assert loads.index.tolist() == [0, 1, 2]
-    shown = re.findall(r"<tr><td>(\d)</td><td>(.*?) mN</td>", table)
+    shown = re.findall(r'<tr><td>(\d)</td><td class="name">Load (.*?) mN</td>', table)
     assert [(int(number), float(load)) for number, load in shown] == [
         (n, pytest.approx(1e3 * x)) for n, x in loads.items()
     ]
