@@ -132,7 +132,7 @@ class LoadingRows(Rows):
     ) -> None:
         height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
         xp = arrays_of(settings.device)
-        require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory=in_memory)
+        require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory)
         given = Profile(height, settings.missing, body.kernel)
         program = program.on_area(given.area)
         check_program(given, body, program, settings)

@@ -130,9 +130,8 @@ def march_bytes(
     cells: float,
     *,
     contact: float = SPARSE,
-    rows: float = 1.0,
+    rows: float = 0.0,
     part: float = 1.0,
-    in_memory: bool = False,
 ) -> float:
     """Return the memory of a loading at its peak, without interpreter and libraries.
 
@@ -147,11 +146,9 @@ def march_bytes(
     contact : float
         Largest contact fraction.
     rows : float
-        Number of kept times.
+        Number of rows whose fields stay in memory, as in :func:`roughvisc.simulate`; others go to a file.
     part : float
         Part of the cells that the domain covers.
-    in_memory : bool
-        Whether the kept fields stay in memory, as in :func:`roughvisc.simulate`; otherwise they go to a file.
 
     Returns
     -------
@@ -172,8 +169,7 @@ def march_bytes(
     solved += solutions * (1 + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
-    frames = rows * len(settings.fields) if in_memory else 0.0
-    surface = _SURFACE + (_WHOLE if part < 1 else 0.0)
+    frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
     return 8.0 * cells * (surface + frames + max(part * solved, frames))
 
 
@@ -186,10 +182,8 @@ def curve_bytes(settings: Settings, cells: float) -> float:
 # ------------------------------------------------------------------------------------------------------------- refusal
 
 
-def require_loading(
-    shape: tuple[int, int], program: Program, settings: Settings, body: Body, *, in_memory: bool
-) -> None:
-    """Check that a loading fits in memory if its contact stays sparse.
+def require_loading(shape: tuple[int, int], program: Program, settings: Settings, body: Body, in_memory: bool) -> None:
+    """Check that a loading fits in memory if its contact stays sparse; its fields may stay in memory.
 
     Raises
     ------
@@ -201,11 +195,10 @@ def require_loading(
     memory = memory_of(body, program, settings).memory
     times = program.segments if settings.times is None else settings.times  # one row for each segment, or more
     rows = times if isinstance(times, int) else len(times)
+    rows = rows if in_memory and settings.device == "cpu" else 0  # kept fields are on the host
     is_free = settings.boundary == "free" and settings.edge == "error"
     part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
-    in_memory = in_memory and settings.device == "cpu"  # kept fields are on the host
-    needed = partial(march_bytes, settings, memory, rows=rows, part=part, in_memory=in_memory)
-    require_memory(shape, needed, settings.device)
+    require_memory(shape, partial(march_bytes, settings, memory, rows=rows, part=part), settings.device)
 
 
 def require_surface(shape: Any) -> None:

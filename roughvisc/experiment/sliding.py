@@ -123,12 +123,9 @@ class SteadySliding(Experiment):
             yield "boundary", "mirror", "the surface is unfolded to four times its area: expected a pressure"
         if "displacement" in settings.fields:
             yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
-        if settings.missing != "refuse":
-            yield "missing", settings.missing, "a surface that slides has no holes: expected fill = true"
         for name in OVER_TIME:
-            found = getattr(settings, name)
-            if found != getattr(Settings, name):
-                yield name, found, "a result over speed has none: expected the usual"
+            if (found := getattr(settings, name)) != (usual := getattr(Settings, name)):
+                yield name, found, f"of steady sliding expected the default, {usual!r}"
 
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body after the time in which the surface slides past a point, at the lowest speed."""

@@ -385,7 +385,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         scene, program, model, area = own.scene, own.scene.program, own.choice.note, own.area
         kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.program.note
         rows = run.kept * run.steps if scene.kept is None else float(len(scene.kept))
-        arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), rows=rows, part=part)
+        arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), part=part)
 
     def needed(cells: float) -> float:
         return PROCESS + arrays(cells)

@@ -49,11 +49,11 @@ def one(side, material, boundary):
     case = vary(case, BOUNDARIES[boundary])
     with tempfile.TemporaryDirectory() as folder:
         with open_result(run_case(case, folder)) as ds:
-            contact, rows = float(ds.roughvisc.steps.contact_area_counted.max()) / nominal_area(ds), ds.sizes["time"]
+            contact = float(ds.roughvisc.steps.contact_area_counted.max()) / nominal_area(ds)
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.settings, case.program.on_area(nominal_area(case.height()))
     memory = memory_of(case.body, program, settings).memory
-    stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact, rows=rows)
+    stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",
         "contact": contact,
