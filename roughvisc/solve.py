@@ -205,17 +205,19 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     steps = pd.DataFrame(recorder.plain)
     kept = steps[steps["kept"]].sort_values("place", kind="stable")
     attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    histories = kept.drop(columns=["kept", "place"]).set_index(axis).to_xarray()
-    variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
+    variables: dict[str, Any] = {
+        name: (axis, kept[name].to_numpy()) for name in kept.columns.drop(["kept", "place", axis])
+    }
+    variables["height"] = ("x", "y"), np.asarray(height.values, dtype=float), attributes
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
         variables[name] = (axis, "x", "y"), field
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
-    dataset = histories.assign(variables).assign_coords(x=height["x"].values, y=height["y"].values)
-    made = {"boundary": settings.boundary, "tolerance": settings.tolerance}
+    coordinates = {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values}
+    made = {"Conventions": "CF-1.11", "boundary": settings.boundary, "tolerance": settings.tolerance}
     made["history"] = str(height.attrs.get("history", ""))
-    dataset = rows.finish(dataset.assign_attrs(Conventions="CF-1.11", **made))
+    dataset = rows.finish(xr.Dataset(variables, coordinates, made))
     if axis != "time":
         return dataset
     steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
