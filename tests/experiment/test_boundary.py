@@ -31,11 +31,6 @@ def test_auto__with_an_accepted_edge_is_free(caplog):
     assert "Contact reached the border of the surface" in caplog.text, "the outline is that of a punch"
 
 
-def test_friction__is_periodic_whatever_slides():
-    ds = rv.friction(SCAN, rv.zener(1e6, 1e6, 1e5), pressure=1e3, speeds=[1e-3], progress=False)
-    assert ds.attrs["boundary"] == "periodic"
-
-
 def test_pressure__is_the_load_over_the_whole_area():
     height = rv.self_affine((3e-4, 2e-4), (15, 12), hurst=0.8, rms_slope=0.1, seed=2)
     options = {"boundary": "periodic", "progress": False, "fields": ("pressure",)}

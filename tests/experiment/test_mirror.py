@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import at_rows, refused
+from support import at_rows
 
 import roughvisc as rv
 from roughvisc.variables import FIELDS
@@ -73,18 +73,6 @@ def test_stated_errors__are_those_of_the_unfolded_surface(pair):
     assert found.contact_area_error.values == pytest.approx(whole.contact_area_error.values / 4, rel=0.02)
     for name in [name for name in found.variables if str(name).startswith("grid_error")]:
         assert found[name].values == pytest.approx(whole[name].values, rel=0.15, abs=1e-9), name
-
-
-def test_border__is_no_seam(caplog):
-    tilted = SCAN + 2e-2 * SCAN.x
-    program = rv.Program().pressure(1e4, over=0)
-    assert "border" in pressed(tilted, ZENER, program, boundary="periodic").attrs["warnings"]
-    assert "border" not in pressed(tilted, ZENER, program, boundary="mirror").attrs.get("warnings", "")
-
-
-def test_slide__is_refused():
-    with refused("boundary", "mirror"):
-        pressed(SCAN, ZENER, PRESS.slide(1e-4, speed=1e-3), boundary="mirror")
 
 
 @pytest.mark.parametrize("direction", ["x", "-y"])

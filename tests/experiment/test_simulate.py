@@ -69,7 +69,13 @@ def test_zero_load__is_open():
 
 @pytest.mark.parametrize(
     ("times", "expected"),
-    [(None, None), (1, (2.0,)), (3, (0.0, 0.5, 2.0)), (2, (0.0, 2.0)), ([0.5 + 1e-15, 2.0], (0.5, 2.0))],
+    [
+        (None, None),
+        (1, (2.0,)),
+        (3, (0.0, 0.5, 2.0)),
+        (2, (0.0, 2.0)),
+        ([0.5 + 1e-15, 0.7, 0.7 + 1e-16, 0.7 + 1e-9, np.nextafter(2.0, 0.0), 2.0], (0.5, 0.7, 0.7 + 1e-9, 2.0)),
+    ],
 )
 def test_kept_times__are_counted_listed_or_snapped(times, expected):
     assert kept_times(rv.Program().load(1.0, over=0.5).hold(1.5), times) == expected

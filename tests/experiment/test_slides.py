@@ -96,6 +96,7 @@ def test_grid_error__holds_the_true_one_although_coarser_slides_come_to_other_in
     ("program", "settings", "message"),
     [
         (PRESS.slide(SIDE, speed=1.0), {"boundary": "free"}, "boundary: found 'free': expected 'periodic'"),
+        (PRESS.slide(SIDE, speed=1.0), {"boundary": "mirror"}, "boundary: found 'mirror': expected 'periodic'"),
         (PRESS.slide(1e-5, speed=1.0), {}, "program.2: slide: found 1e-05: .* half a cell of 41.6667 µm"),
         (rv.Program().slide(SIDE, speed=1.0), {}, "program.0 slides before there is a load"),
     ],

@@ -59,14 +59,6 @@ def test_every_requested_time__has_a_row():
     np.testing.assert_allclose(ds.approach / ds.approach[-1], expected, rtol=2e-2)
 
 
-def test_times__that_differ_by_rounding_alone_are_one():
-    third = 1.0 / 3.0
-    times = [third, np.nextafter(third, 1.0), third + 1e-9, np.nextafter(1.0, 0.0), 1.0]
-    program = rv.Program().load(1e-3, over=1.0)
-    ds = rv.simulate(BALL, rv.kelvin_voigt(1e6, 1e5), program, times=times, fields=(), progress=False)
-    assert ds.time.values.tolist() == [third, third + 1e-9, 1.0]
-
-
 def test_stated_error__covers_rows_after_a_jump_that_is_not_kept():
     """At constant approach the contact stays, and the force relaxes as the modulus; it falls to 1/3000 here."""
     equilibrium, moduli, relaxation = 1e3, (3e6, 3e5), (1e-2, 1.0)
