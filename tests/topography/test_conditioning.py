@@ -245,13 +245,6 @@ def test_combine__adds_the_faces_and_refuses_unequal_grids():
             combine(a, other)
 
 
-def test_conditioning__is_the_same_in_nanometres():
-    h = rough(missing=0.05)
-    small = (h * 1e-3).assign_coords(x=h.x * 1e-3, y=h.y * 1e-3)
-    done, tiny = (gaussian_filter(fill(mask_outliers(level(g, 2))), c) for g, c in ((h, 2e-5), (small, 2e-8)))
-    np.testing.assert_allclose(tiny * 1e3, done.values, rtol=1e-9, atol=1e-16)
-
-
 def test_filled__goes_with_its_points_through_later_steps():
     h = rough((20, 16), missing=0.1)
     done = fill(h)
@@ -266,13 +259,3 @@ def test_filled__goes_with_its_points_through_later_steps():
     for step in (part, doubled, coarse, rotate90(done), level(done), gaussian_filter(done, 2e-5)):
         assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
         assert step.attrs["fill_method"] == "harmonic"
-
-
-def test_filled__of_either_face_stays_in_the_combination():
-    a, b = rough((20, 16), missing=0.1), rough((20, 16), missing=0.1, seed=1)
-    both = combine(fill(a), fill(b, "nearest"), flip="x")
-    np.testing.assert_array_equal(both["filled"], np.isnan(a.values) | np.isnan(b.values)[::-1])
-    assert both.attrs["filled_points"] == int(both["filled"].sum())
-    assert both.attrs["fill_method"] == "harmonic, nearest"
-    np.testing.assert_array_equal(combine(a.fillna(0), fill(b))["filled"], np.isnan(b))
-    assert "filled" not in combine(a, b).coords
