@@ -77,12 +77,12 @@ def step_load(material, duration):
 
 @pytest.mark.parametrize("exponent", [-12, pytest.param(0, marks=thorough), 12])
 @pytest.mark.parametrize("material", [rv.maxwell(0.25, 0.25), ZENER, rv.kelvin_voigt(0.25, 0.25)], ids=repr)
-def test_time_over_retardation_time(material, exponent):
+def test_step_load__is_lee_and_radoks_at_any_time_over_the_retardation_time(material, exponent):
     assert_follows(*step_load(material, 10.0**exponent))
 
 
 @pytest.mark.parametrize("exponent", [-8, -2, pytest.param(4, marks=thorough), 8])
-def test_shear_modulus_over_kelvin_modulus(exponent):
+def test_step_load__is_lee_and_radoks_at_any_ratio_of_the_moduli(exponent):
     kelvin = 0.25 / 10.0**exponent
     assert_follows(*step_load(rv.zener(0.25, kelvin, kelvin), 1e3))
 
@@ -90,11 +90,11 @@ def test_shear_modulus_over_kelvin_modulus(exponent):
 @pytest.mark.parametrize("duration", [1e-6, 1e6])
 @pytest.mark.parametrize("exponent", [0.5, pytest.param(0.1, marks=thorough), pytest.param(0.9, marks=thorough)])
 @pytest.mark.parametrize("glassy", [0.0, 1.0])
-def test_power_law(glassy, exponent, duration):
+def test_step_load__is_lee_and_radoks_on_a_power_law(glassy, exponent, duration):
     assert_follows(*step_load(rv.power_law(glassy, 1.0, exponent), duration))
 
 
-def test_steps_of_all_sizes_in_one_program():
+def test_holds_of_all_lengths_in_one_program__follow_lee_and_radok():
     """Holds from 1e-15 to 1e15 retardation times, ascending."""
     program = rv.Program().load(0.1 / R, over=0)
     for exponent in range(-15, 16, 2):
@@ -195,7 +195,7 @@ def test_approach__pulls_fully_out_and_comes_back(boundary, over):
 
 
 @pytest.mark.parametrize("ratio", [1e-12, 1e12])
-def test_jumps_of_any_size(ratio):
+def test_jumps_of_any_size__leave_a_punch_at_its_exact_approach(ratio):
     """Up or down by any factor and back: a punch tells the exact approach."""
     program = rv.Program().load(1.0, over=0).hold(1.0).load(ratio, over=0).hold(1.0).load(1.0, over=0).hold(1.0)
     punch = rv.flat_punch(1.0, SIZE, SHAPE)
@@ -212,7 +212,7 @@ def test_jumps_of_any_size(ratio):
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (2, 2), (31, 37), (2, 4096)], ids=str)
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_grids_of_any_shape(shape, boundary):
+def test_solution__is_a_contact_state_on_a_grid_of_any_shape(shape, boundary):
     side = 1 / max(shape)
     height = cells(1e-3 * np.random.default_rng(0).standard_normal(shape), side)
     fields = ("pressure", "gap", "displacement")
@@ -253,7 +253,7 @@ SHAPES = {
 @pytest.mark.parametrize("load", [1e-6, 1e-2])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 @pytest.mark.parametrize("name", SHAPES)
-def test_surfaces_of_any_shape(name, boundary, load):
+def test_solution__is_a_contact_state_on_a_surface_of_any_shape(name, boundary, load):
     height = cells(SHAPES[name], 1 / 32)
     program = rv.Program().load(load, over=0.1).hold(1.0).load(load / 3, over=0.1)
     fields = ("pressure", "gap", "displacement")
