@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from support import refused
+from support import ROUGH, refused
 
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
@@ -69,24 +69,11 @@ def test_over_realisations__the_surface_itself_stands_apart():
         over_realisations(values.isel(realisation=0, drop=True).rename("area"))
 
 
-STUDY = """
-[surface]
-generate = "self_affine"
-size = "1 mm"
-shape = [9, 7]
-hurst = 0.8
-rms_slope = 0.1
-amplitudes = "gaussian"
-seed = 5
-[material]
-model = "elastic"
-shear_modulus = "1 MPa"
-[[program]]
-pressure = "10 kPa"
-over = 0
-[keep]
-fields = ["pressure"]
-"""
+STUDY = (
+    ROUGH.replace("seed = 3", 'seed = 5\namplitudes = "gaussian"')
+    .replace('load = "10 mN"\nover = "50 ms"', 'pressure = "10 kPa"\nover = 0')
+    .replace('times = [0, "20 ms", "50 ms"]', 'fields = ["pressure"]')
+)
 SWEEP = '[sweep]\nrealisations = {count}\n"program.0.pressure" = ["10 kPa", "20 kPa"]\n'
 
 
