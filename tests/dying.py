@@ -85,6 +85,8 @@ def main(study, out, most, *ways):
         numbers = range(1, total + 1) if most == "all" else sorted(drawn.sample(range(1, total + 1), int(most)))
         for at in numbers:
             print(way, at, attempted(case, Path(out, way, str(at)), at, way), flush=True)
+            if way == "kill":  # and the run that goes on from there
+                attempted(case, Path(out, way, str(at)), (at + 1) // 2, way)
 
 
 if __name__ == "__main__":

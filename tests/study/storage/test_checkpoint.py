@@ -194,6 +194,7 @@ def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, 
 
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, progress=report)
+    stopped(case, tmp_path, 3, checkpoint_seconds=0)
     assert values(run_case(case, tmp_path)) == expected
 
 
