@@ -52,6 +52,7 @@ from roughvisc.study.trade import trade as trade
 from roughvisc.topography.bandwidth import gaussian_filter as gaussian_filter
 from roughvisc.topography.bandwidth import level as level
 from roughvisc.topography.example import example_scan as example_scan
+from roughvisc.topography.formats.registry import supported_formats as supported_formats
 from roughvisc.topography.framing import combine as combine
 from roughvisc.topography.framing import crop as crop
 from roughvisc.topography.framing import invert as invert
@@ -63,7 +64,6 @@ from roughvisc.topography.missing_points import mask_outliers as mask_outliers
 from roughvisc.topography.parameters import parameters as parameters
 from roughvisc.topography.readers import from_array as from_array
 from roughvisc.topography.readers import list_channels as list_channels
-from roughvisc.topography.readers import supported_formats as supported_formats
 from roughvisc.topography.resampling import resample as resample
 from roughvisc.topography.resampling import without_short_waves as without_short_waves
 from roughvisc.topography.scans import open_scan as open_scan

@@ -186,13 +186,12 @@ def combine(
         raise InputError(f"combine: found {described[0]} and {described[1]}: expected {expected}")
     both = like(h1, h1.values + h2.values)
     solid = all(h.attrs.get("missing") == "absent" or np.isfinite(h.values).all() for h in (h1, h2))
-    attrs = {"recipe": None, "highest": None} | ({} if repeats else {"period": None})
+    methods = {h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs}
+    attrs = {"recipe": None, "highest": None, "fill_method": ", ".join(sorted(methods)) or None}
     attrs["missing"] = "absent" if solid and np.isnan(both.values).any() else None
+    attrs["period"] = h1.attrs.get("period") if repeats else None
     masks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
     both = with_filled_points(both, np.logical_or.reduce(masks) if masks else None)
-    attrs["fill_method"] = (
-        ", ".join(sorted({h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs})) or None
-    )
     return noted(both, line + (f"; the second face: {about}" if about else ""), **attrs)
 
 

@@ -21,7 +21,7 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.formats.registry import open_file, suffixes
+from roughvisc.topography.formats.registry import open_file
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
@@ -40,8 +40,6 @@ FARTHEST = 1e3
 #: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
 _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
-#: What a file without a size needs.
-_SIZE = 'spacing = "1 um", or another length'
 _READER = threading.RLock()
 
 
@@ -67,17 +65,10 @@ def read_file(path: Path, format: str | None, channel: int | str | None, how: Re
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
     stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
-    return noted(
-        h,
-        f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}",
-        source_file=path.name,
-        source_sha256=sha256(path),
-        format=file.format,
-        channel=chosen.name,
-        orientation=orientation(file.format),
-        instrument=file.instrument or None,
-        other_channels=", ".join(other.name for other in file.channels if other is not chosen) or None,
-    )
+    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
+    attrs |= {"orientation": orientation(file.format), "instrument": file.instrument or None}
+    attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not chosen) or None
+    return noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
 
 
 def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
@@ -97,8 +88,6 @@ def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
         values = values[:, ::-1]
     if channel.positions is None or how.spacing is not None:
         spacing = how.spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
-        if not all(math.isfinite(d) and d > 0 for d in spacing):
-            raise InputError(f"it states no size: expected {_SIZE}", key="spacing")
         h = labelled(values, spacing)
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
@@ -120,7 +109,8 @@ def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
 
 def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
-    is_sized = channel.kind == "points" or any((channel.spacing, channel.positions, how.spacing))
+    has_sides = all(side > 0 for side in channel.spacing or [0.0])
+    is_sized = channel.kind == "points" or has_sides or any((channel.positions, how.spacing))
     needs_xy = is_sized and channel.lateral_unit is None and how.spacing is None
     needs_z = channel.unit is None
     is_used = {"unit": needs_xy or (needs_z and how.height_unit is None), "height_unit": needs_z}
@@ -135,7 +125,7 @@ def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
     if (needs_xy and how.unit is None) or (needs_z and how.unit is how.height_unit is None):
         expected["unit"] = 'unit = "um", and height_unit if heights have another unit'
     if not is_sized:
-        expected["spacing"] = _SIZE
+        expected["spacing"] = 'spacing = "1 um", or another length'
     for key in expected:
         text = f"it states no {' and no '.join(expected)}: expected {'; and '.join(expected.values())}"
         raise InputError(text, key=key, expected=expected[key])
@@ -231,19 +221,6 @@ def list_channels(path: str | os.PathLike[str], *, format: str | None = None) ->
     path = existing(path)
     with _reading(path), closing(open_file(path, format)) as file:
         return tuple(file.channels)
-
-
-def supported_formats() -> dict[str, tuple[str, ...]]:
-    """Return the names of all formats, for ``format=``, with their usual suffixes.
-
-    Returns
-    -------
-    dict
-        Name -> suffixes, in alphabetical order.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # warnings of the library's imports
-        return dict(sorted(suffixes().items()))
 
 
 def sha256(path: Path) -> str:

@@ -103,9 +103,7 @@ def open_scan(
             found = sha256(existing(table["file"]))
             stated = about.pop("sha256", found)
             if stated.lower() != found:
-                expected = (
-                    f"{found}, the checksum of {Path(table['file']).name}, or a file that was not changed or damaged"
-                )
+                expected = f"{found}, that of {Path(table['file']).name}, which was changed or damaged"
                 raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:

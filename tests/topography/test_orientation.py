@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scan_files import SCANS, real
 
+from roughvisc.topography.formats.registry import supported_formats
 from roughvisc.topography.orientation import orientation, top_line_first
-from roughvisc.topography.readers import supported_formats
 from roughvisc.topography.scans import open_scan
 
 #: The letter F as it is read, first line at the top.

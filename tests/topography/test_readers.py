@@ -24,8 +24,9 @@ from support import refused
 
 from roughvisc.errors import InputError
 from roughvisc.topography.formats import Channel, ScanFile, add_format, registry
+from roughvisc.topography.formats.registry import supported_formats
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, supported_formats
+from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
 
 # -- every row of the table beside the real files ----------------------------------------------------------------------

@@ -146,8 +146,6 @@ def read_truemap(path: Path) -> ScanFile:
     comment = content.index(b"\0") + 1
     at = content.index(b"\0", comment) + 1
     columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
-    if not (min(columns, rows) > 1 and width > 0 and height > 0):
-        raise InputError(f"found {columns} x {rows} points over {width:g} x {height:g} mm: the file is damaged")
     heights = np.frombuffer(content, "<f4", columns * rows, at + 24).reshape(rows, columns).T.astype(float)
     channel = Channel("Default", (columns, rows), lambda: heights, "mm", "mm", (width / columns, height / rows))
     return ScanFile("tmd", [channel], instrument=content[comment : at - 1].decode("latin-1").strip())

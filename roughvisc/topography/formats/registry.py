@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -65,13 +66,21 @@ def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], Scan
     _FORMATS[format] = tuple(suffix.lower().removeprefix(".") for suffix in suffixes), read
 
 
-def suffixes() -> dict[str, Sequence[str]]:
-    """Return the suffixes of each format, without the dot."""
-    from SurfaceTopography.IO import readers  # slow to import
+def supported_formats() -> dict[str, Sequence[str]]:
+    """Return the names of all formats, for ``format=``, with their usual suffixes.
 
+    Returns
+    -------
+    dict
+        Name -> suffixes without the dot, in alphabetical order.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from SurfaceTopography.IO import readers  # slow to import
     known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
     known["di"] += ("di", "000 to 999")
-    return known | {name: theirs for name, (theirs, _) in _FORMATS.items()} | {"card": ("toml",)}
+    known |= {name: theirs for name, (theirs, _) in _FORMATS.items()} | {"card": ("toml",)}
+    return dict(sorted(known.items()))
 
 
 def _formats_of(path: Path) -> Sequence[str]:
@@ -79,7 +88,7 @@ def _formats_of(path: Path) -> Sequence[str]:
     suffix = path.suffix.lower().removeprefix(".")
     if quick := [name for name, (theirs, _) in _FORMATS.items() if suffix in theirs][-1:] or _SHARED.get(suffix):
         return quick
-    known = suffixes()
+    known = supported_formats()
     wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
     if found := [name for name, theirs in known.items() if wanted in theirs]:
         return found

@@ -32,10 +32,9 @@ _UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
 _LENGTH = re.compile(r"(?<=[:=])\s*\d[\d.]*,\d+(?=\s*\w{0,2}m\b)")
 #: Cells of a heading, such as ``x [mm]; y [mm]; z [um]``.
 _HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
-#: Number with either decimal mark, or a missing one.
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|nan")
-#: Marks of a missing height.
-_MISSING = {"", "nan", "bad", "-", "#n/a", "n/a"}
+#: Marks of a missing height, and a number with either decimal mark or one of these.
+_MISSING = dict.fromkeys(("", "nan", "bad", "-", "#n/a", "n/a"), "nan")
+_NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:e[+-]?\d++)?|nan|bad|-|(?:#?n/a)?", re.IGNORECASE)
 
 
 class Table(NamedTuple):
@@ -69,7 +68,7 @@ def read_table(text: str) -> Table:
     cells = {at: _cells(lines[at], separator) for at in body}
     known = {at: sum(map(bool, map(_NUMBER.fullmatch, row))) for at, row in cells.items()}
     rows = [at for at, row in cells.items() if 1 < len(row) == known[at]]
-    if rows and separator != " " and all(cells[at][-1] == "nan" for at in rows):  # a separator ends each line
+    if rows and separator != " " and not any(cells[at][-1] for at in rows):  # a separator ends each line
         cells, known = {at: row[:-1] for at, row in cells.items()}, {at: count - 1 for at, count in known.items()}
     width = mode(len(cells[at]) for at in rows) if rows else 0
     rows = [at for at in rows if len(cells[at]) == width]
@@ -85,7 +84,7 @@ def read_table(text: str) -> Table:
     for at, line in enumerate(lines):
         lines[at] = _LENGTH.sub(lambda found: found[0].replace(mark, "."), line)
     for at in rows:
-        lines[at] = " ".join(cells[at]).replace(mark, ".")
+        lines[at] = " ".join([_MISSING.get(cell.lower(), cell) for cell in cells[at]]).replace(mark, ".")
     return Table(lines, rows)
 
 
@@ -112,9 +111,9 @@ def _separator(line: str) -> str:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    """Return the cells of a line, with ``nan`` for a missing height."""
+    """Return the cells of a line."""
     cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return ["nan" if (bare := cell.strip()).lower() in _MISSING else bare for cell in cells]
+    return list(map(str.strip, cells))
 
 
 def read_numbers(text: str, format: str) -> ScanFile:
