@@ -570,8 +570,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         here, time = points[-1], instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
-    last = points[-1]
-    once = last
+    once = last = points[-1]
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
     force = friction(scene, last, slide)
