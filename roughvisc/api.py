@@ -194,12 +194,8 @@ def friction(
     ------
     InputError
         If the input is invalid, or the material creeps without limit and the profile varies across the motion.
-
-    Warns
-    -----
-    UserWarning
-        If the contact at a speed is not solved. The values at this speed are NaN, and its ``status`` is not
-        ``converged``; values at other speeds are valid.
+    ConvergenceError
+        If the contact at a speed is not solved; the message states the speed, the error and what to try.
 
     Notes
     -----
@@ -237,7 +233,7 @@ def _stated(numerics: Numerics) -> dict[str, Any]:
 
 
 def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
-    """Issue a Python warning for missed tolerances, unsolved speeds and sparse tables, and return the result."""
+    """Issue a Python warning for missed tolerances and sparse tables, and return the result."""
     for subject, text in warnings_of(dataset.attrs).items():
         if subject in ISSUED:
             warnings.warn(text, UserWarning, level)
@@ -288,8 +284,7 @@ def run(
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.
     ConvergenceError
-        If the contact of a step or at a speed is not solved. The result with the other speeds is written, and the
-        message names the file.
+        If the contact of a step or at a speed is not solved; no result is written.
     """
     from roughvisc.study.case import Case, read_study
     from roughvisc.study.execution.run import run_stated

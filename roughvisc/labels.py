@@ -26,7 +26,7 @@ _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
 STEPS, TITLE = "steps", "histories of every accepted step"
 _CARRIED = "roughvisc_steps"
 #: Subjects of the warnings that :func:`roughvisc.simulate` and others issue as Python warnings; the others are logged.
-ISSUED = ("tolerance", "speeds", "material")
+ISSUED = ("tolerance", "material")
 
 
 def heading(name: str, unit: str) -> str:
