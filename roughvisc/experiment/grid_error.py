@@ -24,7 +24,7 @@ from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import is_indenter, remade
-from roughvisc.topography.resampling import resample
+from roughvisc.topography.resampling import resample, shares
 from roughvisc.variables import GRID_ERROR, axis_of
 
 log = logging.getLogger("roughvisc")
@@ -338,12 +338,6 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
     return resample(height, coarser_shape(shape, factor, False), periodic=periodic) if few is None else few
 
 
-def _shares(cells: Array, onto: Array) -> Array:
-    """Return the fraction of each new cell (rows) that lies in each old cell (columns)."""
-    common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
-    return np.asarray(np.maximum(common, 0.0) / np.diff(onto)[:, None])
-
-
 def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
     """Return the L1 distance of the pressures on two grids, at each common time. [N]
 
@@ -364,7 +358,7 @@ def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
     onto = (_extended(common[0], low[0], high[0]), _extended(common[1], low[1], high[1]))
     means = []
     for ds, grid in zip((found, wanted), grids, strict=True):
-        along_x, along_y = (_shares(a, b) for a, b in zip(grid, onto, strict=True))
+        along_x, along_y = (shares(a, b).toarray() for a, b in zip(grid, onto, strict=True))
         means.append(along_x @ ds["pressure"].values @ along_y.T)
     area = np.diff(onto[0])[:, None] * np.diff(onto[1])
     return np.asarray((np.abs(means[0] - means[1]) * area).sum(axis=(-2, -1)))

@@ -27,7 +27,7 @@ from roughvisc.topography.borders import border_mismatch, is_analytic, recipe_na
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.topography.spectrum import hann, last_octave, modes
+from roughvisc.topography.spectrum import hann, last_octave
 from roughvisc.units import Quantity, format_quantity, quantities
 from roughvisc.variables import axis_of
 
@@ -126,10 +126,8 @@ class Scene:
         z = self.period.values - self.period.values.mean()
         if not np.ptp(z) > 0:
             return math.nan, math.nan
-        q_x, q_y, power, count = modes(hann(z) if self.boundary == "free" else z, self.cells)
-        q = np.hypot(q_x, q_y)
-        squares = count * q**2 * power
-        begins = last_octave(q, squares)
+        q, power, begins = last_octave(hann(z) if self.boundary == "free" else z, self.cells)
+        squares = q**2 * power
         kept = float(squares[q <= begins].sum()) / float(squares.sum())
         return 1 - math.sqrt(kept), 2 * np.pi / begins if begins else 0.0
 

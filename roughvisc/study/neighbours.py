@@ -31,7 +31,7 @@ from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.study_file import TEMPERATURE
 from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.spectrum import last_octave, modes
+from roughvisc.topography.spectrum import last_octave
 from roughvisc.units import Quantity, number, quantities, unit_for
 from roughvisc.variables import VARIABLES
 
@@ -81,10 +81,7 @@ def shortest_wave(height: xr.DataArray) -> float:
 
     The grid resolves waves shorter than two cells along its diagonals only.
     """
-    level = height.values - float(height.mean())
-    q_x, q_y, power, count = modes(level, spacing(height))
-    q = np.hypot(q_x, q_y)
-    begins = last_octave(q, count * power * q**2)
+    _, _, begins = last_octave(height.values - float(height.mean()), spacing(height))
     return max(math.pi / begins, 2 * max(spacing(height))) if begins else 0.0
 
 

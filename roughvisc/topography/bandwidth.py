@@ -35,8 +35,7 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     InputError
         If the order is not one of these, or the points present do not determine the polynomial.
     """
-    if not isinstance(order, int | np.integer) or not 0 <= order <= 3:
-        raise InputError(key="order", found=order, expected="0, 1, 2 or 3")
+    order = int(one_of("order", order, range(4)))
     h = checked(h, "level")
     require_heights(h, "level")
     kept = {} if order == 0 else {"period": None}  # a polynomial does not repeat
@@ -69,9 +68,7 @@ def off_plane(h: xr.DataArray) -> xr.DataArray:
 
 
 @quantities(cutoff="m > 0")
-def gaussian_filter(
-    h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "short"] = "long", periodic: bool = False
-) -> xr.DataArray:
+def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "short"] = "long") -> xr.DataArray:
     r"""Apply an areal Gaussian filter by normalised convolution.
 
     Parameters
@@ -82,8 +79,6 @@ def gaussian_filter(
         Wavelength at which half the amplitude passes, from three cells to the longest side. [m]
     keep : {"long", "short"}, default "long"
         "long": wavelengths above the cut-off (an S-filter). "short": those below (an L-filter, the roughness).
-    periodic : bool, default False
-        Whether the surface is periodic; otherwise the weights end at its border.
 
     Returns
     -------
@@ -114,12 +109,14 @@ def gaussian_filter(
         expected = f"a length [m], or text with a unit, from three cells ({least}) to the longest side ({most})"
         raise InputError(key="cutoff", found=cutoff, expected=expected)
     require_heights(h, "gaussian_filter")
-    heights = _long_waves(h.values, [cutoff / d for d in sides], periodic)
-    if keep == "short":
-        np.subtract(h.values, heights, out=heights)
-    kept = {} if periodic else {"period": None}
+    mean, present = np.nanmean(h.values), np.isfinite(h.values)
+    long, share = np.where(present, h.values - mean, 0.0), present.astype(float)
+    for axis, side in enumerate(sides):
+        long, share = (_smoothed(field, axis, cutoff / side) for field in (long, share))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        heights = np.where(present, long / share + mean, np.nan)
     line = f"Gaussian filter (ISO 16610-61), {keep} waves kept, cut-off {cutoff:.6g} m"
-    return noted(like(h, heights), line, **kept)
+    return noted(like(h, heights if keep == "long" else h.values - heights), line, period=None)
 
 
 def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -129,41 +126,26 @@ def _polynomial(heights: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray
     """
     bases = [np.polynomial.legendre.legvander(np.linspace(-1, 1, n), order) for n in heights.shape]
     degrees = [order if n > 1 else 0 for n in heights.shape]  # heights do not vary across a strip
-    terms = [(i, j) for i in range(degrees[0] + 1) for j in range(min(degrees[1], order - i) + 1)]
+    i, j = np.transpose([(i, j) for i in range(degrees[0] + 1) for j in range(min(degrees[1], order - i) + 1)])
     products = [(b[:, :, None] * b[:, None, :]).reshape(len(b), -1) for b in bases]
     present = np.isfinite(heights)
     moments = np.reshape(products[0].T @ present.astype(float) @ products[1], [order + 1] * 4)
     right = bases[0].T @ np.where(present, heights, 0.0) @ bases[1]
-    normal = np.array([[moments[i, k, j, m] for k, m in terms] for i, j in terms])
+    normal = moments[i[:, None], i, j[:, None], j]
     if np.linalg.cond(normal) > 1e12:
         raise InputError(f"level: the {present.sum()} points present do not determine a polynomial of order {order}")
     coefficients = np.zeros((order + 1, order + 1))
-    for (i, j), c in zip(terms, np.linalg.solve(normal, [right[i, j] for i, j in terms]), strict=True):
-        coefficients[i, j] = c
+    coefficients[i, j] = np.linalg.solve(normal, right[i, j])
     return bases[0], coefficients, bases[1]
 
 
-def _long_waves(heights: np.ndarray, cutoffs: list[float], periodic: bool) -> np.ndarray:
-    """Return the waves longer than a cut-off along each axis (in cells); missing points stay missing. [m]"""
-    mean, present = np.nanmean(heights), np.isfinite(heights)
-    long, share = np.where(present, heights - mean, 0.0), present.astype(float)
-    for axis, cutoff in enumerate(cutoffs):
-        long, share = (_smoothed(field, axis, cutoff, periodic) for field in (long, share))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(present, long / share + mean, np.nan)
-
-
-def _smoothed(field: np.ndarray, axis: int, cutoff: float, periodic: bool) -> np.ndarray:
+def _smoothed(field: np.ndarray, axis: int, cutoff: float) -> np.ndarray:
     """Apply a Gaussian filter along one axis (cut-off in cells), without normalisation at the border."""
-    alpha, count = math.sqrt(math.log(2) / math.pi), field.shape[axis]
-    if periodic:
-        length = count
-        transmission = np.exp(-np.pi * (alpha * cutoff * scipy.fft.rfftfreq(count)) ** 2)
-    else:  # zeros beyond the border, as far as the weights reach
-        length = scipy.fft.next_fast_len(count + min(math.ceil(1.5 * cutoff), count), real=True)
-        at = np.minimum(np.arange(length), length - np.arange(length))
-        weights = np.exp(-np.pi * (at / (alpha * cutoff)) ** 2)
-        transmission = scipy.fft.rfft(weights / weights.sum())
+    count = field.shape[axis]  # zeros beyond the border, as far as the weights reach
+    length = scipy.fft.next_fast_len(count + min(math.ceil(1.5 * cutoff), count), real=True)
+    at = np.minimum(np.arange(length), length - np.arange(length))
+    weights = np.exp(-np.pi * (at / (math.sqrt(math.log(2) / math.pi) * cutoff)) ** 2)
+    transmission = scipy.fft.rfft(weights / weights.sum())
     field_q = scipy.fft.rfft(field, length, axis=axis)
     field_q *= transmission[:, None] if axis == 0 else transmission
     return np.take(scipy.fft.irfft(field_q, length, axis=axis), range(count), axis)

@@ -10,7 +10,9 @@ import math
 import numpy as np
 import scipy.fft
 import xarray as xr
+from scipy import sparse
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.grid import (
@@ -25,6 +27,7 @@ from roughvisc.topography.grid import (
     with_filled_points,
 )
 from roughvisc.topography.missing_points import membrane
+from roughvisc.topography.spectrum import wavevectors
 from roughvisc.units import Quantity, quantities
 
 #: Largest reduction of an overlap by rounding, relative to a cell.
@@ -72,22 +75,20 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     """
     shape = counts("shape", shape)
     h = checked(h, "resample")
-    missing, filled = np.isnan(h.values), filled_points(h)
+    missing, filled, period = np.isnan(h.values), filled_points(h), _period(h, periodic)
     values = membrane(h.values)
-    if _repeats("resample", h, periodic):
+    if period:
         heights, way = resample_periodic(values, shape), "by Fourier interpolation"
     else:
         heights, way = _cosines(_cosines(values, shape[0], 0), shape[1], 1), "by cosines"
     if missing.any():
-        heights[_shares(missing, shape) > 0.5 + _ROUNDING] = np.nan
+        heights[_covered(missing, shape) > 0.5 + _ROUNDING] = np.nan
     axes = []
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
-    marked = None if filled is None else _shares(filled, shape) > _ROUNDING
+    marked = None if filled is None else _covered(filled, shape) > _ROUNDING
     grid = with_filled_points(with_coordinates(heights, *axes, h.attrs), marked)
-    stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
-    line = f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}"
-    return noted(grid, line, **stated)
+    return noted(grid, f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}", period=period)
 
 
 @quantities(shortest="m > 0")
@@ -115,24 +116,21 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
         If points are missing or the length is out of its range.
     """
     h = checked(h, "without_short_waves")
-    sides = spacing(h)
-    lengths = [n * d for n, d in zip(h.shape, sides, strict=True)]
+    sides, lengths, period = spacing(h), period_of(h), _period(h, periodic)
     if not 2 * max(sides) * (1 - _ROUNDING) <= shortest < min(lengths):
         expected = f"at least two cells, {2 * max(sides):.6g} [m], and less than the sides, {min(lengths):.6g} [m]"
         raise InputError(key="shortest", found=shortest, expected=expected)
     require_complete(h, "without_short_waves")
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
-    if _repeats("without_short_waves", h, periodic):
-        q_x = 2 * np.pi * scipy.fft.fftfreq(h.shape[0], sides[0])
-        q_y = 2 * np.pi * scipy.fft.rfftfreq(h.shape[1], sides[1])
+    if period:
+        q_x, q_y, _ = wavevectors(h.shape, sides)
         heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.rfft2(h.values), 0.0)
         heights = scipy.fft.irfft2(heights_q, s=h.shape)
     else:
         q_x, q_y = (np.pi * np.arange(n) / length for n, length in zip(h.shape, lengths, strict=True))
         heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.dctn(h.values, norm="ortho"), 0.0)
         heights = scipy.fft.idctn(heights_q, norm="ortho")
-    stated = {} if periodic is None else {"period": period_of(h) if periodic else None}
-    return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", **stated)
+    return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", period=period)
 
 
 def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept: bool = False) -> np.ndarray:
@@ -153,28 +151,25 @@ def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept:
     ndarray
         Field of the new shape, with the same mean; see :func:`resample`.
     """
-    return _waves(_waves(values, shape[0], 0, first_kept), shape[1], 1, first_kept)
+    for axis, count in enumerate(shape):
+        before = values.shape[axis]
+        if count == before:
+            continue
+        values_q = scipy.fft.rfft(values, axis=axis)
+        moved = 0.0 if first_kept else 0.5 / count - 0.5 / before  # from the first old centre to the first new one
+        turned = np.exp(2j * np.pi * np.arange(values_q.shape[axis]) * moved)
+        fewer = min(count, before)
+        if fewer % 2 == 0:  # a wave of two cells: a coarser grid drops it, a finer grid splits it in two halves
+            turned[fewer // 2] *= 0.0 if count < before else 0.5
+        values_q *= turned[:, None] if axis == 0 else turned
+        values = scipy.fft.irfft(values_q, n=count, axis=axis) * (count / before)
+    return values
 
 
-def _repeats(step: str, h: xr.DataArray, periodic: bool | None) -> bool:
-    if periodic not in (None, True, False):
-        raise InputError(f"{step}: periodic is {periodic!r}: expected True, False or None (as the surface states)")
-    return is_periodic(h) if periodic is None else bool(periodic)
-
-
-def _waves(values: np.ndarray, count: int, axis: int, first_kept: bool) -> np.ndarray:
-    """Interpolate onto `count` cells along an axis by a Fourier series."""
-    before = values.shape[axis]
-    if count == before:
-        return values
-    values_q = scipy.fft.rfft(values, axis=axis)
-    moved = 0.0 if first_kept else 0.5 / count - 0.5 / before  # from the first old centre to the first new one
-    turned = np.exp(2j * np.pi * np.arange(values_q.shape[axis]) * moved)
-    fewer = min(count, before)
-    if fewer % 2 == 0:  # a wave of two cells: a coarser grid drops it, a finer grid splits it in two halves
-        turned[fewer // 2] *= 0.0 if count < before else 0.5
-    values_q *= turned[:, None] if axis == 0 else turned
-    return scipy.fft.irfft(values_q, n=count, axis=axis) * (count / before)
+def _period(h: xr.DataArray, periodic: bool | None) -> list[float] | None:
+    """Return the sides of a surface that is periodic, or is taken as periodic; None for any other. [m]"""
+    repeats = is_periodic(h) if one_of("periodic", periodic, (None, True, False)) is None else periodic
+    return period_of(h) if repeats else None
 
 
 def _cosines(values: np.ndarray, count: int, axis: int) -> np.ndarray:
@@ -183,11 +178,14 @@ def _cosines(values: np.ndarray, count: int, axis: int) -> np.ndarray:
     return scipy.fft.idct(values_q, n=count, axis=axis, norm="ortho") * math.sqrt(count / values.shape[axis])
 
 
-def _shares(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def shares(cells: np.ndarray, onto: np.ndarray) -> sparse.csr_array:
+    """Return the fraction of each new cell (rows) that lies in each old cell (columns), from the edges of both."""
+    common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
+    return sparse.csr_array(np.maximum(common, 0.0) / np.diff(onto)[:, None])
+
+
+def _covered(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Return the part of each new cell that a mask of the old cells covers."""
-    for count in shape:  # along the first axis, then transposed
-        borders = np.arange(count + 1) * (len(mask) / count)
-        before = np.minimum(borders.astype(int), len(mask) - 1)
-        total = np.concatenate([np.zeros((1, mask.shape[1])), np.cumsum(mask, axis=0)])
-        mask = (np.diff(total[before] + (borders - before)[:, None] * mask[before], axis=0) * (count / len(mask))).T
-    return mask
+    pairs = zip(mask.shape, shape, strict=True)
+    along_x, along_y = (shares(np.arange(old + 1) / old, np.arange(new + 1) / new) for old, new in pairs)
+    return along_x @ mask @ along_y.T

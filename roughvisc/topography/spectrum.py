@@ -22,8 +22,15 @@ def hann(z: np.ndarray) -> np.ndarray:
     return z * along_x[:, None] * along_y
 
 
-def modes(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the modes of periodic heights.
+def wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the wavevectors along x and, from zero on, along y [rad/m], and the number of modes of each column."""
+    (nx, ny), (dx, dy) = shape, cells
+    count = np.where(2 * np.arange(ny // 2 + 1) % ny == 0, 1.0, 2.0)  # two if the conjugate is not stored
+    return 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy), count
+
+
+def last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the waves of periodic heights, and where their shortest octave begins.
 
     Parameters
     ----------
@@ -34,40 +41,17 @@ def modes(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, np.nda
 
     Returns
     -------
-    q_x, q_y : ndarray, shapes (nx, 1) and (1, ny // 2 + 1)
-        Wavevectors. [rad/m]
-    power, count : ndarray, shape (nx, ny // 2 + 1)
-        Variance of each mode [m2], and the number of modes of each entry: two if its conjugate is not stored.
+    q, power : ndarray, shape (nx, ny // 2 + 1)
+        Length of each wavevector [rad/m], and the variance of its waves [m2].
+    begins : float
+        Half the wave number below which 99 % of the mean square slope lie; zero for a flat surface. [rad/m]
     """
     q_x, q_y, count = wavevectors(z.shape, cells)
-    power = np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
-    return q_x[:, None], q_y[None], power, np.broadcast_to(count, power.shape)
-
-
-def wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the wavevectors along x and, from zero on, along y [rad/m], and the number of modes of each column."""
-    (nx, ny), (dx, dy) = shape, cells
-    q_x, q_y = 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy)
-    count = np.full(q_y.size, 2.0)
-    count[0] = 1.0
-    if ny % 2 == 0:
-        count[-1] = 1.0
-    return q_x, q_y, count
-
-
-def last_octave(q: np.ndarray, slope: np.ndarray) -> float:
-    """Return the wave number at which the shortest octave of waves begins; zero for a flat surface. [rad/m]
-
-    Parameters
-    ----------
-    q, slope : ndarray
-        Length of each wavevector [rad/m], and its share of the mean square slope, on any scale.
-    """
+    q, power = np.hypot(q_x[:, None], q_y), count * np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
     order = np.argsort(q, axis=None)
-    summed = np.cumsum(slope.ravel()[order])
-    if not summed[-1] > 0:
-        return 0.0
-    return 0.5 * float(q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])])
+    summed = np.cumsum((q**2 * power).ravel()[order])
+    end = q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])] if summed[-1] > 0 else 0.0
+    return q, power, 0.5 * float(end)
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:

@@ -183,14 +183,13 @@ def test_resample__keeps_absent_material_absent():
     assert int(few.notnull().sum()) == pytest.approx(int(punch.notnull().sum()) / 4, abs=6)
 
 
-@pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("axis", ["x", "y"])
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0, 4.0])
-def test_gaussian_filter__transmission_is_half_at_the_cutoff(periodic, axis, ratio):
+def test_gaussian_filter__transmission_is_half_at_the_cutoff(axis, ratio):
     cutoff, cells = 2.4e-5, {"x": (240, 7), "y": (7, 160)}[axis]
     flat = from_array(np.zeros(cells), CELL)
     wave = flat + 1e-6 * np.cos(2 * np.pi * flat[axis] / (ratio * cutoff)) + 0.05
-    passed = gaussian_filter(wave, cutoff, periodic=periodic) - 0.05
+    passed = gaussian_filter(wave, cutoff) - 0.05
     # away from the border, where the weights are cut
     middle = passed.isel({axis: slice(50, -50)})
     expected = 0.5 ** (1 / ratio**2) * (wave - 0.05).isel({axis: slice(50, -50)})
