@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.settings import GRID_ERROR_CELLS, OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.topography.borders import MIRRORED, is_mirrored, is_periodic, recipe_name
+from roughvisc.topography.borders import is_mirrored, is_periodic, recipe_name
 from roughvisc.topography.grid import checked
 from roughvisc.topography.indenters import is_indenter
 from roughvisc.topography.synthesis import BOUNDARIES
@@ -54,9 +54,8 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     """
     if is_indenter(h):
         return "free"
-    mirrored = MIRRORED in str(h.attrs.get("history", "")).split("\n")
-    made = BOUNDARIES.get(recipe_name(h)) == "periodic" or (mirrored and is_mirrored(h.values))
-    return "periodic" if made and is_periodic(h) else None
+    made = BOUNDARIES.get(recipe_name(h)) == "periodic" and is_periodic(h)
+    return "periodic" if made or is_mirrored(h) else None
 
 
 @dataclass(frozen=True)

@@ -126,37 +126,22 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     if known is None:
         return None
     evaluate, cell, centre = known
-    h = h.transpose("x", "y")
-    wider, kept = [], []
+    wider = []
     for axis, side in zip("xy", cell, strict=True):
-        at = h[axis].values
-        margin = max(1, math.ceil(at.size * (factor - 1) / 2 - 1e-6))
-        there = (np.arange(-margin, at.size + margin) + round(at[0] / side - 0.5) + 0.5) * side
-        there[margin:-margin] = at
-        wider.append(there)
-        kept.append(slice(margin, -margin))
+        margin = max(1, math.ceil(h.sizes[axis] * (factor - 1) / 2 - 1e-6))
+        first = round(float(h[axis][0]) / side - 0.5)
+        wider.append((np.arange(first - margin, first + h.sizes[axis] + margin) + 0.5) * side)
     heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
-    heights[kept[0], kept[1]] = h.values
-    line = "grown from {} x {} to {} x {} cells".format(*h.shape, *heights.shape)
+    line = f"grown from {h.sizes['x']} x {h.sizes['y']} to {heights.shape[0]} x {heights.shape[1]} cells"
     return noted(with_coordinates(heights, *wider, h.attrs), line)
 
 
-def remade(h: xr.DataArray, shape: tuple[int, int], size: tuple[float, float] | None = None) -> xr.DataArray | None:
-    """Return the same indenter on another number of cells; None if `h` is not an indenter.
-
-    Parameters
-    ----------
-    h : xarray.DataArray
-        Height over (x, y). [m]
-    shape : tuple of int
-        Number of cells.
-    size : tuple of float, optional
-        Sides of the domain; default: the sides in its recipe. [m]
-    """
+def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
+    """Return the same indenter on another number of cells over its domain; None if `h` is not an indenter. [m]"""
     if not is_indenter(h):
         return None
     recipe = json.loads(h.attrs["recipe"])
-    return _indenter(recipe["name"], recipe["parameters"], recipe["size"] if size is None else size, shape)
+    return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
 
 
 def highest(h: xr.DataArray) -> float:
@@ -225,7 +210,7 @@ _INDENTERS: dict[str, Callable[..., np.ndarray]] = {
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
     size, shape = pair("size", size), counts("shape", shape, low=1)
-    h = labelled(np.empty(shape), cell_of(size, shape), recipe_of(name, parameters, size, shape))
+    h = generated(np.empty(shape), name, parameters, size)
     x, y = h["x"].values[:, None] - size[0] / 2, h["y"].values - size[1] / 2
     h.values = _INDENTERS[name](x, y, **parameters)
     absent = np.isnan(h.values)
@@ -237,12 +222,8 @@ def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> x
     return h
 
 
-def cell_of(size: Any, shape: Any) -> tuple[float, float]:
-    """Return the cell sides (dx, dy) of a domain. [m]"""
-    return size[0] / shape[0], size[1] / shape[1]
-
-
-def recipe_of(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> dict[str, str]:
-    """Return attributes from which the heights can be generated again."""
-    recipe = {"name": name, "parameters": parameters, "size": list(size), "shape": list(shape)}
-    return {"recipe": json.dumps(recipe), "history": f"generated: {name}"}
+def generated(heights: np.ndarray, name: str, parameters: dict[str, Any], size: Any, **attrs: Any) -> xr.DataArray:
+    """Return heights over their domain, with a recipe from which they can be generated again. [m]"""
+    recipe = {"name": name, "parameters": parameters, "size": list(size), "shape": list(heights.shape)}
+    stated = {"recipe": json.dumps(recipe), "history": f"generated: {name}"} | attrs
+    return labelled(heights, (size[0] / heights.shape[0], size[1] / heights.shape[1]), stated)

@@ -7,12 +7,11 @@ import math
 import numpy as np
 import xarray as xr
 
-from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, labelled, noted, require_complete, spacing
 from roughvisc.topography.spectrum import psd, wavevectors
-from roughvisc.topography.synthesis import random_heights
+from roughvisc.topography.synthesis import random_heights, whole
 
 
 def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
@@ -56,21 +55,17 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     >>> rv.surrogates(scan, 3, seed=7).sizes["realisation"]
     3
     """
-    if not (isinstance(count, int | np.integer) and not isinstance(count, bool) and count >= 1):
-        raise InputError(key="count", found=count, expected="a positive whole number")
-    found = [surrogate(h, number, seed=seed) for number in range(1, int(count) + 1)]
-    return xr.concat(found, xr.DataArray(np.arange(1, count + 1), dims="realisation", name="realisation"))
+    numbers = np.arange(1, whole("count", count, 1) + 1)
+    found = [surrogate(h, number, seed=seed) for number in numbers]
+    return xr.concat(found, xr.DataArray(numbers, dims="realisation", name="realisation"))
 
 
 def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     """Return one surface of :func:`surrogates`, by its number. [m]"""
-    if not (isinstance(number, int | np.integer) and not isinstance(number, bool) and number >= 1):
-        raise InputError(key="number", found=number, expected="the number of a surrogate, from 1")
-    if not (isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0):
-        raise InputError(key="seed", found=seed, expected="a whole number >= 0")
+    entropy = [whole("seed", seed), whole("number", number, 1)]
     h = checked(h, "surrogates")
     require_complete(h, "surrogates")
-    if is_mirrored(h.values):
+    if is_mirrored(h):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
@@ -83,7 +78,6 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     ring = np.maximum(np.round(q / step).astype(int), 1)
     inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
     variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
-    entropy = [int(seed), int(number)]
     heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=True)
     grid = labelled(heights, sides).assign_coords(x=h["x"], y=h["y"])
     line = f"surrogate {number} of seed {seed}: random phases, gaussian amplitudes"

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from numbers import Integral
 from typing import Any, Literal
 
 import numpy as np
 import scipy.fft
 import xarray as xr
 
-from roughvisc.arguments import check_keys, located, one_of, units_of
+from roughvisc.arguments import check_keys, located, one_of, split, units_of
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import counts, labelled, pair
-from roughvisc.topography.indenters import cell_of, cone, flat_punch, recipe_of, sphere
+from roughvisc.topography.grid import counts, pair
+from roughvisc.topography.indenters import cone, flat_punch, generated, sphere
 from roughvisc.topography.spectrum import wavevectors
 from roughvisc.units import Quantity, number, quantities
 
@@ -55,13 +56,10 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
             expected = f"a whole number of wavelengths, so that the waves repeat; {side:.6g} m holds {periods:.6g}"
             raise InputError(key="size", found=size, expected=expected)
-    along = [
-        np.cos(2 * np.pi * round(s / wavelength) * (np.arange(n) + 0.5) / n) for s, n in zip(size, shape, strict=True)
-    ]
-    heights = amplitude * along[0][:, None] * (along[1] if waves == 2 else np.ones(shape[1]))
+    repeats = (round(size[0] / wavelength), round(size[1] / wavelength) * (waves == 2))
+    along_x, along_y = (np.cos(2 * np.pi * k * (np.arange(n) + 0.5) / n) for k, n in zip(repeats, shape, strict=True))
     parameters = {"amplitude": amplitude, "wavelength": wavelength, "waves": int(waves)}
-    attrs = recipe_of("wavy", parameters, size, shape) | {"period": list(size)}
-    return labelled(heights, cell_of(size, shape), attrs)
+    return generated(amplitude * along_x[:, None] * along_y, "wavy", parameters, size, period=list(size))
 
 
 @quantities(size="m", rms_slope="1 > 0", rms_height="m > 0", rolloff="m > 0", shortcut="m > 0", anisotropy="1 > 0")
@@ -146,18 +144,17 @@ def self_affine(
         raise InputError(key="rms_slope", found=rms_slope, expected="exactly one of rms_slope and rms_height")
     target = rms_slope if rms_height is None else rms_height
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
-    finest = 2 * max(d / s for d, s in zip(cell_of(size, shape), stretch, strict=True))
+    cells = size[0] / shape[0], size[1] / shape[1]
+    finest = 2 * max(cells[0] / stretch[0], cells[1] / stretch[1])
     shortcut = finest if shortcut is None else shortcut
     if shortcut < finest * (1 - 1e-12):
         raise InputError(f"shortcut is {shortcut!r}: expected at least two cells, {finest:.6g} [m]")
     if rolloff is not None and rolloff < shortcut:
         raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
-    is_number = isinstance(seed, int | np.integer) and not isinstance(seed, bool) and seed >= 0
-    if not (is_number or isinstance(seed, np.random.Generator)):
-        raise InputError(key="seed", found=seed, expected="a whole number >= 0, or a numpy.random.Generator")
+    stated_seed = None if isinstance(seed, np.random.Generator) else whole("seed", seed)
     entropy = np.random.default_rng(seed).integers(1 << 32, size=4).tolist()
-    q_x, q_y, weight = wavevectors(shape, cell_of(size, shape))
+    q_x, q_y, weight = wavevectors(shape, cells)
     q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
     inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, are outside
     amplitude = np.zeros(q.shape)
@@ -171,9 +168,15 @@ def self_affine(
     heights *= target / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes}
-    parameters |= {"seed": int(seed) if is_number else None}
-    attrs = recipe_of("self_affine", parameters, size, shape) | {"period": list(size)}
-    return labelled(heights, cell_of(size, shape), attrs)
+    parameters |= {"seed": stated_seed}
+    return generated(heights, "self_affine", parameters, size, period=list(size))
+
+
+def whole(key: str, value: Any, least: int = 0) -> int:
+    """Return a whole number; refuse smaller numbers and other values."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        raise InputError(key=key, found=value, expected=f"a whole number of at least {least}")
+    return int(value)
 
 
 def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal: bool) -> np.ndarray:
@@ -220,9 +223,8 @@ RECIPES: dict[str, Callable[..., xr.DataArray]] = {
     recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
 }
 #: Boundary for which the surfaces of each recipe are made.
-BOUNDARIES: dict[str, Literal["free", "periodic"]] = {
-    name: "periodic" if name in ("wavy", "self_affine") else "free" for name in RECIPES
-}
+BOUNDARIES: dict[str, Literal["free", "periodic"]] = dict.fromkeys(("sphere", "cone", "flat_punch"), "free")
+BOUNDARIES |= dict.fromkeys(("wavy", "self_affine"), "periodic")
 
 
 def check_recipe(where: str, table: Mapping[str, Any]) -> None:
@@ -241,17 +243,13 @@ def check_recipe(where: str, table: Mapping[str, Any]) -> None:
         If the recipe or a key is unknown, an argument is missing, or a value is wrong.
     """
     recipe = RECIPES[one_of(f"{where}.generate", table["generate"], RECIPES)]
-    stated = {key: value for key, value in table.items() if key != "generate"}
+    _, stated = split(table, "generate")
     check_keys(recipe, where, stated)
     try:
-        for key, value in stated.items():
-            if key == "size":
-                pair(key, value)
-            elif key == "shape":
-                counts(key, value, low=2 if recipe is self_affine else 1)
-            elif key == "seed" and value < 0:
-                raise InputError(key=key, found=value, expected="a whole number, at least 0")
-            elif key in units_of(recipe):
-                number(value, units_of(recipe)[key], key, above=0, most=1.0 if key == "hurst" else None)
+        pair("size", stated["size"])
+        counts("shape", stated["shape"], low=2 if recipe is self_affine else 1)
+        whole("seed", stated.get("seed", 0))
+        for key in (units_of(recipe).keys() & stated) - {"size"}:
+            number(stated[key], units_of(recipe)[key], key, above=0, most=1.0 if key == "hurst" else None)
     except InputError as error:
         raise located(error, where) from error
