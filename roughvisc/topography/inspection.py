@@ -115,7 +115,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     >>> found.steps
     {'level': 1, 'filter': 2.2e-06}
     >>> found.findings["Missing points"].seen
-    'none'
+    '0 (0 %)'
     """
     h = checked(h, "inspect")
     findings: dict[str, Finding] = {}
@@ -127,34 +127,31 @@ def inspect(h: xr.DataArray) -> Inspection:
     if share := float(void.mean()):
         limits = _largest_part(h, void) if share >= _HOLES else {}
         h = crop(h, **limits) if limits else h
-        part = f"{h.shape[0]} x {h.shape[1]} points, to which the findings below refer"
-        advice = f'crop to the largest part without holes, {part}; missing = "absent" if holes contain no material'
-        advice = advice if limits else "too small to crop; fill them with the other missing points"
+        advice = "too small to crop; fill them with the other missing points"
+        if limits:
+            part = f"{h.shape[0]} x {h.shape[1]} points, to which the findings below refer"
+            advice = f'crop to the largest part without holes, {part}; missing = "absent" if they contain no material'
         seen = f"{_percent(share)} of the scan lies in holes wider than a few points"
         find("Holes", seen, advice, {"crop": limits} if limits else {}, share=share)
 
     missing = int(h.isnull().sum())
+    seen, advice, step = f"{missing} ({_percent(missing / h.size)})", "", {}
     if missing:
         advice, step = 'fill = "harmonic"; the result marks the filled points', {"fill": "harmonic"}
-        find("Missing points", f"{missing} ({_percent(missing / h.size)})", advice, step, points=missing)
-    else:
-        find("Missing points", "none", points=0)
+    find("Missing points", seen, advice, step, points=missing)
 
     levelled = level(h)
     kept = mask_outliers(levelled)
     spikes = int(kept.isnull().sum()) - missing
-    doubtful = spikes > _MOST_SPIKES * h.size
-    kept = levelled if doubtful else kept
+    kept = kept if 0 < spikes <= _MOST_SPIKES * h.size else levelled
     rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
-    seen, advice, step = "none", "", {}
-    if spikes:
-        seen = f"{spikes} point{'s' * (spikes > 1)} ({_percent(spikes / h.size)})"
-    if spikes and doubtful:
-        seen += " differ strongly from their neighbours"
-        advice = "too many to be spikes: check the picture; outliers = true only if the surface has no such features"
-    elif spikes:
+    seen, advice, step = f"{spikes} ({_percent(spikes / h.size)})", "", {}
+    if kept is not levelled:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice, step = "outliers = true; otherwise the spikes carry the load", {"outliers": True, "fill": "harmonic"}
+    elif spikes:
+        seen += " differ strongly from their neighbours"
+        advice = "too many to be spikes: check the picture; outliers = true only if the surface has no such features"
     find("Spikes", seen, advice, step, points=spikes, rms_with=rms_levelled, rms_without=rms)
 
     rms_flat = float(np.nanstd(level(kept, 2).values)) if min(h.shape) > 2 else rms
@@ -163,9 +160,10 @@ def inspect(h: xr.DataArray) -> Inspection:
     order = 2 if form > _FORM else 0 if repeats else 1
     treated = kept if order == 1 else level(h, order).where(kept.notnull())
     slopes = tuple(float(np.nanmean((h - levelled).diff(axis))) / d for axis, d in zip("xy", spacing(h), strict=True))
-    seen = f"{_angle(slopes[0])} along x, {_angle(slopes[1])} along y: Sq is {_length(rms_levelled)} without the plane"
-    advice = "level = 0 subtracts the mean only; a plane would break the periodicity"
-    advice = f"level = {order} subtracts the plane{' too' if order == 2 else ''}" if order else advice
+    along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.3f}°" for one in slopes)
+    seen = f"{along_x} along x, {along_y} along y: Sq is {_length(rms_levelled)} without the plane"
+    advice = f"level = {order} subtracts the plane" + " and the form" * (order == 2)
+    advice = advice if order else "level = 0 subtracts the mean only; a plane would break the periodicity"
     find("Tilt", seen, advice, {"level": order}, slopes=slopes)
     seen = f"a quadratic form accounts for {_percent(form)} of Sq squared; Sq is {_length(rms_flat)} without it"
     advice = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
@@ -174,31 +172,25 @@ def inspect(h: xr.DataArray) -> Inspection:
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
     boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
-    times = [f"{one:.2g}" if one > 1e-3 else "0" for one in borders]  # rounding of a surface that repeats
-    seen = f"opposite borders differ {times[0]} (x) and {times[1]} times (y) as much as neighbouring rows"
+    seen = f"opposite borders differ {borders[0]:.2f} (x) and {borders[1]:.2f} times (y) as much as neighbouring rows"
     why = '; with "periodic" the step at the seam carries load' if boundary == "mirror" else ""
     find("Borders", seen, f'boundary = "{boundary}"{why}', of_neighbours=borders)
 
-    noise, cell = _noise(treated), max(spacing(treated))
-    cutoff = None
-    if noise and noise["noisy_slopes"] > _HARMLESS and noise["wavelength"] >= 3 * cell:
-        cutoff = max(float(f"{noise['wavelength']:.2g}"), 3.001 * cell)
-        treated = gaussian_filter(treated, cutoff)
-    slope = rms_slope(treated)
-    seen, advice = f"the rms slope is {slope:.2g} after these steps", ""
-    if slope > _STEEP:
-        seen += ", which is steeper than 45°, unlike almost any measured surface"
-        advice = "check unit, spacing and height_scale; the half-space model holds for small slopes only"
-    find("Slope", seen, advice, rms_slope=slope)
-
-    seen = "not known: the scan is flat, smaller than 16 points, or mostly missing"
+    noise, cell, step = _noise(treated), max(spacing(treated)), {}
+    seen, advice = "not known: the scan is flat, smaller than 16 points, or mostly missing", ""
     if noise and noise["floor"]:
         part = f"{_percent(noise['noisy_slopes'])} of the mean square slope"
         seen = f"{_length(noise['rms'])} rms: wavelengths below {_length(noise['wavelength'])} are noise, {part}"
     elif noise:
         seen = f"no noise floor down to two cells; noise is below {_length(noise['rms'])} rms"
-    step, advice = ({"filter": cutoff}, "filter out these wavelengths") if cutoff else ({}, "")
+    if noise and noise["noisy_slopes"] > _HARMLESS and noise["wavelength"] >= 3 * cell:
+        step = {"filter": max(float(f"{noise['wavelength']:.2g}"), 3.001 * cell)}
+        advice, treated = "filter out these wavelengths", gaussian_filter(treated, step["filter"])
     find("Noise", seen, advice, step, **noise)
+
+    slope = rms_slope(treated)
+    advice = "steeper than almost any measured surface: check unit, spacing and height_scale"
+    find("Slope", f"{slope:.2g} rms after these steps", advice if slope > _STEEP else "", rms_slope=slope)
 
     proposed = {name: value for one in findings.values() for name, value in one.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
@@ -208,24 +200,21 @@ def inspect(h: xr.DataArray) -> Inspection:
 def _largest_part(h: xr.DataArray, void: np.ndarray) -> dict[str, tuple[float, float]]:
     """Return the limits of the largest rectangle outside a mask [m]; empty if it is narrower than 16 points."""
     block = [max(1, n // 128) for n in h.shape]
-    coarse = np.logical_or.reduceat(void, np.arange(0, h.shape[0], block[0]), axis=0)
-    coarse = np.logical_or.reduceat(coarse, np.arange(0, h.shape[1], block[1]), axis=1)
+    for axis in (0, 1):
+        void = np.logical_or.reduceat(void, np.arange(0, void.shape[axis], block[axis]), axis=axis)
     best, found = 0, (slice(0), slice(0))
-    run = np.zeros(coarse.shape[1], dtype=int)  # cells present above, up to this row
-    for row, line in enumerate(~coarse):
-        run = np.where(line, run + 1, 0)
-        for height in np.unique(run[run > 0]):
-            labels, count = scipy.ndimage.label(run >= height)
-            for (piece,) in scipy.ndimage.find_objects(labels, count):
-                if (size := int(height) * (piece.stop - piece.start)) > best:
-                    best, found = size, (slice(row + 1 - int(height), row + 1), piece)
+    for last in range(1, len(void) + 1):
+        for first in reversed(range(last)):
+            labels, _ = scipy.ndimage.label(~void[first:last].any(axis=0))
+            for (piece,) in scipy.ndimage.find_objects(labels):
+                if (size := (last - first) * (piece.stop - piece.start)) > best:
+                    best, found = size, (slice(first, last), piece)
     limits = {}
     for axis, part, step in zip(("x", "y"), found, block, strict=True):
-        first, last = (part.start or 0) * step, min(part.stop * step, h.sizes[axis])
-        if last - first < 16:
+        edges = cell_edges(h[axis])[(part.start or 0) * step : part.stop * step + 1]
+        if edges.size < 17:
             return {}
-        edges = cell_edges(h[axis])
-        limits[axis] = (float(f"{edges[first]:.6g}"), float(f"{edges[last]:.6g}"))
+        limits[axis] = (float(f"{edges[0]:.6g}"), float(f"{edges[-1]:.6g}"))
     return limits
 
 
@@ -281,8 +270,3 @@ def _length(value: float) -> str:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
-
-
-def _angle(slope: float) -> str:
-    degrees = math.degrees(math.atan(abs(slope)))
-    return f"{degrees:.2g}°" if degrees >= 1e-3 else "less than 0.001°"

@@ -57,10 +57,8 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     h = checked(h, "parameters", least=1)
     require_heights(h, "parameters")
     known = h.values[np.isfinite(h.values)]
-    z = known - known.mean()
+    z, gradient = known - known.mean(), _squared_slopes(h, periodic)
     square = _mean(z**2)
-    slope_x, slope_y = _slopes(h, periodic)
-    gradient = slope_x**2 + slope_y**2
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
             "Sa": _mean(np.abs(z)),
@@ -98,21 +96,21 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
     float
         NaN if no corner counts. [-]
     """
-    slope_x, slope_y = _slopes(checked(h, "rms_slope", least=1), periodic, depth)
-    return float(np.sqrt((slope_x**2 + slope_y**2).mean())) if slope_x.size else math.nan
+    return float(np.sqrt(_mean(_squared_slopes(checked(h, "rms_slope", least=1), periodic, depth))))
 
 
-def _slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes along x and y at the corners of the points (i, j), (i+1, j), (i, j+1) that are all present."""
+def _squared_slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> np.ndarray:
+    """Return the squared slopes at the corners of the points (i, j), (i+1, j), (i, j+1) that are all present."""
     (dx, dy), (nx, ny) = spacing(h), h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
     slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
-    counts = np.isfinite(slope_x) & np.isfinite(slope_y)
+    squares = slope_x**2 + slope_y**2
+    counts = np.isfinite(squares)
     if depth < math.inf:
         lowest = np.nanmax(h.values) - depth
         counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
-    return slope_x[counts], slope_y[counts]
+    return squares[counts]
 
 
 def _mean(values: np.ndarray) -> np.float64:
