@@ -69,8 +69,7 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
     cells, boundary = spacing(dataset, "spots"), dataset.attrs.get("boundary", "free")
 
     def measure(touching: np.ndarray, present: np.ndarray) -> tuple[float, float]:
-        found = frozen_contact(touching, cells, boundary, present=present)
-        return found.stiffness, found.error
+        return frozen_contact(touching, cells, boundary, present=present)
 
     stiffness, error = frame_by_frame(measure, touching, present, outputs=[(), ()])
     name, factor = f"{kind}_conductance", 2 / sum(both)

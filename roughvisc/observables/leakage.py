@@ -103,8 +103,5 @@ def leakage(
     for axis, one in zip((along, across), fields, strict=False):
         variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
-    for name in ("transmissivity", "hydraulic_aperture", "leak_rate", "leak_rate_error"):
-        described[name].attrs["along"] = along
-        if name.startswith("leak"):
-            described[name].attrs |= {"viscosity": viscosity, "pressure_drop": pressure_drop}
+    described["leak_rate"].attrs |= {"along": along, "viscosity": viscosity, "pressure_drop": pressure_drop}
     return described

@@ -21,6 +21,7 @@ from roughvisc.observables.frames import need
 from roughvisc.observables.histories import history
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.spectrum import wavevectors
 
 Array = NDArray[np.float64]
 
@@ -87,9 +88,8 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     steps, kept = history(dataset), dataset["time"].values
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
         raise InputError("the theories are for surfaces without borders: expected boundary = 'periodic' or 'mirror'")
-    for body in ("thickness", "kernel"):
-        if body in dataset.attrs:
-            raise InputError(f"the theories are for a half-space: found a result with the {body} {dataset.attrs[body]}")
+    for body in dataset.attrs.keys() & {"thickness", "kernel"}:
+        raise InputError(f"the theories are for a half-space: found a result with the {body} {dataset.attrs[body]}")
     material = check_material(material)
     area, times, force = nominal_area(dataset), steps["time"].values, steps["force"].values
     # int C(t - s) dp(s) for a pressure that is linear between the steps
@@ -141,11 +141,8 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     for speed, pressure in zip(dataset["speed"].values, dataset["nominal_pressure"].values, strict=True):
         sliding = Sliding(grid.law(body, float(speed), _TOLERANCE), grid.gap.shape, grid.spacing, float(speed))
         found.append(friction_of_waves(sliding, grid.gap, float(pressure)))
-    coefficients, fractions = zip(*found, strict=True)
-    columns = {
-        "persson_friction_coefficient": ("speed", list(coefficients)),
-        "persson_contact_fraction": ("speed", list(fractions)),
-    }
+    names = "persson_friction_coefficient", "persson_contact_fraction"
+    columns = {name: ("speed", column) for name, column in zip(names, np.transpose(found), strict=True)}
     return label(xr.Dataset(columns, coords={"speed": dataset["speed"]}))
 
 
@@ -187,15 +184,10 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     ----------
     .. [1] B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
     """
-    ny, waves = height.shape[1], fft.rfft2(height, norm="forward")
+    waves = fft.rfft2(height, norm="forward")
     length = np.broadcast_to(np.hypot(sliding.qx, sliding.qy), waves.shape)
-    twice = np.full(ny // 2 + 1, 2.0)  # conjugate waves are not stored
-    twice[0] = 1.0
-    if ny % 2 == 0:
-        twice[-1] = 1.0
-    power = twice * np.abs(waves) ** 2
-    moved = length > 0
-    stiffness = np.divide(1.0, sliding.response, where=moved, out=np.zeros(waves.shape, complex))
+    power = wavevectors(height.shape, (1.0, 1.0))[2] * np.abs(waves) ** 2
+    stiffness = np.divide(1.0, sliding.response, where=length > 0, out=np.zeros(waves.shape, complex))
     order = np.argsort(length, axis=None)
     stress, drag = ((power * part).ravel()[order] for part in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag))
     sorted_length = length.ravel()[order]

@@ -266,7 +266,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     Parameters
     ----------
     dataset : xarray.Dataset
-        One case's result with ``height``, ``pressure``, and ``gap`` or ``displacement``.
+        One case's result with ``height``, ``pressure`` and ``gap``.
     time : float or str, optional
         The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
         the largest contact area. [s]

@@ -21,14 +21,13 @@ Grid error, measured on discs, squares at any angle, strips and Hertz contacts:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from roughvisc.mechanics.contact import ContactState, solve_contact
+from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.neighbours import neighbours
 from roughvisc.mechanics.grid import Boundary, Grid
 
@@ -48,23 +47,6 @@ _SHARED, _SCATTER = 0.03, 1.0
 _OF_PRESSURE = 0.1
 
 
-@dataclass(frozen=True)
-class FrozenContact:
-    """Contact whose area does not change, as a punch.
-
-    Attributes
-    ----------
-    stiffness : float
-        Force over approach, over the contact modulus; for a disc twice the radius. Infinite in full contact
-        unless space is free. [m]
-    error : float
-        Error of the stiffness due to grid and solver. [m]
-    """
-
-    stiffness: float
-    error: float
-
-
 def frozen_contact(
     contact: Mask,
     spacing: tuple[float, float],
@@ -72,8 +54,8 @@ def frozen_contact(
     *,
     present: Mask | None = None,
     tolerance: float = 1e-6,
-) -> FrozenContact:
-    """Return the stiffness of a contact at constant area.
+) -> tuple[float, float]:
+    """Return the stiffness of a contact at constant area, and its error.
 
     Parameters
     ----------
@@ -92,10 +74,16 @@ def frozen_contact(
 
     Returns
     -------
-    FrozenContact
+    stiffness : float
+        Force over approach, over the contact modulus; for a disc twice the radius. Infinite in full contact
+        unless space is free. [m]
+    error : float
+        Error of the stiffness due to grid and solver. [m]
     """
     if not contact.any():
-        return FrozenContact(0.0, 0.0)
+        return 0.0, 0.0
+    if contact.all() and boundary != "free":
+        return math.inf, 0.0
     present = np.ones(contact.shape, dtype=bool) if present is None else present
     beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
     rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
@@ -103,49 +91,35 @@ def frozen_contact(
         [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
-    body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary)
-    if contact.all() and boundary != "free":
-        return FrozenContact(math.inf, 0.0)
-    punch = _punch(body, contact, tolerance)
-    stiffness, off = _variational(punch, body.cell_area)
-    ends, opens, scatter = _edge_energies(rimmed, rim, punch.pressure, spacing)
+    stiffness, off, pressure = _punch(contact, spacing, boundary, tolerance)
+    ends, opens, scatter = _edge_energies(rimmed, rim, pressure, spacing)
     images = math.prod(
         2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis))
     )  # their faces have equal errors
     error = off + _SHARED * opens + _SCATTER * math.sqrt(images) * scatter
-    found = FrozenContact(stiffness, error)
     if ends == 0:
-        return found
+        return stiffness, error
+    split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)  # edges of the material: cells of half the side
+    finer, off, _ = _punch(split, (spacing[0] / 2, spacing[1] / 2), boundary, tolerance)
+    difference = ends / (ends + opens) * max(finer - stiffness, 0.0)
     oblique = min(_staircase(rimmed) / _STEPS, 1.0)
-    return _extrapolated(found, contact, body, tolerance, share=ends / (ends + opens), oblique=oblique)
-
-
-def _extrapolated(
-    coarse: FrozenContact, contact: Mask, body: Grid, tolerance: float, *, share: float, oblique: float
-) -> FrozenContact:
-    """Return the stiffness, extrapolated from cells of half the side at edges of the material."""
-    split = np.repeat(np.repeat(contact, 2, axis=0), 2, axis=1)
-    finer = body.on((split.shape[0], split.shape[1]))
-    punch = _punch(finer, split, tolerance)
-    stiffness, off = _variational(punch, finer.cell_area)
-    difference = share * max(stiffness - coarse.stiffness, 0.0)
     part = _OBLIQUE + (_ALONG - _OBLIQUE) * (1 - oblique) ** 2
-    return FrozenContact(coarse.stiffness + part * difference, coarse.error + part * off + _OFF * difference)
+    return stiffness + part * difference, error + part * off + _OFF * difference
 
 
-def _punch(body: Grid, contact: Mask, tolerance: float) -> ContactState:
-    return solve_contact(
-        body, np.zeros(contact.shape), approach=1.0, present=contact, tolerance=_OF_PRESSURE * math.sqrt(tolerance)
-    )
+def _punch(
+    contact: Mask, spacing: tuple[float, float], boundary: Boundary, tolerance: float
+) -> tuple[float, float, Array]:
+    """Return a lower bound of the stiffness, a bound on its error [m], and the pressure of the punch.
 
-
-def _variational(punch: ContactState, cell: float) -> tuple[float, float]:
-    """Return a lower bound of the stiffness, with a second-order error in the pressure, and a bound on this error. [m]
-
-    ``k = max 2 sum p - p.Kp``; the error is at most twice the duality gap.
+    ``k = max 2 sum p - p.Kp`` has an error of second order in the pressure, at most twice the duality gap.
     """
+    body = Grid((contact.shape[0], contact.shape[1]), spacing, boundary)
+    nearness = _OF_PRESSURE * math.sqrt(tolerance)
+    punch = solve_contact(body, np.zeros(contact.shape), approach=1.0, present=contact, tolerance=nearness)
     energy = float(np.sum(punch.pressure * punch.displacement))
-    return cell * (2 * punch.load - energy), cell * energy * punch.bound**2
+    stiffness = body.cell_area * (2 * punch.load - energy)
+    return stiffness, body.cell_area * energy * punch.bound**2, punch.pressure
 
 
 def _edge_energies(

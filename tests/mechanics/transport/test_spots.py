@@ -30,8 +30,8 @@ def outlined(spots, spacing=UNIT, boundary="free", **settings):
 
 def within(found, exact):
     """How far off, after checking that the stated error holds."""
-    off = abs(found.stiffness - exact)
-    assert off <= found.error
+    off = abs(found[0] - exact)
+    assert off <= found[1]
     return off / exact
 
 
@@ -52,10 +52,10 @@ def test_square__is_its_capacity(cells, off):
 
 def test_correction__has_the_order_of_a_corner():
     """Less than 2, which is that of a smooth outline's second term; more than 1, which is that of no correction."""
-    off = [abs(outlined(np.ones((n, n), dtype=bool), (1 / n, 1 / n)).stiffness / SQUARE - 1) for n in (8, 16, 32)]
+    off = [abs(outlined(np.ones((n, n), dtype=bool), (1 / n, 1 / n))[0] / SQUARE - 1) for n in (8, 16, 32)]
     assert np.log2(off[0] / off[1]) > 1.5
     assert np.log2(off[1] / off[2]) > 1.5
-    raw = [frozen_contact(np.pad(np.ones((n, n), dtype=bool), 1), (1 / n, 1 / n)).stiffness for n in (16, 32)]
+    raw = [frozen_contact(np.pad(np.ones((n, n), dtype=bool), 1), (1 / n, 1 / n))[0] for n in (16, 32)]
     assert np.log2((SQUARE - raw[0]) / (SQUARE - raw[1])) == pytest.approx(1, abs=0.05)
 
 
@@ -75,7 +75,7 @@ def test_two_far_spots__add_but_for_what_each_displaces_the_other(apart):
     spot = disc(5.2)
     both = np.zeros((len(spot) + apart, spot.shape[1]), dtype=bool)
     both[: len(spot)], both[apart:] = spot, spot
-    one, found = outlined(spot).stiffness, outlined(both).stiffness
+    one, found = outlined(spot)[0], outlined(both)[0]
     assert found == pytest.approx(1 / (1 / (2 * one) + 1 / (2 * math.pi * apart)), rel=5e-4 * (40 / apart) ** 3)
 
 
@@ -94,7 +94,7 @@ def test_hertz__has_the_stiffness_of_its_exact_radius():
         contact = hertz(42, radius, rng.random(2) - 0.5)
         found = frozen_contact(contact, UNIT)
         assert within(found, 2 * radius) < 1e-2
-        off.append(found.stiffness / (2 * radius) - 1)
+        off.append(found[0] / (2 * radius) - 1)
     assert abs(np.mean(off)) < 2e-3, "nothing systematic"
     assert abs(np.sqrt(contact.sum() / math.pi) / radius - 1) > 5e-3, "which the count is"
 
@@ -111,13 +111,13 @@ def test_stiffness__is_the_slope_of_force_over_approach(boundary, make):
     contact = states[0].pressure > 0
     assert np.array_equal(contact, states[1].pressure > 0), "choose another load"
     slope = 2 * eps * load / (states[1].approach - states[0].approach)
-    assert frozen_contact(contact, UNIT, boundary, tolerance=1e-10).stiffness == pytest.approx(slope, rel=1e-8)
+    assert frozen_contact(contact, UNIT, boundary, tolerance=1e-10)[0] == pytest.approx(slope, rel=1e-8)
 
 
 def test_nothing_and_all():
     none, full = np.zeros((5, 4), dtype=bool), np.ones((5, 4), dtype=bool)
-    assert frozen_contact(none, UNIT).stiffness == 0
-    assert frozen_contact(full, UNIT, "periodic").stiffness == math.inf
+    assert frozen_contact(none, UNIT)[0] == 0
+    assert frozen_contact(full, UNIT, "periodic")[0] == math.inf
 
 
 def test_edges__are_told_apart():
@@ -125,14 +125,14 @@ def test_edges__are_told_apart():
     spot = np.pad(np.ones((8, 8), dtype=bool), 2)
     ended, opened = frozen_contact(spot, UNIT, present=spot), frozen_contact(spot, UNIT)
     at_border = frozen_contact(spot[2:-2, 2:-2], UNIT)
-    assert at_border.stiffness == ended.stiffness > opened.stiffness
+    assert at_border[0] == ended[0] > opened[0]
     half = spot.copy()
     half[6:] = True
-    assert opened.stiffness < frozen_contact(spot, UNIT, present=half).stiffness < ended.stiffness
+    assert opened[0] < frozen_contact(spot, UNIT, present=half)[0] < ended[0]
 
 
 def test_lengths__scale():
     spots = rough_gap((14, 15), seed=3) < 2.0
     one, tiny = (frozen_contact(spots, (s, 1.3 * s)) for s in (1.0, 1e-9))
-    assert tiny.stiffness == pytest.approx(1e-9 * one.stiffness, rel=1e-9)
-    assert tiny.error == pytest.approx(1e-9 * one.error, rel=1e-6)
+    assert tiny[0] == pytest.approx(1e-9 * one[0], rel=1e-9)
+    assert tiny[1] == pytest.approx(1e-9 * one[1], rel=1e-6)
