@@ -62,7 +62,7 @@ def test_resistivities__say_what_flows(ball):
         ((0.0, 0), "not both zero"),
         ((1.0, -1), "none below zero"),
         (("1 ohm m", "1 K m/W"), "resistivity: found '1 K m/W'"),
-        ((np.nan, 1), "finite"),
+        ((np.nan, 1), "found nan"),
     ],
 )
 def test_wrong_resistivities__are_refused(ball, resistivity, message):
