@@ -269,8 +269,7 @@ class LoadingRows(Rows):
             }
         if not kept:
             return row, {}
-        area_off = area_error(step, scene, pressure, gap, counted, area)
-        row |= stated | {"contact_area_error": area_off}
+        row |= stated | {"contact_area_error": area_error(step, scene, pressure, gap, counted, area)}
 
         names, found = self.problem.settings.fields, {"pressure": pressure, "displacement": displacement, "gap": gap}
         kept_fields = {name: to_host(found[name]) for name in names}

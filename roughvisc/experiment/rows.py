@@ -202,7 +202,6 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     largest_force, largest_approach = largest
     loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
     of_force = series_error * loaded
-    of_approach = series_error * reached
     unit = scene.tolerance if largest_force > 0 else 0.0
     solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
     work = scene.stated[0] * abs(state.work_apart) + state.work_curved
@@ -211,7 +210,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
     if control == "load" or not given:
-        approach = apart.approach + point.solver_error_approach + of_approach
+        approach = apart.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
     pressure = (apart.pressure + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf

@@ -148,12 +148,9 @@ def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> boo
     axis : {0, 1}
         Axis of the motion.
     """
-    if "recipe" in height.attrs:
-        if is_indenter(height):
-            return True
-        if is_analytic(height):
-            return False
-    if pressure is None or not (pressure > 0).any():
+    if is_indenter(height):
+        return True
+    if is_analytic(height) or pressure is None or not (pressure > 0).any():
         return False
     touching = np.flatnonzero((pressure > 0).any(axis=1 - axis))
     count = pressure.shape[axis]
