@@ -23,7 +23,8 @@ from roughvisc.topography.formats.text import read_numbers, read_table
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING = {0: 4096, 1: 32768, 2: 131072}, 2147483640
-#: First bytes of a Digital Surf file without and with compression.
+#: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
+_TRUEMAP = b"Binary TrueMap Data File v2.0"
 _DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
 #: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
 _HEADER, _SIZES = 512, 334
@@ -143,6 +144,8 @@ def read_text_file(path: Path, format: str) -> ScanFile:
 def read_truemap(path: Path) -> ScanFile:
     """Read a TrueMap or GelSight file of version 2: a comment, then the grid in millimetres, top line first."""
     content = path.read_bytes()
+    if not content.startswith(_TRUEMAP):
+        raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
     comment = content.index(b"\0") + 1
     at = content.index(b"\0", comment) + 1
     columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
