@@ -1,6 +1,6 @@
 """What tests of several modules share.
 
-The suite runs with the transforms that everybody has; test_transforms.py compares those of ducc0 with them.
+The suite runs with the transforms of SciPy; mechanics/test_convolution.py compares those of ducc0 with them.
 """
 
 import os
@@ -17,10 +17,12 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # a shell's background jo
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 import strategies  # noqa: F401  (loads the profile of the random examples)
+from support import BALL, LOADS
 
 from roughvisc.cli import main
 from roughvisc.mechanics.grid import Grid
 from roughvisc.plot import save as save_module
+from roughvisc.study.case import read_cases
 
 
 @pytest.fixture
@@ -48,6 +50,17 @@ def invoke(tmp_path, monkeypatch):
         return done.exit_code, done.stdout, done.stderr
 
     return run
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Writes a study into a folder of its own and reads its cases."""
+
+    def write(text=BALL + LOADS, name="ball"):
+        (tmp_path / f"{name}.toml").write_text(text)
+        return read_cases(tmp_path / f"{name}.toml")
+
+    return write
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """What tests of several modules share: cases, scenes, and how they are looked at."""
 
+import codecs
 import re
 
 import numpy as np
@@ -201,6 +202,16 @@ def relative_errors(found, exact):
         (apart["approach"], approach),
     ]
     return np.max([np.divide(one, scale, out=np.zeros_like(one), where=scale > 0) for one, scale in errors], axis=0)
+
+
+#: Encoding of a text file -> the bytes of a text.
+ENCODINGS = {
+    "UTF-8": str.encode,
+    "UTF-8 with its mark": lambda text: text.encode("utf-8-sig"),
+    "UTF-16 little": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
+    "UTF-16 big": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
+    "Latin-1": lambda text: text.encode("latin-1"),
+}
 
 
 def refused(key=None, found=None):

@@ -1,24 +1,16 @@
 """Tables of numbers in text: written in any way they are read back as the same numbers, or refused by name."""
 
-import codecs
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import ENCODINGS
 
 from roughvisc.errors import InputError
 from roughvisc.tables import Wanted, read_table
 
 TIME, LOAD = {"time": Wanted("time", "s")}, {"load": Wanted("load", "N")}
 PULL = {"time": Wanted("time", "s"), "züge": Wanted("Züge", "N")}
-ENCODINGS = {
-    "UTF-8": str.encode,
-    "UTF-8 with its mark": lambda text: text.encode("utf-8-sig"),
-    "UTF-16 little": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
-    "UTF-16 big": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
-    "Latin-1": lambda text: text.encode("latin-1"),
-}
 #: separator, what stands around each cell, decimal mark
 STYLES = [(",", "", "."), (",", '"', "."), (",", '"', ",")]
 STYLES += [(separator, quote, mark) for separator in (";", "\t") for quote in ("", '"') for mark in ".,"]

@@ -1,4 +1,4 @@
-"""Studies in folders of their own, and a cluster that was started by hand."""
+"""A cluster that was started by hand."""
 
 import os
 import subprocess
@@ -6,22 +6,8 @@ import sys
 import time
 
 import pytest
-from support import BALL, LOADS
 
 from roughvisc.cli.study_options import connect
-from roughvisc.study.case import read_cases
-
-
-@pytest.fixture
-def study(tmp_path):
-    """Writes a study into a folder of its own and reads its cases."""
-
-    def write(text=BALL + LOADS, name="ball"):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(text)
-        return read_cases(path)
-
-    return write
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ from support import BALL, FRICTION, LOADS, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.case import read_cases, vary
+from roughvisc.study.case import vary
 from roughvisc.study.execution.sweep import sweep
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.netcdf import open_result, write_result
@@ -29,18 +29,6 @@ OWN_TIMES = (
 "program.1.hold" = ["0.1 s", "10 s"]
 """
 )
-
-
-@pytest.fixture
-def study(tmp_path):
-    """Writes a study and reads its cases."""
-
-    def write(text=SMALL + LOADS, name="ball"):
-        path = tmp_path / f"{name}.toml"
-        path.write_text(text)
-        return read_cases(path)
-
-    return write
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +97,7 @@ def test_open_results__on_different_grids_has_histories(study, tmp_path, caplog)
 
 
 def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_path):
-    cases = study()
+    cases = study(SMALL + LOADS)
     sweep(cases, tmp_path / "out", workers=0, progress=False)
     (tmp_path / "out" / f"{cases[1].key}.nc").unlink()
     ds, table = rv.open_results(tmp_path / "out"), rv.to_table(tmp_path / "out")
@@ -120,7 +108,7 @@ def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_p
 
 def test_list_of_cases__damaged_is_refused(study, tmp_path):
     out = tmp_path / "out"
-    sweep(study(), out, workers=0, progress=False)
+    sweep(study(SMALL + LOADS), out, workers=0, progress=False)
     whole = (out / SWEEP).read_bytes()
     for content in (whole[:-3], b"[]", whole.replace(whole[20:24], b"abcd")):
         (out / SWEEP).write_bytes(content)
@@ -241,7 +229,7 @@ def test_open_results__a_file_made_from_a_result_is_none(sixty, tmp_path, caplog
 
 def test_open_results__of_the_last_sweep_or_of_some_cases(study, tmp_path):
     out = tmp_path / "out"
-    cases = study()
+    cases = study(SMALL + LOADS)
     sweep(cases, out, workers=0, progress=False)
     tighter = [vary(case, {"solve.tolerance": 2e-3}) for case in cases[:2]]
     assert sweep(tighter, out, workers=0, progress=False).sizes["case"] == 2

@@ -1,21 +1,15 @@
 """Scans in text on the same numbers: encodings, separators, decimal marks. Right, or refused by name."""
 
-import codecs
-
 import numpy as np
 import pytest
+from support import ENCODINGS
 
 import roughvisc as rv
 from roughvisc.errors import InputError
 
 #: Numbers that show a lost mark, sign or row; as they are written with a decimal point.
 HEIGHTS = [[f"{-0.25 + 1.5 * i + 0.125 * j * j:.3f}" for i in range(5)] for j in range(4)]  # line j, column i
-ENCODINGS = {
-    "UTF-8": str.encode,
-    "UTF-8 with its mark": lambda text: text.encode("utf-8-sig"),
-    "UTF-16 little": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
-    "UTF-16 big": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
-    "Windows-1252": lambda text: text.encode("cp1252"),
+WRITTEN = ENCODINGS | {
     "CRLF": lambda text: text.replace("\n", "\r\n").encode(),
     "empty last line": lambda text: f"{text}\n\n".encode(),
     "no last line break": lambda text: text.rstrip("\n").encode(),
@@ -64,7 +58,7 @@ def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_pa
     path = tmp_path / f"numbers.{suffix}"
     for separator, mark in STYLES:
         text = written(rows(separator), separator, mark)
-        for name, encode in ENCODINGS.items():
+        for name, encode in WRITTEN.items():
             path.write_bytes(encode(text))
             np.testing.assert_allclose(read(path), expected, rtol=1e-12, err_msg=f"{separator!r} {mark} {name}")
         path.write_bytes(text.encode("utf-16-le"))  # without its mark
