@@ -170,13 +170,3 @@ def test_clusters__pass_a_leading_dimension_through():
     found = observables.clusters(ds.assign_coords(case=["ring", "board"]))
     assert found["cluster_count"].dims == ("case", "time")
     assert found["cluster_count"].values.ravel().tolist() == [1, 13]
-
-
-def test_contact_area__is_the_count_less_a_part_of_each_face_at_the_edge():
-    ds = rv.simulate(rv.sphere(1e-2, 2e-3, (17, 12)), RUBBER, rv.Program().load(0.02, over=0), progress=False)
-    mask = np.pad(ds["pressure"].values[-1] > 0, 1)
-    faces = sum(np.count_nonzero(mask & ~np.roll(mask, turn, axis)) for axis in (0, 1) for turn in (1, -1))
-    cells = np.count_nonzero(mask) - 0.088 * faces
-    assert float(ds["contact_fraction"][-1]) == pytest.approx(cells / (17 * 12), rel=1e-9)
-    cell = float(ds.x[1] - ds.x[0]) * float(ds.y[1] - ds.y[0])
-    assert float(ds["contact_area"][-1]) == pytest.approx(cells * cell, rel=1e-9, abs=0)

@@ -322,15 +322,6 @@ def test_audit__refuses_what_is_no_result_of_one_case(ball):
             rv.audit(wrong)
 
 
-def test_audit__takes_units_and_shows_a_table(ball):
-    one = rv.audit(ball, work_of_adhesion="50 mJ/m^2", yield_strength="40 MPa", thickness="1 mm", density="1.1 g/cm^3")
-    two = rv.audit(ball, work_of_adhesion=0.05, yield_strength=4e7, thickness=1e-3, density=1100)
-    assert repr(one) == repr(two)
-    lines = repr(one).splitlines()
-    assert len(one.findings) == 6
-    assert [line.split()[0] for line in lines if line[:1].strip()][-6:] == [finding.name.split()[0] for finding in one]
-
-
 AUDITED = BALL + '[audit]\nwork_of_adhesion = "50 mJ/m^2"\nthickness = "0.6 mm"\n'
 
 
