@@ -393,6 +393,7 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
     a Hann window, after missing points are filled.
     """
+    height = height["height"] if isinstance(height, xr.Dataset) else height
     height = checked(height, "surface", least=1).rename("height")
     if not np.isfinite(height).any():
         raise InputError("the surface is all missing: nothing to draw")
