@@ -20,7 +20,7 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage
 from roughvisc.observables.deformed import deformed
-from roughvisc.observables.frames import expect_result
+from roughvisc.observables.frames import expect_result, need
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.topography.bandwidth import off_plane
@@ -63,9 +63,7 @@ def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
 
 def largest_contact(dataset: xr.Dataset) -> int:
     """Return the number of the last row with the largest contact area, or of the last row if areas are not known."""
-    if "contact_area" not in dataset:
-        return dataset.sizes[axis_of(dataset.variables)] - 1
-    area = np.nan_to_num(dataset["contact_area"].values)
+    area = np.nan_to_num(dataset.get("contact_area", np.zeros(dataset.sizes[axis_of(dataset.variables)])))
     return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
 
 
@@ -145,14 +143,9 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
     x, y = plane(cell_edges(field["x"])), plane(cell_edges(field["y"]))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
-    image = ax.imshow(
-        np.ma.masked_invalid(unit(field.transpose("y", "x"))),
-        origin="lower",
-        extent=(x[0], x[-1], y[0], y[-1]),
-        cmap=matplotlib.colormaps[colours].with_extremes(bad=bad, under=below),
-        norm=norm,
-        aspect="auto",
-    )
+    values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
+    cmap = matplotlib.colormaps[colours].with_extremes(bad=bad, under=below)
+    image = ax.imshow(values, cmap=cmap, norm=norm, aspect="auto", origin="lower", extent=extent)
     ax.grid(visible=False)
     for axis, side in (("x", ax.bbox.width), ("y", ax.bbox.height)):
         most = int(np.clip(2.5 * side / ax.figure.dpi, 1, 4))
@@ -393,7 +386,9 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
     a Hann window, after missing points are filled.
     """
-    height = height["height"] if isinstance(height, xr.Dataset) else height
+    if isinstance(height, xr.Dataset):
+        need(height, "height")
+        height = height["height"]
     height = checked(height, "surface", least=1).rename("height")
     if not np.isfinite(height).any():
         raise InputError("the surface is all missing: nothing to draw")

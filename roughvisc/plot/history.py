@@ -17,7 +17,7 @@ from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.units import quantities, unit_for
+from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, VARIABLES, axis_of
 
 #: Quantities that are drawn if the result holds them.
@@ -74,30 +74,30 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x", left=0.8)
     across = style.row_axis(axes, (steps if over in steps else kept)[over])
     for ax, name in zip(axes, names, strict=True):
-        line = steps if name in steps and over in steps else kept
-        _draw_history(ax, name, (across(line[over]), line[name]), (across(kept[over]), kept))
+        _draw_history(ax, name, steps if name in steps and over in steps else kept, kept, over, across)
     figure.align_ylabels()
     style.legend_above(figure, style.named_in(*axes))
     return figure
 
 
-def _draw_history(ax: Axes, name: str, line: tuple[Any, xr.DataArray], dots: tuple[Any, xr.Dataset]) -> None:
+def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over: str, across: Unit) -> None:
     """Draw a quantity as a line through the steps and dots at the kept rows, with the theory and the error of the grid.
 
     Parameters
     ----------
     ax : matplotlib.axes.Axes
         Panel to draw in.
-    name : str
-        Quantity.
-    line, dots : tuple
-        Places in the unit of the axis, with values of the quantity at the steps, and with the kept rows.
+    name, over : str
+        Quantities on the vertical and on the horizontal axis.
+    steps, kept : xarray.Dataset
+        Both quantities at the steps and at the kept rows.
+    across : Unit
+        Unit of the horizontal axis.
     """
-    (places, steps), (at, kept) = (line[0], style.drawable(line[1])), dots
-    values = style.drawable(kept[name])
+    line, values, at = style.drawable(steps[name]), style.drawable(kept[name]), across(kept[over])
     (label, si), colour = style.described(kept[name]), style.CONTACT if "contact" in name else style.BLUE
-    unit, is_finer = unit_for(steps, si), steps.size > values.size
-    ax.plot(places, unit(steps), color=colour, label="time steps" if is_finer else None)
+    unit, is_finer = unit_for(line, si), line.size > values.size
+    ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
     if values.size <= _DOTS:
         ax.plot(at, unit(values), "o", color=colour, label="kept times" if is_finer else None)
     error = _GRID_ERROR.get(name, "")

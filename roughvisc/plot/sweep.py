@@ -188,10 +188,8 @@ def _text(level: Any) -> str:
 def _looks(column: pd.Series) -> dict[Any, dict[str, Any]]:
     """Return level of a column -> colour and label of its lines; of many levels only some have a label."""
     levels = column.cat.categories
-    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.88, len(levels)))  # the light end is hard to see on white
-    looks = {level: {"color": style.CYCLE[number % 8]} for number, level in enumerate(levels)}
-    if not _is_text(column):
-        looks = {level: {"color": shade} for level, shade in zip(levels, shades, strict=True)}
+    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.88, len(levels)))  # without the light end
+    looks = {level: {"color": shade} for level, shade in zip(levels, shades, strict=True)}
     for level in levels[:: -(-len(levels) // _MOST_NAMED)]:
         looks[level]["label"] = _text(level)
     return looks

@@ -104,6 +104,23 @@ def test_sweep__over_time_has_a_line_for_each_case_and_names_some(count):
     assert len({tuple(to_rgba(line.get_color())) for line in ax.lines}) == count
 
 
+def test_sweep__in_several_rows_labels_the_outer_panels():
+    loads, viscosities = np.geomspace(0.01, 0.02, 5), np.geomspace(1e3, 1e5, 6)
+    ds = stacked(by_both, program__0__load=loads, material__kelvin_viscosity=viscosities)
+    axes = plot.sweep(ds, along="time").axes
+    assert [ax.get_xlabel() for ax in axes] == ["", "", "Time [s]", "Time [s]", "Time [s]"], "the last place is empty"
+    assert [ax.get_ylabel() for ax in axes] == ["Contact area [mm²]", "", "", "Contact area [mm²]", ""]
+
+
+def test_sweep__keeps_long_file_names_apart():
+    names = [f"{'a_flank_of_a_gear_' * 3}{number}.sur" for number in range(3)]
+    files = xr.DataArray(names, dims="case", attrs={"long_name": "surface.file"})
+    ds = stacked(by_load, program__0__load=LOADS).drop_vars("program_0_load").assign_coords(surface_file=files)
+    (ax,) = plot.sweep(ds).axes
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), LOADS**0.9)
+    assert [text.get_text()[-5:] for text in ax.get_xticklabels()] == ["0.sur", "1.sur", "2.sur"]
+
+
 def test_sweep__refuses_what_cannot_be_drawn():
     ds = stacked(by_load, program__0__load=LOADS)
     for options in ({"quantity": "pressure"}, {"along": "surface.seed"}, {"along": "speed"}, {"times": range(13)}):
