@@ -180,7 +180,7 @@ class SlidingGrid:
 
     def areas(self, contact: NDArray[np.bool_]) -> tuple[float, float]:
         """Return the area of cells in contact, counted and corrected for the grid. [m2]"""
-        return contact_area(contact, ~contact, self.spacing[0] * self.spacing[1], True)
+        return contact_area(contact, ~contact, self.spacing[0] * self.spacing[1], "periodic")
 
     def opening(self, found: SteadyState) -> Array:
         """Return the gap of a steady state. [m]"""
@@ -322,7 +322,7 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
 
     contact = found.pressure > 0
     hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
-    counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, True))
+    counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, "periodic"))
     # Friction from pressure times slope of the profile. The surface follows the profile at the centres of the contact
     # cells but not at the edges of contact; this is an error of the grid.
     inclined = float(np.sum(found.pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]

@@ -16,14 +16,13 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property, lru_cache
-from itertools import pairwise, starmap
 from typing import Any, Literal
 
 import numpy as np
 import scipy
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves, wave_limits
+from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves
 
 try:
     import ducc0
@@ -32,14 +31,12 @@ except ImportError:
 
 Array = Any  # an array of NumPy or CuPy
 Boundary = Literal["free", "periodic", "mirror"]
-BOUNDARIES: tuple[Boundary, ...] = ("free", "periodic", "mirror")
 
 #: Number of rows that are transformed together; bytes of the columns that are, and their least number. The blocks fit
 #: in the cache. Whole fields take up to 1.5 times as long (measured from 64 to 1,024 cells a side).
 ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
-#: Number of cells from which periodic convolutions use blocks of columns too; below, whole fields are faster.
-BLOCKS_FROM = 1024**2
-#: Cells of a field from which several threads are faster than one (measured: slower at 512 squared, faster at 1024).
+#: Cells of a field from which blocks are transformed on several threads, and periodic fields in blocks at all: each
+#: block has the same bits on any number of threads. Measured: slower at 512 squared, faster at 1024.
 THREADED_FROM = 1024**2
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
@@ -69,18 +66,16 @@ def arrays_of(device: str) -> Any:
     """
     if device == "cpu":
         return np
-    expected = "'cpu'"
     try:
         import cupy
 
-        if cupy.cuda.runtime.getDeviceCount() > 0:
-            return cupy
-        reason = "CuPy finds none on this machine"
-    except ImportError:
-        reason, expected = "CuPy is not installed", "'cpu', or CuPy: pip install 'roughvisc[gpu]'"
-    except RuntimeError as error:  # of the CUDA driver
-        reason = f"CuPy finds none on this machine ({error})"
-    raise InputError(f"device is 'gpu', and {reason}: expected {expected}", key="device", found="gpu")
+        problem = "" if cupy.cuda.runtime.getDeviceCount() > 0 else "CuPy finds none on this machine"
+    except (ImportError, RuntimeError) as error:  # RuntimeError: of the CUDA driver
+        problem = str(error)
+    if problem:
+        expected = f"'cpu', or a GPU with CuPy, pip install 'roughvisc[gpu]' ({problem})"
+        raise InputError(key="device", found="gpu", expected=expected)
+    return cupy
 
 
 def to_host(array: Array) -> np.ndarray:
@@ -99,8 +94,6 @@ class Grid:
         Cell sides ``(dx, dy)``. [m]
     boundary : {"free", "periodic", "mirror"}
         Surface outside the grid.
-    workers : int, optional
-        Threads of the transforms from a million cells on. Default: as set by ``scipy.fft.set_workers``, or one.
     kernel : Kernel
         Displacement of the body's surface under pressure.
     symbol : array, optional
@@ -122,6 +115,11 @@ class Grid:
         Transform of the kernel at non-negative wave numbers. [m]
     definite : bool
         Whether a uniform pressure displaces the surface.
+    stiffest : float
+        Largest eigenvalue of the convolution, or a bound on it. [m]
+    self_influence : float
+        Displacement of a cell under unit pressure on that cell alone: the mean eigenvalue. On a mirrored surface, the
+        mean over all cells. [m]
     convolutions : int
         Number of convolutions so far, applications of the inverse included.
     threads : int
@@ -130,7 +128,7 @@ class Grid:
     Raises
     ------
     InputError
-        If the boundary is unknown, the grid is impossible or the kernel's transfer function is not positive.
+        If the grid is impossible or the kernel's transfer function is not positive.
     """
 
     def __init__(
@@ -138,16 +136,12 @@ class Grid:
         shape: tuple[int, int],
         spacing: tuple[float, float],
         boundary: Boundary = "free",
-        workers: int | None = None,
         *,
         kernel: Kernel = HALF_SPACE,
         symbol: Array | None = None,
         xp: Any = np,
     ) -> None:
-        if boundary not in BOUNDARIES:
-            raise InputError(key="boundary", found=boundary, expected="'free', 'periodic' or 'mirror'")
-        self.shape, self.spacing, self.boundary, self.kernel = shape, spacing, boundary, kernel
-        self.workers, self.xp = workers, xp
+        self.shape, self.spacing, self.boundary, self.kernel, self.xp = shape, spacing, boundary, kernel, xp
         images = 2 if boundary == "mirror" else 1
         self.period = images * shape[0], images * shape[1]
         self.size, self.cell_area = shape[0] * shape[1], spacing[0] * spacing[1]
@@ -161,28 +155,28 @@ class Grid:
             symbol = np.ascontiguousarray(periodic_symbol(kernel, self.period, spacing)[: shape[0], : shape[1]])
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
-        self.convolutions = 0
-        self.threads = threads_of(self.size, workers)
+        self.stiffest = float(self.symbol.max()) or spacing[0]
+        if boundary == "mirror":
+            self.self_influence = float(self.symbol.mean())
+        else:
+            shares = []  # number of waves of each non-negative wave number, over the number of points
+            for points in self.points:
+                number = np.arange(points // 2 + 1)
+                shares.append(xp.asarray(np.where((number == 0) | (2 * number == points), 1.0, 2.0)) / points)
+            self.self_influence = float((shares[0][:, None] * self.symbol * shares[1]).sum())
+        self.convolutions, self.threads = 0, threads_of(self.size) if xp is np else 1
         self._transforms = transforms(self.threads, xp)
+        #: Whether a convolution is one call of :meth:`CupyTransforms.convolved`.
+        self._on_device = boundary == "periodic" and xp is not np
+        self._acting = self._of_all_waves(self.symbol) if self._on_device else self.symbol
         self._memories: dict[Any, Array] = {}
-
-    @property
-    def wave_numbers(self) -> tuple[float, float]:
-        """Wave numbers of the longest and of the shortest wave. [1/m]"""
-        return wave_limits(self.period, self.spacing)
 
     # ----------------------------------------------------------------------------------------- other grids and kernels
 
     def on(self, shape: tuple[int, int]) -> Grid:
         """Return a grid of the same body, boundary and extent with another number of cells."""
         (nx, ny), (mx, my), (dx, dy) = self.shape, shape, self.spacing
-        spacing = dx * (nx / mx), dy * (ny / my)
-        return Grid(shape, spacing, self.boundary, self.workers, kernel=self.kernel, xp=self.xp)
-
-    def answering(self, symbol: Array, kernel: Kernel) -> Grid:
-        """Return the same cells with another kernel and its transform."""
-        cells = self.shape, self.spacing, self.boundary, self.workers
-        return Grid(*cells, kernel=kernel, symbol=symbol, xp=self.xp)
+        return Grid(shape, (dx * (nx / mx), dy * (ny / my)), self.boundary, kernel=self.kernel, xp=self.xp)
 
     @cached_property
     def coarse(self) -> Grid:
@@ -213,7 +207,7 @@ class Grid:
         half-space is zero.
         """
         self.convolutions += 1
-        return self._convolved(pressure, self._double_symbol, self.points)
+        return self._convolved(pressure, self._acting, self.points)
 
     def inverse(self, displacement: Array) -> Array:
         """Return approximately the pressure that causes a displacement, in single precision.
@@ -230,40 +224,15 @@ class Grid:
         return self._convolved(displacement, self._inverse_symbol, self.shape)
 
     @cached_property
-    def stiffest(self) -> float:
-        """Largest eigenvalue of the convolution, or a bound on it. [m]"""
-        return float(self.symbol.max()) or self.spacing[0]
-
-    @cached_property
-    def self_influence(self) -> float:
-        """Displacement of a cell under unit pressure on that cell alone: the mean eigenvalue. [m]
-
-        On a mirrored surface, the mean over all cells.
-        """
-        if self.boundary == "mirror":
-            return float(self.symbol.mean())
-        parts = []  # number of waves of each non-negative wave number, over the number of points
-        for points in self.points:
-            number = np.arange(points // 2 + 1)
-            parts.append(self.xp.asarray(np.where((number == 0) | (2 * number == points), 1.0, 2.0)) / points)
-        return float((parts[0][:, None] * self.symbol * parts[1]).sum())
-
-    @cached_property
-    def _double_symbol(self) -> Array:
-        return self._of_all_waves(self.symbol)
-
-    @cached_property
     def _inverse_symbol(self) -> Array:
         symbol = self.symbol.copy()
         if self.boundary == "free":
             symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-        return self._of_all_waves(1 / symbol).astype(np.float32)
+        return (self._of_all_waves(1 / symbol) if self._on_device else 1 / symbol).astype(np.float32)
 
     def _of_all_waves(self, symbol: Array) -> Array:
-        """Return a symbol for a convolution: on a device with periodic boundaries, for :meth:`Transforms.convolved`."""
-        if self.xp is np or self.boundary != "periodic":
-            return symbol
+        """Return a symbol for :meth:`Transforms.convolved`."""
         count, first = self.shape[0], len(symbol)
         symbol = self.xp.concatenate([symbol, symbol[count - first : 0 : -1]])
         return symbol if self._transforms.normalise else symbol / self.size
@@ -273,9 +242,9 @@ class Grid:
         fft = self._transforms
         if self.boundary == "mirror":
             return fft.cosines_back(fft.cosines(field) * symbol)
-        if self.boundary == "periodic" and self.xp is not np:
+        if self._on_device:
             return fft.convolved(field, symbol)
-        if points == self.shape and self.size < BLOCKS_FROM:
+        if points == self.shape and self.size < THREADED_FROM:
             spectrum = fft.waves(field)
             self.multiply(spectrum, symbol)
             return fft.waves_back(spectrum, points)
@@ -284,9 +253,8 @@ class Grid:
         spectrum = self._memory((nx, count), np.result_type(field.dtype, np.complex64))
         found = self.xp.empty((nx, ny), field.dtype)
         rows, columns = ROWS, min(max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS), count)
-        threads = self.threads
         if self.xp is not np:
-            rows, columns, threads = nx, count, 1
+            rows, columns = nx, count
 
         def transform_rows(part: slice) -> None:
             spectrum[part] = fft.waves(field[part], points[1], axes=(1,))
@@ -301,13 +269,16 @@ class Grid:
         def rows_back(part: slice) -> None:
             found[part] = fft.waves_back(spectrum[part], points[1:], axes=(1,))[:, :ny]
 
-        on_threads(transform_rows, nx, rows, threads)
-        on_threads(convolve_columns, count, columns, threads)
-        on_threads(rows_back, nx, rows, threads)
+        on_threads(transform_rows, nx, rows, self.threads)
+        on_threads(convolve_columns, count, columns, self.threads)
+        on_threads(rows_back, nx, rows, self.threads)
         return found
 
     def _memory(self, shape: tuple[int, int], number: Any) -> Array:
-        """Return a complex work array, reused by each convolution: new memory takes up to a third more time."""
+        """Return a complex work array, reused by each convolution.
+
+        New memory takes a tenth of the processor time of two threads at 1,024 squared, and of one at 2,048 squared.
+        """
         key = shape, threading.get_ident()
         if key not in self._memories:
             self._memories[key] = self.xp.empty(shape, np.complex128)
@@ -340,8 +311,6 @@ class Grid:
 
     def turn(self, cells: int, axis: int) -> Array:
         """Return the factors of the transform of a periodic field for a shift of the field back by `cells`."""
-        if self.boundary != "periodic":
-            raise ValueError("only periodic fields turn")
         count = self.shape[axis]
         waves = np.fft.fftfreq(count, 1 / count) if axis == 0 else np.fft.rfftfreq(count, 1 / count)
         phases = np.exp(2j * np.pi * cells / count * waves)
@@ -351,34 +320,25 @@ class Grid:
 # ---------------------------------------------------------------------------------------------------------- threads
 
 
-def threads_of(size: int, workers: int | None = None) -> int:
-    """Return the number of threads for a field of a number of cells.
-
-    Parameters
-    ----------
-    size : int
-        Cells.
-    workers : int, optional
-        Threads for a large field. Default: the value of ``scipy.fft.set_workers``.
-    """
-    if size < THREADED_FROM:
-        return 1
-    return scipy.fft.get_workers() if workers is None else workers
+def threads_of(size: int) -> int:
+    """Return the number of threads for a field of a number of cells: as set by ``scipy.fft.set_workers``, or one."""
+    return scipy.fft.get_workers() if size >= THREADED_FROM else 1
 
 
 def on_threads(work: Callable[[slice], Any], count: int, length: int, threads: int) -> None:
     """Split `count` rows or columns into parts of a length, and call a function for each part on several threads."""
-    parts = starmap(slice, pairwise([*range(0, count, length), count]))
+    starts = range(0, count, length)
     if threads == 1:
-        for part in parts:
-            work(part)
-    else:
-        for _ in _pool(threads).map(work, parts):  # reraises an error of a part
-            pass
+        for start in starts:
+            work(slice(start, min(start + length, count)))
+        return
+    for _ in _pool(threads).map(lambda start: work(slice(start, min(start + length, count))), starts):
+        pass  # reraises an error of a part
 
 
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
+    """Return threads that all convolutions share: new ones would take a tenth of the processor time."""
     return ThreadPoolExecutor(threads, thread_name_prefix="roughvisc")
 
 
@@ -395,8 +355,8 @@ class Transforms:
     #: Whether the inverse transform of :meth:`convolved` divides by the number of points.
     normalise = True
 
-    def __init__(self, fft: Any, **settings: Any) -> None:
-        self.fft, self.settings = fft, settings
+    def __init__(self, threads: int, xp: Any) -> None:
+        self.fft, self.settings = fft_of(xp), {"workers": threads} if xp is np else {}
 
     def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
         """Return the Fourier transform of a field at non-negative wave numbers along y.
@@ -433,12 +393,12 @@ class Transforms:
 class DuccTransforms(Transforms):
     """Transforms by ducc0, which are faster."""
 
-    def __init__(self, threads: int) -> None:
-        super().__init__(ducc0.fft, nthreads=threads)
+    def __init__(self, threads: int, _: Any) -> None:
+        self.fft, self.settings = ducc0.fft, {"nthreads": threads}
 
     def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
         if points is not None:
-            longer = _apart((field.shape[0], points), field.dtype)
+            longer = _apart((len(field), points), field.dtype)
             longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
             field = longer
         return self.fft.r2c(field, axes=axes, **self.settings)
@@ -492,15 +452,15 @@ def _plans(fft: Any, shape: tuple[int, int], number: str) -> tuple[Any, Any]:
 
 
 def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
-    """Return an array with padded rows: rows a power of two apart make transforms up to three times slower."""
+    """Return an array with padded rows: rows a power of two apart take a tenth more time at 1,024 squared."""
     return np.empty((shape[0], shape[1] + 16), number)[:, : shape[1]]
 
 
 def transforms(threads: int = 1, xp: Any = np) -> Transforms:
-    """Return the transforms of arrays of NumPy, or of CuPy."""
-    if xp is not np:
-        return (CupyTransforms if hasattr(xp, "RawKernel") else Transforms)(fft_of(xp))
-    return DuccTransforms(threads) if has_ducc0() else Transforms(scipy.fft, workers=threads)
+    """Return the transforms of arrays of NumPy, by ducc0 if it is installed and not refused, or of CuPy."""
+    if xp is np and ducc0 is not None and os.environ.get("ROUGHVISC_TRANSFORMS") != "scipy":
+        return DuccTransforms(threads, xp)
+    return (CupyTransforms if hasattr(xp, "RawKernel") else Transforms)(threads, xp)
 
 
 def fft_of(xp: Any) -> Any:
@@ -512,15 +472,10 @@ def fft_of(xp: Any) -> Any:
     return fft
 
 
-def has_ducc0() -> bool:
-    """Return whether ducc0 is installed and ``ROUGHVISC_TRANSFORMS`` is not ``scipy``."""
-    return ducc0 is not None and os.environ.get("ROUGHVISC_TRANSFORMS") != "scipy"
-
-
 def transform_library() -> str:
     """Return names and versions of the libraries that determine the last digits of results.
 
     Results are identical to the last bit only if these are the same. SciPy also transforms the sampled kernels.
     """
-    engine = f"ducc0 {ducc0.__version__}, scipy" if has_ducc0() else "scipy.fft"
+    engine = f"ducc0 {ducc0.__version__}, scipy" if isinstance(transforms(), DuccTransforms) else "scipy.fft"
     return f"{engine} {scipy.__version__}, numpy {np.__version__}"

@@ -157,8 +157,6 @@ class Memory:
             Pressure at the end. [Pa]
         """
         fields = self.kept(unit, pressure)
-        if prediction.step == 0:
-            return History(fields, history.modes)
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
             mode += weight * fields
         # the next step can use BDF2 only if it is stiff and not much longer than this one
@@ -260,8 +258,6 @@ class Memory:
         own, earlier, before, new : ndarray, shape (m,)
         """
         ratio, flows, none = step / self.times, np.isinf(self.times), np.zeros(self.times.size)
-        if step == 0:
-            return none + 1, none, none, none
         if rule == "linear":
             own = np.exp(-ratio)
             new = np.where(flows, step / 2, one_less_mean_decay(ratio))

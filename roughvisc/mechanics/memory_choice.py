@@ -20,7 +20,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.layer import LayeredBody, LayerSeries, layer_series
 from roughvisc.mechanics.materials.creep import Material
@@ -52,7 +52,7 @@ class LayerMemory(Memory):
     """
 
     def __init__(self, waves: LayerSeries, duration: float, grid: Grid | None) -> None:
-        limits = (waves.q[0], waves.q[-1]) if grid is None else grid.wave_numbers
+        limits = (waves.q[0], waves.q[-1]) if grid is None else wave_limits(grid.period, grid.spacing)
         super().__init__(waves.fastest_wave(*limits), duration)
         self.waves, self.grid = waves, cast(Grid, grid)
         if grid is not None:
@@ -82,8 +82,9 @@ class LayerMemory(Memory):
         """Return the elastic problem of a step, with its kernel; its compliance is one, or zero if it is rigid."""
         *symbols, at_once = self.weights
         symbol = sum((part * one for part, one in zip(new, symbols, strict=True) if part), at_once)
-        answering = self.grid.answering(symbol, self.waves.kernel(np.append(new, 1.0)))
-        return Prediction(float(symbol.any()), self.grid.field_of(carried), modes, new, step, answering)
+        cells, kernel = self.grid, self.waves.kernel(np.append(new, 1.0))
+        grid = Grid(cells.shape, cells.spacing, cells.boundary, kernel=kernel, symbol=symbol, xp=cells.xp)
+        return Prediction(float(symbol.any()), cells.field_of(carried), modes, new, step, grid)
 
     def unit(self, history: History) -> None:
         """Return None: the kernel differs between steps."""

@@ -9,39 +9,18 @@ pressure stagnates. Numbers in brackets are the equations of the paper; "printed
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError
+from roughvisc.mechanics.grid import Grid
 
 Array = NDArray[np.float64]
 
 
-class Convolution(Protocol):
-    """Grid on which the profile is pressed: displacement at unit compliance [Pa m], and the area of a cell [m2]."""
-
-    cell_area: float
-
-    def displacement(self, pressure: Array) -> Array:
-        """``K0 p``."""
-        ...
-
-
-@dataclass(frozen=True)
-class Contact:
-    """One elastic contact: pressure [Pa], level of the rigid profile [m], iterations, and whether it stagnated."""
-
-    pressure: Array
-    approach: float
-    iterations: int
-    stagnated: bool
-
-
 def press(
-    operator: Convolution,
+    grid: Grid,
     gap: Array,
     compliance: Callable[[float], float],
     load: Callable[[float], float],
@@ -56,8 +35,8 @@ def press(
 
     Parameters
     ----------
-    operator : Convolution
-        Convolution of the half-space, on the grid of the gap.
+    grid : Grid
+        Cells of the half-space.
     gap : ndarray, shape (nx, ny)
         Undeformed gap. [m]
     compliance : callable
@@ -90,22 +69,17 @@ def press(
     for time in times:
         # (5) Printed: up to the last step, with a kernel of unit force. An increment acts from its step on. The present
         # increment is new pressure minus last pressure, and only the second part is known yet.
-        past = -at_once * operator.displacement(pressure)
+        past = -at_once * grid.displacement(pressure)
         for began, increment in zip(times, increments, strict=False):
-            past += operator.displacement(compliance(time - began) * increment)
-        contact = conjugate_gradients(operator, gap + past, at_once, load(time), epsilon=epsilon)
-        if not contact.stagnated:
-            raise ConvergenceError(
-                f"at {time:.6g} s the paper's iteration does not stagnate in {contact.iterations} iterations: expected "
-                "a larger epsilon"
-            )
-        increments.append(contact.pressure - pressure)
-        pressure = contact.pressure
-        yield time, pressure, contact.approach
+            past += grid.displacement(compliance(time - began) * increment)
+        found, approach, _ = conjugate_gradients(grid, gap + past, at_once, load(time), epsilon=epsilon)
+        increments.append(found - pressure)
+        pressure = found
+        yield time, pressure, approach
 
 
 def conjugate_gradients(
-    operator: Convolution,
+    grid: Grid,
     gap: Array,
     compliance: float,
     load: float,
@@ -113,19 +87,20 @@ def conjugate_gradients(
     epsilon: float = 1e-5,
     sign: float = 1.0,
     most: int = 3000,
-) -> Contact:
+) -> tuple[Array, float, int]:
     """Elastic contact under a load, (1) to (4), by the iteration (6) to (16).
 
+    Returns the pressure [Pa], the level of the rigid profile [m] and the number of iterations, at most ``most``.
     ``gap`` excludes the displacement by the present pressure [m]; ``compliance`` is for the present increment [1/Pa].
-    ``sign`` is the sign in (9); with the printed sign, -1, the iteration stalls. It ends after ``most`` iterations.
+    ``sign`` is the sign in (9); with the printed sign, -1, the iteration does not converge.
     """
     if load == 0:
-        return Contact(np.zeros_like(gap), float(np.min(gap)), 0, True)
-    pressure = np.full(gap.shape, load / (operator.cell_area * gap.size))  # (1), uniform
+        return np.zeros_like(gap), float(np.min(gap)), 0
+    pressure = np.full(gap.shape, load / (grid.cell_area * gap.size))  # (1), uniform
     direction, last, restart = np.zeros_like(gap), 1.0, True
     for iteration in range(1, most + 1):
         touching = pressure > 0  # (3) Printed: all points
-        opening = gap + compliance * operator.displacement(pressure)  # (2)
+        opening = gap + compliance * grid.displacement(pressure)  # (2)
         opening -= np.mean(opening[touching])  # (7) Printed: mean over all points
         residual = np.where(touching, opening, 0.0)
         norm = float(np.sum(residual**2))  # (8)
@@ -133,7 +108,7 @@ def conjugate_gradients(
         factor = 0.0 if restart else sign * norm / last
         direction, last = np.where(touching, residual + factor * direction, 0.0), norm
         # (11) Printed: the kernel at the lag of the whole time, which makes steps too short.
-        change = compliance * operator.displacement(direction)
+        change = compliance * grid.displacement(direction)
         change -= np.mean(change[touching])  # (10) Printed: no mean
         curvature = float(np.sum(direction * change))
         length = float(np.sum(residual * direction)) / curvature if curvature else 0.0  # (11)
@@ -142,12 +117,11 @@ def conjugate_gradients(
         penetrating = (pressure == 0) & (opening < 0)  # (4) Printed: opening > 0 outside. It may be 0.
         pressure[penetrating] -= length * opening[penetrating]  # (14)
         restart = bool(np.any(penetrating))
-        total = operator.cell_area * float(np.sum(pressure))
+        total = grid.cell_area * float(np.sum(pressure))
         if total == 0:
-            return Contact(before, float("nan"), iteration, False)
-        pressure *= load / total  # (15) Printed: without the cell's area, as (16)
-        stagnated = bool(operator.cell_area * np.sum(np.abs(pressure - before)) <= epsilon * load)  # (16)
-        if stagnated:
             break
-    displaced = gap + compliance * operator.displacement(pressure)
-    return Contact(pressure, float(np.mean(displaced[pressure > 0])), iteration, stagnated)
+        pressure *= load / total  # (15) Printed: without the cell's area, as (16)
+        if grid.cell_area * np.sum(np.abs(pressure - before)) <= epsilon * load:  # (16)
+            displaced = gap + compliance * grid.displacement(pressure)
+            return pressure, float(np.mean(displaced[pressure > 0])), iteration
+    raise ConvergenceError(f"the paper's iteration does not stagnate in {iteration} steps: expected a larger epsilon")

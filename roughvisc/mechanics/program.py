@@ -86,8 +86,8 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
 Control = Literal["load", "approach", "pressure"]
 #: Controlled quantity -> its unit.
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
-#: Quantities that contact without adhesion cannot carry below zero.
-PUSHING = ("load", "pressure")
+#: Least value of the quantities that are never negative in contact without adhesion.
+LEAST = {"load": 0.0, "pressure": 0.0}
 
 
 @dataclass(frozen=True)
@@ -114,13 +114,6 @@ class Segment:
     amplitude: float = 0.0
     period: float = math.inf
     slide: Slide | None = None
-
-    def __post_init__(self) -> None:
-        lowest = (self.end or 0.0) - abs(self.amplitude)
-        if self.control in PUSHING and lowest < 0:
-            reached = f"{self.control} reaches {lowest!r} {UNITS[self.control]}"
-            expected = f"no negative {self.control}, contact here has no adhesion"
-            raise InputError(f"{reached}: expected {expected}", found=lowest, expected=expected)
 
     def __str__(self) -> str:
         """Return the segment in words, such as ``load to 2 N over 50 ms``."""
@@ -163,9 +156,7 @@ class Segment:
 
     def highest(self, start: float) -> float:
         """Return the largest prescribed value of the segment; ``start`` is the value at the start. [N or m]"""
-        if self.amplitude:
-            return (start if self.end is None else self.end) + abs(self.amplitude)
-        return max(start, start if self.end is None else self.end)
+        return max(start, start if self.end is None else self.end) + abs(self.amplitude)
 
     def is_nothing(self, start: float) -> bool:
         """Return whether the prescribed value is zero throughout; ``start`` is the value at the start."""
@@ -222,8 +213,7 @@ class Program:
 
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""
-        least = 0.0 if control in PUSHING else None
-        end = number(value, UNITS[control], control, least=least)
+        end = number(value, UNITS[control], control, least=LEAST.get(control))
         return self._then(Segment(control, number(over, "s", "over", least=0), end))
 
     def __add__(self, other: Program) -> Program:
@@ -403,7 +393,7 @@ class Program:
             expected = f"as many values as times, {len(times)}, at least one"
             raise InputError(key="values", found=len(values), expected=expected)
         instants = [number(time, "s", f"times.{row}") for row, time in enumerate(times)]
-        ends = [number(value, unit, f"values.{row}") for row, value in enumerate(values)]
+        ends = [number(value, unit, f"values.{row}", least=LEAST.get(control)) for row, value in enumerate(values)]
         if instants[0] != 0:
             raise InputError(key="times.0", found=times[0], expected="zero")
         segments = [Segment(control, 0.0, ends[0])] if ends[0] else []
@@ -443,8 +433,10 @@ class Program:
             If a quantity has a wrong type or unit, or load or pressure become negative.
         """
         unit = UNITS[one_of("control", control, UNITS)]
-        middle = number(mean, unit, "mean", least=0 if control in PUSHING else None)
+        middle = number(mean, unit, "mean", least=LEAST.get(control))
         height = number(amplitude, unit, "amplitude")
+        if control in LEAST and abs(height) > middle:
+            raise InputError(key="amplitude", found=amplitude, expected=f"at most the mean, {mean!r}")
         length = number(period, "s", "period", above=0)
         duration = number(length * number(cycles, "1", "cycles", above=0, most=MOST_CYCLES), "s", "cycles")
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
@@ -510,17 +502,7 @@ class Program:
 
     @cached_property
     def largest_load(self) -> float:
-        """Largest load prescribed anywhere; zero if none is. [N]
-
-        Raises
-        ------
-        InputError
-            If a nominal pressure is prescribed: its load is unknown without an area.
-        """
-        if any(segment.control == "pressure" for segment in self.segments):
-            raise InputError(
-                "the program prescribes a nominal pressure: expected loads, as Program.on_area() gives them"
-            )
+        """Largest load prescribed anywhere; zero if none is. A nominal pressure has no load without an area. [N]"""
         loads = [(s.end or 0.0) + abs(s.amplitude) for s in self.segments if s.control == "load"]
         return max(loads, default=0.0)
 

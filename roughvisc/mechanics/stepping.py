@@ -872,7 +872,7 @@ def take_step(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
         ) from error
     if grid is not scene.grid:
-        scene.grid.convolutions += found.convolutions
+        scene.grid.convolutions += grid.convolutions
     pressure, unit = found.pressure, found.displacement
     pressure /= alpha
     unit /= alpha

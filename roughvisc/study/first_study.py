@@ -98,8 +98,7 @@ def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTA
     def touching(pressure: float) -> float:
         load = share * pressure * profile.area * compliance / grid.cell_area
         pressed = solve_contact(grid, profile.gap, load=load, tolerance=_TOLERANCE, present=present).pressure > 0
-        free, periodic = present & ~pressed, found.boundary == "periodic"
-        return contact_area(pressed, free, grid.cell_area, periodic)[1] / profile.area
+        return contact_area(pressed, present & ~pressed, grid.cell_area, found.boundary)[1] / profile.area
 
     guess = pressure = contact / compliance * slope / 2 or _ON_FLAT
     for _ in range(_PRESSES if slope > 0 else 0):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.program import PUSHING, UNITS, Control, Program
+from roughvisc.mechanics.program import LEAST, UNITS, Control, Program
 from roughvisc.tables import Wanted, read_table
 from roughvisc.units import is_quantity, number
 
@@ -101,7 +101,7 @@ def read_history(
     start = float(measured[0])
     times, values = _less(measured, start), _less(found[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
-    if control in PUSHING:
+    if control in LEAST:
         notes += _noise_note(path, control, measured, values)
         values = np.maximum(values, 0.0)
     largest = float(np.max(np.abs(values)))

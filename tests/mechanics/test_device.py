@@ -30,9 +30,10 @@ def assert_equal(one, other):
 def solved_on_both(xp, boundary, gap, present=None, **given):
     """Solve on NumPy and on the device, compare, and return the state of NumPy."""
     there = None if present is None else xp.asarray(present)
-    found = solve_contact(Grid(gap.shape, SPACING, boundary), gap, present=present, **given)
-    other = solve_contact(Grid(gap.shape, SPACING, boundary, xp=xp), xp.asarray(gap), present=there, **given)
-    assert (other.convolutions, other.iterations) == (found.convolutions, found.iterations)
+    grids = Grid(gap.shape, SPACING, boundary), Grid(gap.shape, SPACING, boundary, xp=xp)
+    found = solve_contact(grids[0], gap, present=present, **given)
+    other = solve_contact(grids[1], xp.asarray(gap), present=there, **given)
+    assert (grids[1].convolutions, other.iterations) == (grids[0].convolutions, found.iterations)
     assert_equal(other.pressure, found.pressure)
     assert_equal(other.displacement, found.displacement)
     assert other.approach == pytest.approx(found.approach, rel=1e-12)

@@ -70,18 +70,12 @@ class Kernel:
         self, name: str, arguments: str, body: str, sums: Sequence[str] = (), maxima: Sequence[str] = ()
     ) -> None:
         lines = [f"sums[{k}] += {one};" for k, one in enumerate(sums)]
-        for k, one in enumerate(maxima, len(sums)):
-            lines.append(f"maxima[{k}] = fmax(maxima[{k}], {one});")
+        lines += [f"maxima[{k}] = fmax(maxima[{k}], {one});" for k, one in enumerate(maxima, len(sums))]
+        number, adding = max(len(lines), 1), " ".join(lines)
         self._name, self._sums, self._returned = name, len(sums), len(lines)
         self._compiled: dict[str, Any] = {}
         self._source = SOURCE.format(
-            name=name,
-            arguments=arguments,
-            body=body,
-            adding=" ".join(lines),
-            number=max(len(lines), 1),
-            added=len(sums),
-            threads=THREADS,
+            name=name, arguments=arguments, body=body, adding=adding, number=number, added=len(sums), threads=THREADS
         )
 
     def __call__(self, count: int, *arguments: Any, real: Any = np.float64) -> list[float]:
@@ -252,12 +246,7 @@ def taken(field: Array, cells: Array, factor: float) -> Array:
 
 
 def conjugate(
-    direction: Array,
-    residual: Array,
-    last: Last | None,
-    on_grid: Callable[[Array, Array], Array],
-    cells: Array,
-    under_load: bool,
+    direction: Array, residual: Array, last: Last | None, on_grid: Scatter, cells: Array, under_load: bool
 ) -> tuple[Array, float]:
     """Return the direction of the step, and the L1 norm of the preconditioned residual."""
     count, beta, former_mean, former = direction.size, 0.0, 0.0, direction
@@ -305,17 +294,10 @@ def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float
 
 
 def advance(
-    pressure: Array,
-    separation: Array,
-    cells: Array,
-    held: Array,
-    trial: Array,
-    change: Array,
-    response: Array,
-    fraction: float,
+    pressure: Array, separation: Array, cells: Array, step: tuple[Array, Array, Array], response: Array, fraction: float
 ) -> None:
     """Take a fraction of a trial step: change the pressure at the free cells, and the separation everywhere."""
-    _put(cells.size, pressure, cells, held, trial, change, fraction)
+    _put(cells.size, pressure, cells, *step, fraction)
     _add(separation.size, separation, response, fraction)
 
 

@@ -6,30 +6,28 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roughvisc.mechanics.grid import Boundary, namespace
+from roughvisc.mechanics.grid import Boundary
 
 Array = Any  # an array of NumPy or CuPy, or a float
-Mask = NDArray[np.bool_]
 
 #: Counted contact cells overestimate the area by this part of the staircase perimeter times the cell side; measured
 #: on Hertz contacts of 6 to 200 cells' radius (0.080 to 0.092).
 PERIMETER_CORRECTION = 0.088
 
 
-def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: bool = False) -> Iterator[Mask]:
+def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterator[Array]:
     """Yield the mask of the neighbour across the lower and the upper face of each cell, along x, then along y.
 
     Parameters
     ----------
-    mask : ndarray of bool, shape (nx, ny)
+    mask : array of bool, shape (nx, ny)
         Mask of the cells.
     boundary : {"free", "periodic", "mirror"}
         Periodic: the first cell of a row is the neighbour of the last. Mirror: beyond the border, a cell's neighbour is
         its own image.
-    before, beyond : bool
-        Values outside the first and the last cell of every row in free space.
+    outside : bool
+        Value beyond the border in free space.
 
     Examples
     --------
@@ -38,30 +36,20 @@ def neighbours(mask: Mask, boundary: Boundary, before: bool = False, beyond: boo
     >>> [seen.ravel().tolist() for seen in neighbours(np.array([[True], [False]]), "mirror")][:2]
     [[True, True], [False, False]]
     """
-    for turned in (False, True):
-        own = mask.T if turned else mask
+    for own in (mask, mask.T):
         lower, upper = np.empty_like(own), np.empty_like(own)
-        lower[1:], lower[0] = own[:-1], {"free": before, "periodic": own[-1], "mirror": own[0]}[boundary]
-        upper[:-1], upper[-1] = own[1:], {"free": beyond, "periodic": own[0], "mirror": own[-1]}[boundary]
-        yield from (lower.T, upper.T) if turned else (lower, upper)
+        lower[1:], lower[0] = own[:-1], {"free": outside, "periodic": own[-1], "mirror": own[0]}[boundary]
+        upper[:-1], upper[-1] = own[1:], {"free": outside, "periodic": own[0], "mirror": own[-1]}[boundary]
+        yield from (lower, upper) if own is mask else (lower.T, upper.T)
 
 
-def faces_between(contact: Array, free: Array, periodic: bool, before: bool = False, beyond: bool = False) -> int:
-    """Return the number of faces between contact cells and free cells, see :func:`neighbours`.
-
-    With mirror boundaries the border has no such faces: use ``periodic=False`` and the default values beyond it.
-    """
-    count, xp = 0, namespace(contact)
-    for own, other in ((contact, free), (contact.T, free.T)):
-        below = other[-1] if periodic else before
-        above = other[0] if periodic else beyond
-        for cells, beside in (own[1:], other[:-1]), (own[:-1], other[1:]), (own[0], below), (own[-1], above):
-            count += int(xp.count_nonzero(cells & beside))
-    return count
+def faces_between(contact: Array, free: Array, boundary: Boundary, outside: bool = False) -> int:
+    """Return the number of faces between contact cells and free cells, see :func:`neighbours`."""
+    return sum(int(np.count_nonzero(contact & beside)) for beside in neighbours(free, boundary, outside))
 
 
 def contact_area(
-    contact: Array, free: Array, cell_area: float, periodic: bool, before: bool = False, beyond: bool = False
+    contact: Array, free: Array, cell_area: float, boundary: Boundary, outside: bool = False
 ) -> tuple[float, float]:
     """Return the area of the cells in contact, counted and corrected for the grid. [m2]
 
@@ -73,12 +61,12 @@ def contact_area(
         Contact cells, and cells with material out of contact.
     cell_area : float
         Area of a cell. [m2]
-    periodic, before, beyond
+    boundary, outside
         See :func:`neighbours`.
     """
-    counted = int(namespace(contact).count_nonzero(contact)) * cell_area
+    counted = int(np.count_nonzero(contact)) * cell_area
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, periodic, before, beyond)
+    strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, boundary, outside)
     return counted, max(counted - strip, 0.0)
 
 

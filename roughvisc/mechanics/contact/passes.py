@@ -96,12 +96,7 @@ def taken(field: Array, cells: Array, factor: float) -> Array:
 
 
 def conjugate(
-    direction: Array,
-    residual: Array,
-    last: Last | None,
-    on_grid: Callable[[Array, Array], Array],
-    cells: Array,
-    under_load: bool,
+    direction: Array, residual: Array, last: Last | None, on_grid: Scatter, cells: Array, under_load: bool
 ) -> tuple[Array, float]:
     """Return the direction of the step, and the L1 norm of the preconditioned residual.
 
@@ -113,8 +108,8 @@ def conjugate(
         Preconditioned residual, and residual, at the free cells.
     last : tuple or None
         The last step.
-    on_grid : callable
-        Returns the field with given values at given cells.
+    on_grid : Scatter
+        Field on the cells.
     cells : array of int, shape (n,)
         The free cells.
     under_load : bool
@@ -239,14 +234,7 @@ def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: f
 
 
 def advance(
-    pressure: Array,
-    separation: Array,
-    cells: Array,
-    held: Array,
-    trial: Array,
-    change: Array,
-    response: Array,
-    fraction: float,
+    pressure: Array, separation: Array, cells: Array, step: tuple[Array, Array, Array], response: Array, fraction: float
 ) -> None:
     """Take a fraction of a trial step: change the pressure at the free cells, and the separation everywhere.
 
@@ -256,11 +244,12 @@ def advance(
         Pressure and separation, which are overwritten, and the displacement due to the step.
     cells : array of int, shape (n,)
         The free cells.
-    held, trial, change : array, shape (n,)
+    step : tuple of array, shape (n,)
         Their pressure before and after the step, and its change.
     fraction : float
         Part of the step.
     """
+    held, trial, change = step
     if fraction != 1:
         trial = namespace(held).maximum(held + fraction * change, 0)
     pressure[cells] = trial
@@ -272,9 +261,9 @@ def without_mean(values: Array) -> Array:
     return values - values.sum() / values.size
 
 
-def largest(values: Array, least: float = 0.0) -> float:
-    """Return the largest value, but at least a given one; a vector may be empty."""
-    return max(float(values.max()), least) if values.size else least
+def largest(values: Array) -> float:
+    """Return the largest value, but at least zero; a vector may be empty."""
+    return max(float(values.max()), 0.0) if values.size else 0.0
 
 
 def inner(one: Array, other: Array) -> float:

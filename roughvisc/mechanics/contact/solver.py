@@ -84,8 +84,8 @@ class ContactState(NamedTuple):
         Under a given approach it holds to first order only.
     approach_error : float
         Duality gap over the load: error of the approach under a given load. [m]
-    iterations, convolutions : int
-        Cost; displacements and applications of the preconditioner are convolutions.
+    iterations : int
+        Number of steps.
     """
 
     pressure: Array
@@ -96,7 +96,6 @@ class ContactState(NamedTuple):
     bound: float
     approach_error: float
     iterations: int
-    convolutions: int
 
 
 def solve_contact(
@@ -137,55 +136,51 @@ def solve_contact(
 
     Raises
     ------
-    ValueError
-        If both or neither of load and approach are given.
     ConvergenceError
         If the tolerance is not reached, or if the approach reaches full contact.
     """
-    if (load is None) == (approach is None):
-        raise ValueError("expected either load or approach")
-    xp, under_load, before, passes = grid.xp, load is not None, grid.convolutions, passes_of(grid.xp)
+    xp, under_load, passes = grid.xp, load is not None, passes_of(grid.xp)
     present = None if present is None or present.all() else present.reshape(-1)
+    absent = slice(0) if present is None else ~present
     start = start if start is not None and (start > 0).any() else None
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
         start, start_displacement = coarse_guess(grid, gap, load), None
+    if not overwrite:
+        gap, start, start_displacement = (
+            one if one is None else one.copy() for one in (gap, start, start_displacement)
+        )
 
     # Divide pressures and lengths by one pressure, and measure lengths from the lowest point: the load is then one.
     lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
     overlap = 0.0 if approach is None else approach - lowest_gap
     unit = load if load is not None else (overlap / grid.stiffest if overlap > 0 else 1.0)
-    given = (gap if overwrite else gap.copy()).reshape(-1)
+    given = gap.reshape(-1)
     given -= lowest_gap
     given /= unit
-    if present is not None:
-        given[~present] = 0
+    given[absent] = 0
     level = overlap / unit
     is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
     has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
     if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
         raise ConvergenceError("the approach reaches full contact and does not determine the load")
 
-    def separation_under(pressure: Array) -> Array:
-        return given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
-
     # First guess: the given one, else uniform, or the overlap of the surfaces.
     if start is not None:
-        pressure = (start if overwrite else start.copy()).reshape(-1)
+        pressure = start.reshape(-1)
         pressure[pressure < 0] = 0
         pressure /= unit
     else:
         pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.stiffest
-    if present is not None:
-        pressure[~present] = 0
+    pressure[absent] = 0
     scale = 1 / float(pressure.sum()) if under_load else 1.0
     pressure *= scale
     is_extrapolated = start is not None and start_displacement is not None
-    if start_displacement is not None and start is not None:
-        separation = (start_displacement if overwrite else start_displacement.copy()).reshape(-1)
+    if start_displacement is not None and is_extrapolated:
+        separation = start_displacement.reshape(-1)
         separation *= scale / unit
         separation += given
     else:
-        separation = separation_under(pressure)
+        separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
 
     on_grid, cells = passes.Scatter(xp.zeros(gap.shape)), xp.flatnonzero(pressure)
     touching = cells.size  # number of cells in contact
@@ -210,7 +205,7 @@ def solve_contact(
         rounding = ROUNDING * total * (highest + grid.self_influence * found.highest_pressure)
 
         if size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
-            separation = separation_under(pressure)
+            separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
             is_extrapolated = False
             continue
 
@@ -273,7 +268,7 @@ def solve_contact(
         if is_extrapolated:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
-        passes.advance(pressure, separation, cells, held, trial, change, response, fraction)
+        passes.advance(pressure, separation, cells, (held, trial, change), response, fraction)
         previous = (cells, change, response, curvature) if curvature > 0 else None
         length *= min(max(minimum, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
@@ -292,7 +287,6 @@ def solve_contact(
         bound=math.sqrt(2 * duality / energy) if energy > 0 else 0.0,
         approach_error=duality / total * unit if total > 0 else 0.0,
         iterations=iteration,
-        convolutions=grid.convolutions - before,
     )
 
 
@@ -303,7 +297,7 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     rows, columns = (-(-xp.arange(m) * n // m) for n, m in sides)  # an odd number of cells: one is left out
     few = xp.stack([gap[xp.ix_(rows + i, columns + j)] for i in (0, 1) for j in (0, 1)]).mean(axis=0)
     found = solve_contact(coarse, few, load=load * few.size / gap.size, tolerance=COARSE_TOLERANCE)
-    grid.convolutions += found.convolutions
+    grid.convolutions += coarse.convolutions
     rows, columns = (xp.arange(n) * m // n for n, m in sides)
     return found.pressure[xp.ix_(rows, columns)]
 

@@ -125,8 +125,8 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
         same(*(one.admissible_fraction(held, trial, change, minimum) for one in (kernels, passes)))
     for fraction in (0.4, 1.0):
         both = [(pressure.copy(), separation.copy()) for _ in range(2)]
-        kernels.advance(*both[0], cells, held, trial, change, response, fraction)
-        passes.advance(*both[1], cells, held, trial, change, response, fraction)
+        kernels.advance(*both[0], cells, (held, trial, change), response, fraction)
+        passes.advance(*both[1], cells, (held, trial, change), response, fraction)
         same(*both)
 
 

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from references.dense import PERIOD, dense, half_space_symbol, line_profiles, rubber, slid
-from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE
@@ -131,9 +130,3 @@ def test_units__do_not_matter():
 def test_few_iterations__raise_the_error_that_they_reached():
     with pytest.raises(rv.ConvergenceError, match="after 3 iterations, expected 1e-06"):
         slid(ROUGH, rubber(100.0), 0.1, LOAD, tolerance=1e-6, max_iterations=3)
-
-
-@pytest.mark.parametrize("speed", [0.0, -1.0, math.inf, math.nan])
-def test_speed__is_positive(speed):
-    with refused("speed", speed):
-        slid(ROUGH, rubber(), speed, LOAD)

@@ -152,7 +152,7 @@ def test_thinned__passes_every_row_within_the_tolerance(rows, tolerance):
     [
         ({"load": 1}, "program"),
         (None, "program"),
-        ([{"cycle": {"mean": 1, "amplitude": 2, "period": 1, "cycles": 1}}], "program.0.cycle"),
+        ([{"cycle": {"mean": 1, "amplitude": 2, "period": 1, "cycles": 1}}], "program.0.cycle.amplitude"),
         ([{"table": {"times": [0, 2, 1], "values": [0, 1, 2]}}], "program.0.table.times.2"),
         ([{"table": {"file": "length.csv"}}], "program.0.table"),
         ([{"table": {"file": "named.csv"}}], "program.0.table"),
