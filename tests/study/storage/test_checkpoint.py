@@ -183,7 +183,7 @@ def test_stopped_run__goes_on_and_ends_with_the_same_bits(whole, tmp_path, name,
 
 
 @pytest.mark.parametrize("reports", [1, 2, 6])
-def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, reports):
+def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, caplog, reports):
     """In the middle of a pair of steps, or at its end, before the state is recorded."""
     case, expected, _ = whole(MODES)
     told = iter(range(reports))
@@ -196,6 +196,7 @@ def test_interrupt_between_a_row_and_its_state__repeats_no_row(whole, tmp_path, 
         run_case(case, tmp_path, progress=report)
     stopped(case, tmp_path, 3, checkpoint_seconds=0)
     assert values(run_case(case, tmp_path)) == expected
+    assert not caplog.records, "both times it went on"
 
 
 # ----------------------------------------------------------------------------------------------------------------
