@@ -230,14 +230,13 @@ def in_words(hint: Any, unit: str = "1") -> str:
     >>> in_words(float | str | None, "Pa"), in_words(Literal["x", "y"]), in_words(Sequence[float])
     ('a number [Pa], or text with a unit', "'x' or 'y'", 'a list')
     """
-    inner = [one for one in get_args(hint) if one is not type(None)]
-    if get_origin(hint) is Literal:
+    kind, inner = get_origin(hint), [one for one in get_args(hint) if one is not type(None)]
+    if kind is Literal:
         return " or ".join(map(repr, inner))
-    if get_origin(hint) in (Union, types.UnionType):
-        if float in inner and str in inner:
-            number = "a number, or a text" if unit == "1" else f"a number [{unit}], or text with a unit"
-            inner = [number, *(one for one in inner if one not in (float, str))]
-        return " or ".join(dict.fromkeys(one if isinstance(one, str) else in_words(one) for one in inner))
+    if kind in (Union, types.UnionType):
+        if {float, str} <= set(inner) and unit != "1":
+            others = [in_words(one) for one in inner if one not in (float, str)]
+            return " or ".join([f"a number [{unit}], or text with a unit", *others])
+        return " or ".join(dict.fromkeys(map(in_words, inner)))
     named = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
-    named |= {tuple: "a list", Sequence: "a list"}
-    return named.get(get_origin(hint) or hint, "a value")
+    return (named | {tuple: "a list", Sequence: "a list"}).get(kind or hint, "a value")

@@ -105,9 +105,5 @@ def printable(text: str) -> str:
     >>> printable("red \\x1b[31m")
     'red \\\\x1b[31m'
     """
-    return "".join(
-        sign.encode("unicode_escape").decode()
-        if sign != "\n" and unicodedata.category(sign) in ("Cc", "Cf", "Cs")
-        else sign
-        for sign in text
-    )
+    hidden = {sign for sign in text if unicodedata.category(sign) in ("Cc", "Cf", "Cs")} - {"\n"}
+    return text.translate({ord(sign): sign.encode("unicode_escape").decode() for sign in hidden})

@@ -84,11 +84,7 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
     >>> warnings_of({"warnings": "slope: too steep"})
     {'slope': 'too steep'}
     """
-    found = {}
-    for line in str(attributes.get("warnings", "")).splitlines():
-        subject, text = line.split(": ", 1)
-        found[subject] = text
-    return found
+    return dict(line.split(": ", 1) for line in str(attributes.get("warnings", "")).splitlines())
 
 
 def warnings_text(warnings: Mapping[str, str]) -> str:

@@ -31,8 +31,7 @@ class Bars(Progress):
 
     def __init__(self, console: Console | None = None) -> None:
         console = console or Console(stderr=True)
-        notebook = console.is_jupyter and find_spec("ipywidgets") is not None
-        terminal = console.is_terminal and not console.is_dumb_terminal
+        draws = find_spec("ipywidgets") if console.is_jupyter else console.is_terminal and not console.is_dumb_terminal
         super().__init__(
             TextColumn("{task.description}", markup=False),
             BarColumn(20),
@@ -40,7 +39,7 @@ class Bars(Progress):
             TimeRemainingColumn(compact=True),
             console=console,
             transient=True,
-            disable=console.quiet or not (terminal or notebook),
+            disable=console.quiet or not draws,
             speed_estimate_period=_RECENT,
         )
         self._labels: dict[str, TaskID] = {}

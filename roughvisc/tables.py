@@ -86,16 +86,12 @@ def decimal_mark(cells: Iterable[str], separator: str) -> str:
     (',', '.', ',')
     """
     cells = list(cells)
-    commas = [cell for cell in cells if "," in cell and plain_number(cell, ",")]
-    if not commas:
-        return "."
-    for cell in cells:
-        if "." in cell and plain_number(cell, "."):
-            raise InputError(f"holds {commas[0]!r} and {cell!r}: expected one decimal mark")
-    if separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
-        ambiguous = f"holds {commas[0]!r}, which may have a decimal comma or be thousands"
-        raise InputError(f"{ambiguous}: expected a decimal point")
-    return ","
+    commas, points = ([cell for cell in cells if mark in cell and plain_number(cell, mark)] for mark in ",.")
+    if commas and points:
+        raise InputError(f"holds {commas[0]!r} and {points[0]!r}: expected one decimal mark")
+    if commas and separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
+        raise InputError(f"holds {commas[0]!r}, a decimal number or thousands: expected a decimal point")
+    return "," if commas else "."
 
 
 def plain_number(cell: str, mark: str) -> str | None:
@@ -185,8 +181,7 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     }
     for row, cells in below:
         if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
-            expected = f"{len(heading)}, one for each column"
-            raise InputError(f"{path}, line {row}: found {len(cells)} cells: expected {expected}")
+            raise InputError(f"{path}, line {row}: found {len(cells)} cells: expected {len(heading)}, as above")
     texts = {key: [cells[at] if at < len(cells) else "" for _, cells in below] for key, (at, *_) in places.items()}
     try:
         mark = decimal_mark((cell for column in texts.values() for cell in column), separator)
@@ -248,10 +243,8 @@ def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mappin
     """Return the error of a table without a heading; it states the heading to write."""
     sign = {",": ", ", ";": "; "}.get(separator, separator)
     write = sign.join(_example(one.name, one.unit) for one in wanted.values() if not one.optional)
-    found = "holds no rows"
-    if rows:
-        line, widest = max(rows[:_FIRST], key=lambda row: len(row[1]))  # the first of them
-        found = f"found {sign.join(widest)[:200]!r} in line {line}"
+    line, widest = max(rows[:_FIRST], key=lambda row: len(row[1]), default=(0, ["no rows"]))
+    found = f"found {sign.join(widest)[:200]!r} in line {line}"
     return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
 
 
@@ -274,12 +267,7 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
         found, expected = names[0], _example(names[0], one.unit)
         message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
         raise InputError(message, found=found, expected=expected)
-    if unit == one.unit:
-        return 1.0
-    if one.unit in FREQUENCY_UNITS:
-        text = f"{path}: unit of {key}: found {unit!r}: expected {one.unit!r}, as stated"
-        raise InputError(text, found=unit, expected=one.unit)
     try:
-        return number(f"1 {unit}", one.unit)
+        return 1.0 if unit == one.unit else number(f"1 {unit}", one.unit)
     except InputError as error:
         raise error.prefixed(f"{path}: unit of {key}") from error

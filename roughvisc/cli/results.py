@@ -107,10 +107,9 @@ def audit(result: Path, **properties: Any) -> None:
     from roughvisc.study.storage.folder import results_at
 
     given = {name: value for name, value in properties.items() if value is not None}
-    console = screen()
-    for number, path in enumerate(results_at(result)):
+    for path in results_at(result):
         with rv.open_result(path) as dataset:
-            console.print(*([""] if number else []), audit_table(rv.audit(dataset, **given)), sep="\n")
+            screen().print(audit_table(rv.audit(dataset, **given)), "", sep="\n")
 
 
 @click.command()
@@ -151,7 +150,6 @@ def clean(results: Path, everything: bool) -> None:
     """
     from roughvisc.study.storage.index import clean_folder
 
-    removed = clean_folder(results, everything=everything)
-    for path in removed:
+    for path in (removed := clean_folder(results, everything=everything)):
         click.echo(printable(f"removed {path.name}"))
     click.echo(f"{counted(len(removed), 'leftover')} removed")

@@ -11,18 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import (
-    PATH,
-    QUIET,
-    WORKERS,
-    Failure,
-    complain,
-    quantity,
-    say,
-    say_figures,
-    say_path,
-    screen,
-)
+from roughvisc.cli.group import PATH, QUIET, WORKERS, Failure, complain, quantity, say, say_figures, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:

@@ -36,11 +36,6 @@ NUMERICS_REVISION = 50
 
 
 @cache
-def program() -> str:
-    """Return name and version of this program, as the source of results."""
-    return f"roughvisc {metadata.version('roughvisc')}"
-
-
 def program_version() -> str:
     """Return name and version of this program, and the revision of its numbers.
 
@@ -49,7 +44,7 @@ def program_version() -> str:
     >>> program_version()  # doctest: +SKIP
     'roughvisc 0.1.dev493+g9bdb14a83 (numerics 15)'
     """
-    return f"{program()} (numerics {NUMERICS_REVISION})"
+    return f"roughvisc {metadata.version('roughvisc')} (numerics {NUMERICS_REVISION})"
 
 
 @dataclass(frozen=True)
@@ -116,8 +111,7 @@ class Case:
             If the study states friction, which has no program.
         """
         if not isinstance(self.experiment, Loading):
-            error = InputError(key="friction", found="steady sliding", expected="[[program]] tables")
-            raise error.prefixed(str(self.origin)) if self.origin else error
+            raise InputError(key="friction", found="steady sliding", expected="[[program]] tables")
         return self.experiment.program
 
     @property
@@ -179,8 +173,7 @@ class Case:
             raise error.prefixed(source) from error
         if is_changed:
             changed = f"{self.surface.get('file', 'the second face')}: was changed after the study was read"
-            expected = "the heights that the case's key stands for; run the study again for the new ones"
-            raise RoughviscError(f"{source}: surface: {changed}: expected {expected}", transient=True)
+            raise RoughviscError(f"{source}: surface: {changed}: run the study again", transient=True)
         return height
 
     def to_json(self) -> str:
@@ -192,10 +185,8 @@ class Case:
     def from_json(cls, text: str) -> Case:
         """Make a case from the JSON of :meth:`to_json`, which is also the attribute ``case`` of a result."""
         try:
-            data = json.loads(text)
-            if not isinstance(data, dict):
-                raise InputError("found no JSON object")
-        except (ValueError, RecursionError) as error:
+            data = dict(json.loads(text))
+        except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
         origin, varied = data.pop("origin", None), data.pop("varied", {})
         return replace(_case_of(data, origin and Path(origin), None), varied=varied)
@@ -333,12 +324,10 @@ def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
     found = []
     for face in _faces(surface):
         if "file" not in face:
-            steps = ("second", "missing", "flip", "offset", *STEPS)
-            found.append((_digest(split(face, *steps)[1]), ""))
+            found.append((_digest(split(face, "second", "missing", "flip", "offset", *STEPS)[1]), ""))
             continue
-        path, card = Path(face["file"]), {}
-        if is_card(path, face.get("format")):
-            card = split(read_card(path)[1], "file")[1]
+        path = Path(face["file"])
+        card = split(read_card(path)[1], "file")[1] if is_card(path, face.get("format")) else {}
         scan = measured_file(path, face.get("format"))
         try:
             found.append((_digest(card) if scan is None else sha256(scan), _digest(card) if card else ""))

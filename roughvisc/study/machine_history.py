@@ -78,33 +78,33 @@ def read_history(
     chosen = {control: name for control, name in columns.items() if name is not None} or {"load": "load"}
     if len(chosen) > 1:
         raise InputError(key="load", found=list(chosen), expected="one prescribed column")
-    control, column = next(iter(chosen.items()))
+    ((control, column),) = chosen.items()
     unit = UNITS[control]
     is_part = isinstance(thin, str) and is_quantity(thin, "1")
     limit = number(thin, "1" if is_part else unit, "thin", least=0)
     offset, scale = number(zero, unit, "zero"), number(factor, "1", "factor")
-    for key, name in (("time", time), (control, column)):
-        if not name.strip():
-            raise InputError(key=key, found=name, expected="the name of a column")
-    wanted = {"time": Wanted(time, "s"), control: Wanted(column, unit)}
-    found, lines = read_table(path, wanted)
+    found, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
     measured = found["time"]
-    for at in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
-        raise InputError(
-            f"{path}, line {lines[at]}: time {measured[at]:g} s after {measured[at - 1]:g} s: expected increasing times"
-        )
-    for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
-        raise InputError(
-            f"{path}, lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s: expected at most two, "
-            "which are a jump; export the times with more digits"
-        )
     start = float(measured[0])
+    for at in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
+        told = f"time {measured[at]:g} s after {measured[at - 1]:g} s"
+        raise InputError(f"{path}, line {lines[at]}: {told}: expected increasing times")
+    for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
+        told = f"lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s"
+        raise InputError(f"{path}, {told}: expected at most two, which are a jump; export more digits")
     times, values = _less(measured, start), _less(found[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
-    if control in LEAST:
-        notes += _noise_note(path, control, measured, values)
+    largest, lowest = float(np.max(np.abs(values))), float(values.min())
+    if control in LEAST and lowest < 0:
+        highest = max(float(values.max()), 0.0)
+        if lowest < -_NOISE * highest:
+            turn = " Does the machine count compression negative? Then factor = -1." if -lowest > highest else ""
+            raise InputError(
+                f"{path}: {control} falls to {lowest:.3g} {unit} at {times[values.argmin()]:g} s: expected none below "
+                f"zero by more than {100 * _NOISE:g} % of the largest {control} (`zero` takes an offset off).{turn}"
+            )
+        notes.append(f"{(values < 0).sum()} rows below zero count as zero, the lowest {lowest:.3g} {unit}")
         values = np.maximum(values, 0.0)
-    largest = float(np.max(np.abs(values)))
     tolerance = limit * largest if is_part else limit
     if abs(values[0]) <= tolerance:
         values[0] = 0.0
@@ -113,21 +113,6 @@ def read_history(
     if tolerance:
         lead += f", which pass every row within {tolerance:.3g} {unit}"
     return control, times[kept].tolist(), values[kept].tolist(), "; ".join([lead, *notes]) + "."
-
-
-def _noise_note(path: str | Path, control: Control, times: Array, values: Array) -> list[str]:
-    """Return a note on noise below zero, which counts as zero; refuse lower values."""
-    unit, largest, lowest = UNITS[control], max(float(values.max()), 0.0), float(values.min())
-    if lowest < -_NOISE * largest:
-        at = int(np.argmin(values))
-        turn = " Does the machine count compression negative? Then factor = -1." if -lowest > largest else ""
-        raise InputError(
-            f"{path}: {control} falls to {lowest:.3g} {unit} at {times[at]:g} s: expected none below zero by more than "
-            f"{100 * _NOISE:g} % of the largest {control} (`zero` takes an offset off).{turn}"
-        )
-    below = int(np.count_nonzero(values < 0))
-    rows = "row below zero counts" if below == 1 else "rows below zero count"
-    return [f"{below:,} {rows} as zero, the lowest {lowest:.3g} {unit}"] if below else []
 
 
 def _less(values: Array, zero: float) -> Array:

@@ -14,18 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from roughvisc.arguments import (
-    a_table,
-    call,
-    check,
-    located,
-    one_key,
-    one_of,
-    refuse_unknown,
-    split,
-    suits,
-    units_of,
-)
+from roughvisc.arguments import a_table, call, check, located, one_key, one_of, refuse_unknown, split, suits, units_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -40,6 +29,7 @@ from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
 from roughvisc.study.audit import audit
 from roughvisc.study.machine_history import read_history
+from roughvisc.study.sweep_table import value_at
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
@@ -54,11 +44,7 @@ TEMPERATURE = ("temperature", "reference_temperature", "wlf_c1", "wlf_c2", "acti
 GEOMETRY = ("thickness", "base", "on")
 #: Method of each segment of a program, by the key of its first argument; and functions that make programs from a table.
 SEGMENTS: dict[str, Callable[..., Program]] = {
-    "load": Program.load,
-    "pressure": Program.pressure,
-    "approach": Program.approach,
-    "hold": Program.hold,
-    "slide": Program.slide,
+    name: getattr(Program, name) for name in ("load", "pressure", "approach", "hold", "slide")
 }
 PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": Program.table}
 #: Table of each setting.
@@ -162,12 +148,9 @@ def _unit(key: str, tables: Mapping[str, Any]) -> str:
     names = [part for part in path if not part.isdecimal()]
     if not names or key == "keep.times":  # a number in keep.times is a number of times
         return ""
-    if table == "program" and not path[0].isdecimal():
-        return ""
     if table == "program" and names[-1] in ("mean", "amplitude", "values"):
-        segments = tables.get("program") or []
-        here = segments[int(path[0])] if int(path[0]) < len(segments) else None
-        return UNITS.get(str(here.get("control", "load")), "") if isinstance(here, Mapping) else ""
+        segment = value_at(tables, f"program.{path[0]}", None)
+        return UNITS.get(str(segment.get("control", "load")), "") if isinstance(segment, Mapping) else ""
     return _UNITS.get(names[-1], "")
 
 

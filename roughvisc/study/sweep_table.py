@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from glob import glob
 from pathlib import Path
 from typing import Any
 
-from roughvisc.arguments import a_table, dotted
+from roughvisc.arguments import a_table, dotted, suits
 from roughvisc.errors import InputError, short_repr
 
 #: Keys of the number of realisations in a sweep, and of the number of a realisation in a case.
@@ -47,8 +47,7 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
         influence results, or the surface has no realisations.
     """
     found: list[tuple[dict[str, Any], dict[str, int]]] = []
-    named = [_with_files(one, folder) for one in sweep] if isinstance(sweep, list) else _with_files(sweep, folder)
-    for change in expand(named):
+    for change in expand(sweep, folder):
         for key in change:
             if key.partition(".")[0] in ("observe", "audit"):
                 expected = "a value in its own table, since it changes no result"
@@ -60,14 +59,11 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
     return found
 
 
-def expand(sweep: Any) -> list[dict[str, Any]]:
-    """Return the changes of each case of a sweep, without realisations: dotted key -> value.
+def expand(sweep: Any, folder: Path = Path()) -> list[dict[str, Any]]:
+    """Return the changes of each case: dotted key -> value.
 
-    Parameters
-    ----------
-    sweep : dict or list of dict
-        ``[sweep]``: every combination of the lists; ``[[sweep]]``: the lists of a table entry by entry, table after
-        table. A single value in ``[[sweep]]`` applies to its whole table.
+    The lists of ``[sweep]`` are multiplied, the last key varying fastest. The lists of ``[[sweep]]`` have equal length
+    and are combined entry by entry. A single value in ``[[sweep]]`` applies to its whole table.
 
     Examples
     --------
@@ -76,25 +72,29 @@ def expand(sweep: Any) -> list[dict[str, Any]]:
     >>> expand([{"a": [1, 2], "b": [3, 4]}, {"a": 5}])
     [{'a': 1, 'b': 3}, {'a': 2, 'b': 4}, {'a': 5}]
     """
-    if isinstance(sweep, list) and all(isinstance(table, Mapping) and table for table in sweep):
-        found = []
-        for number, table in enumerate(sweep):
-            stated = dict(_flat(table))
-            lengths = {key: len(values) for key, values in stated.items() if isinstance(values, list)}
-            if len(set(lengths.values())) > 1 or 0 in lengths.values():
-                raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
-            for entry in range(max(lengths.values(), default=1)):
-                found.append({key: one[entry] if isinstance(one, list) else one for key, one in stated.items()})
-        return found
-    if not isinstance(sweep, Mapping):
+    tables = sweep if isinstance(sweep, list) else [sweep]
+    if not tables or not all(isinstance(table, Mapping) for table in tables):
         raise InputError(key="sweep", found=sweep, expected="a table of lists, or [[sweep]] tables")
-    lists = {key: [value] if key == REALISATIONS else value for key, value in _flat(sweep)}
-    for key, values in lists.items():
-        if not isinstance(values, list) or not values:
-            raise InputError(key=f"sweep.{key}", found=values, expected="a list of values")
-    if (count := math.prod(map(len, lists.values()))) > MOST_CASES:
-        raise InputError(key="sweep", found=f"{count} cases", expected=f"at most {MOST_CASES}")
-    return [dict(zip(lists, chosen, strict=True)) for chosen in itertools.product(*lists.values())]
+    found: list[dict[str, Any]] = []
+    for number, table in enumerate(tables):
+        lists = {key: _matching(key, value, folder) for key, value in _flat(table)}
+        if tables is sweep:
+            lengths = {key: len(values) for key, values in lists.items() if isinstance(values, list)}
+            if not table or len(set(lengths.values())) > 1 or 0 in lengths.values():
+                raise InputError(key=f"sweep.{number}", found=lengths, expected="lists of one length, at least 1")
+            count = max(lengths.values(), default=1)
+            columns = [values if key in lengths else [values] * count for key, values in lists.items()]
+            chosen: Iterable[Any] = zip(*columns, strict=True)
+        else:
+            lists |= {key: [value] for key, value in lists.items() if key == REALISATIONS}
+            for key, values in lists.items():
+                if not isinstance(values, list) or not values:
+                    raise InputError(key=f"sweep.{key}", found=values, expected="a list of values")
+            if (count := math.prod(map(len, lists.values()))) > MOST_CASES:
+                raise InputError(key="sweep", found=f"{count} cases", expected=f"at most {MOST_CASES}")
+            chosen = itertools.product(*lists.values())
+        found += [dict(zip(lists, values, strict=True)) for values in chosen]
+    return found
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -106,33 +106,29 @@ def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]
             yield f"{above}{key}", value
 
 
-def _with_files(table: Any, folder: Path) -> Any:
-    """Return a table of a sweep with the names of files, sorted, for each pattern such as ``"scans/*.sur"``.
+def _matching(key: str, value: Any, folder: Path) -> Any:
+    """Return a value of a sweep with the names of files, sorted, for each pattern such as ``"scans/*.sur"``.
 
     The name of an existing file is not a pattern.
     """
-    if not isinstance(table, Mapping):
-        return table
-    named = dict(_flat(table))
-    for key, value in named.items():
-        found: list[Any] = []
-        for one in value if isinstance(value, list) else [value]:
-            is_pattern = isinstance(one, str) and set("*?[") & set(one) and not (folder / one).exists()
-            if key.rpartition(".")[2] != "file" or not is_pattern:
-                found.append(one)
-                continue
-            pattern = os.path.expanduser(one)
-            matches = [name for name in glob(pattern, root_dir=folder, recursive=True) if (folder / name).is_file()]
-            if not matches:
-                where = "" if os.path.isabs(pattern) else f" in {folder.absolute()}"
-                raise InputError(key=f"sweep.{key}", found=one, expected=f"a pattern that matches a file{where}")
-            found += sorted(matches)
-        named[key] = value if found == [value] else found
-    return named
+    if key.rpartition(".")[2] != "file":
+        return value
+    found: list[Any] = []
+    for one in value if isinstance(value, list) else [value]:
+        if not isinstance(one, str) or not set("*?[") & set(one) or (folder / one).exists():
+            found.append(one)
+            continue
+        names = glob(os.path.expanduser(one), root_dir=folder, recursive=True)
+        matches = sorted(name for name in names if (folder / name).is_file())
+        if not matches:
+            expected = f"a pattern that matches a file in {folder.absolute()}"
+            raise InputError(key=f"sweep.{key}", found=one, expected=expected)
+        found += matches
+    return value if found == [value] else found
 
 
 def _realisations(
-    change: Mapping[str, Any], count: Any, data: Mapping[str, Any]
+    change: dict[str, Any], count: Any, data: Mapping[str, Any]
 ) -> list[tuple[dict[str, Any], dict[str, int]]]:
     """Return the changes of a case for each of its realisations, and the number of each.
 
@@ -140,17 +136,19 @@ def _realisations(
     beginning with the stated seeds; the stated seeds of two faces decide whether any faces are equal.
     """
     where = f"sweep.{REALISATIONS}"
-    if not isinstance(count, int) or isinstance(count, bool) or not 2 <= count <= MOST:
+    if not suits(count, int) or not 2 <= count <= MOST:
         raise InputError(key=where, found=count, expected=f"a whole number from 2 to {MOST}")
     for key, value in change.items():
-        data = place(data, key, value) if key.partition(".")[0] == "surface" else data
+        data = place(data, key, value) if key.startswith("surface") else data
     surface = a_table("surface", data.get("surface"))
     faces = {_SEED: surface, _SECOND_SEED: a_table("surface.second", surface.get("second", {}))}
     if stated := [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface):
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
     if any("file" in face for face in faces.values()):
-        surrogates = [{SURROGATE: number} for number in range(1, count + 1)]
-        return [({**change, **one}, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
+        return [
+            (change | ({SURROGATE: number} if number != ITSELF else {}), {REALISATION: number})
+            for number in range(ITSELF, count + 1)
+        ]
     seeds = {key: face.get("seed") for key, face in faces.items() if face.get("generate") == "self_affine"}
     if not seeds:
         made = f"generate = {surface.get('generate')!r}"
@@ -161,8 +159,8 @@ def _realisations(
             expected = f"a whole number as {key}, and {key.removesuffix('seed')}amplitudes: {kinds}"
             raise InputError(key=where, found=count, expected=expected)
     return [
-        ({**change, **{key: seed + number - 1 for key, seed in seeds.items()}}, {REALISATION: number})
-        for number in range(1, count + 1)
+        (change | {key: seed + number for key, seed in seeds.items()}, {REALISATION: number + 1})
+        for number in range(count)
     ]
 
 

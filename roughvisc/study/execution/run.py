@@ -21,7 +21,7 @@ from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
-from roughvisc.study.case import Case, program, program_version
+from roughvisc.study.case import Case, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.folder import (
     checkpoint_path,
@@ -100,7 +100,7 @@ def compute(
     if "speed" in dataset:
         dataset = dataset.assign(reduced_speed=("speed", case.shift_factor * dataset["speed"].values))
     now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
-    ran = f"{now} {program()}: run of {case.origin.name if case.origin else 'a case'}"
+    ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
         "Conventions": "CF-1.11",
         "title": case.title + "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items()),

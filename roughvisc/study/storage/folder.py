@@ -22,7 +22,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from roughvisc.errors import InputError
-from roughvisc.study.case import Case, program
+from roughvisc.study.case import Case, program_version
 
 log = logging.getLogger("roughvisc")
 
@@ -216,7 +216,7 @@ def record_path(folder: Path, key: str) -> Path:
 
 def record_failure(folder: Path, case: Case, **what: str) -> None:
     """Write the record of a failed case: its message, error and traceback, the program, and the case."""
-    record = what | {"source": program(), "case": json.loads(case.to_json())}
+    record = what | {"source": program_version(), "case": json.loads(case.to_json())}
     write_text(record_path(folder, case.key), json.dumps(record, indent=1))
 
 
