@@ -231,7 +231,7 @@ def rows(name):
             unit = "-"  # the name of a column
         unit = (
             unit
-            or unit_of(f"{above}.{key}")
+            or unit_of(f"{above}.{key}").removeprefix("1")
             or units_of(function).get(argument, "").removeprefix("1")
         )
         columns = COLUMNS.get(name.removeprefix("material: "), {})

@@ -299,8 +299,7 @@ def _changed(
 
 def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) -> Case:
     """Return the checked case of the tables of a study; without a folder, paths are not resolved."""
-    stated = with_files(data, folder)
-    tables = in_si(stated, "", stated)
+    tables = with_files(data, folder)
     try:
         return Case(tables, origin, **parts_of(tables))
     except InputError as error:
@@ -309,7 +308,7 @@ def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) 
             if file is not None and key.startswith("material"):  # its columns have replaced its name in the table
                 raise error.prefixed(str(file)) from error
         text = value_at(data, error.key, None)
-        if in_si(text, error.key, data) != error.found:
+        if text is None or in_si(text, error.key, data, folder) != error.found:
             raise
         message = str(error).replace(repr(error.found), repr(text))
         raise type(error)(message, key=error.key, found=text, expected=error.expected) from error

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -82,8 +83,8 @@ _UNITS |= {"wlf_c2": "K", "shift_factor": "1", "modulus_factor": "1", "from": "m
 _UNITS |= UNITS | {"over": "s", "hold": "s", "period": "s", "times": "s", "slide": "m", "speed": "m/s", "cycles": "1"}
 
 
-def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
-    """Return a value of a study in SI.
+def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None = None) -> Any:
+    """Return a value of a study in SI, with absolute paths.
 
     Parameters
     ----------
@@ -93,6 +94,8 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
         Dotted key of the value.
     tables : mapping
         Tables of the case, for units that depend on another key.
+    folder : Path, optional
+        Folder of relative paths. Without one, paths are not checked: the files of a stored case may have moved.
 
     Returns
     -------
@@ -102,15 +105,22 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     Raises
     ------
     InputError
-        If an integer exceeds the largest number of double precision.
+        If a file does not exist, or an integer exceeds the largest number of double precision.
     """
+    if key.endswith(".file"):
+        if not isinstance(value, str) or not value:
+            raise InputError(key=key, found=value, expected="the path of a file")
+        path = (folder / Path(value).expanduser()).resolve() if folder else Path(value)
+        if folder and not path.is_file():
+            raise InputError(key=key, found=value, expected=f"an existing file, but there is none at {path}")
+        return str(path)
     if isinstance(value, Mapping):
-        return {name: in_si(one, f"{key}.{name}" if key else name, tables) for name, one in value.items()}
+        return {name: in_si(one, f"{key}.{name}" if key else name, tables, folder) for name, one in value.items()}
     if isinstance(value, list | tuple):
-        return [in_si(one, f"{key}.{number}", tables) for number, one in enumerate(value)]
+        return [in_si(one, f"{key}.{number}", tables, folder) for number, one in enumerate(value)]
     if isinstance(value, float | bool) or value is None:
         return value
-    unit = _unit(key, tables)
+    unit = unit_of(key, tables)
     if unit and isinstance(value, str):
         with suppress(InputError):
             return number(value, unit, difference=key.endswith("wlf_c2"))
@@ -121,8 +131,8 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any]) -> Any:
     return value
 
 
-def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
-    """Return the unit of the value at a dotted key of a study; empty if it has none.
+def unit_of(key: str, case: Mapping[str, Any] = MappingProxyType({})) -> str:
+    """Return the unit of the value at a dotted key of a study: ``"1"`` for a pure number, empty if it has none.
 
     Parameters
     ----------
@@ -138,18 +148,12 @@ def unit_of(key: str, case: Mapping[str, Any] | None = None) -> str:
     >>> unit_of("program.0.cycle.amplitude", {"program": [{"cycle": {}, "control": "approach"}]})
     'm'
     """
-    unit = _unit(key, case or {})
-    return "" if unit == "1" else unit
-
-
-def _unit(key: str, tables: Mapping[str, Any]) -> str:
-    """Return the unit of the value at a dotted key; ``"1"`` for a pure number."""
     table, *path = key.split(".")
     names = [part for part in path if not part.isdecimal()]
     if not names or key == "keep.times":  # a number in keep.times is a number of times
         return ""
     if table == "program" and names[-1] in ("mean", "amplitude", "values"):
-        segment = value_at(tables, f"program.{path[0]}", None)
+        segment = value_at(case, f"program.{path[0]}", None)
         return UNITS.get(str(segment.get("control", "load")), "") if isinstance(segment, Mapping) else ""
     return _UNITS.get(names[-1], "")
 
@@ -171,38 +175,19 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     Returns
     -------
     dict
-        The tables with absolute paths of scans, the content of CSV files, and the speeds of a friction curve in order.
+        The tables in SI, with absolute paths of scans, the content of CSV files, and speeds in order.
     """
     refuse_unknown("", data, TABLES)
     for name in ("surface", "material"):
         if name not in data:
             raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
-    tables = {name: with_paths(name, table, folder) for name, table in data.items()}
+    tables = in_si(data, "", data, folder)
     tables["material"] = with_columns("material", tables["material"])
     if isinstance(segments := tables.get("program"), list):
         tables["program"] = [with_rows(f"program.{place}", one) for place, one in enumerate(segments)]
     if isinstance(friction := tables.get("friction"), Mapping) and "speeds" in friction:
         tables["friction"] = {**friction, "speeds": speeds_of("friction.speeds", friction["speeds"])}
     return tables
-
-
-def with_paths(where: str, stated: Any, folder: Path | None) -> Any:
-    """Return a value of a study in which every ``file`` of a table is the absolute path of an existing file."""
-    if isinstance(stated, list):
-        return [with_paths(f"{where}.{place}", one, folder) for place, one in enumerate(stated)]
-    if not isinstance(stated, Mapping):
-        return stated
-    table = {key: with_paths(f"{where}.{key}", one, folder) for key, one in stated.items()}
-    if "file" in table:
-        file, key = table["file"], f"{where}.file"
-        if not isinstance(file, str) or not file:
-            raise InputError(key=key, found=file, expected="the path of a file")
-        if folder is not None:  # otherwise the case is a stored one, whose file may have been moved
-            path = (folder / Path(file).expanduser()).resolve()
-            if not path.is_file():
-                raise InputError(key=key, found=file, expected=f"an existing file, but there is none at {path}")
-            table["file"] = str(path)
-    return table
 
 
 def with_columns(where: str, stated: Any) -> dict[str, Any]:
@@ -279,7 +264,14 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
     else:
         experiment = call(SteadySliding, "friction", a_table("friction", tables["friction"]))
     settings = settings_of(tables, experiment)
-    check_observed(a_table("observe", tables.get("observe", {})), settings)
+    observe = a_table("observe", tables.get("observe", {}))
+    refuse_unknown("observe", observe, OBSERVABLES)
+    for name, stated in observe.items():
+        arguments = a_table(f"observe.{name}", stated)
+        check(OBSERVABLES[name], f"observe.{name}", arguments)
+        if not set(_NEEDS[name]) & set(settings.fields):
+            expected = f"{' or '.join(map(repr, _NEEDS[name]))} in keep.fields"
+            raise InputError(key=f"observe.{name}", found=arguments, expected=expected)
     check(audit, "audit", a_table("audit", tables.get("audit", {})))
     return {"title": title, "body": body, "experiment": experiment, "settings": settings}
 
@@ -379,14 +371,3 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         key = f"{TABLE_OF[name]}.{name}"
         raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)
     return settings
-
-
-def check_observed(observe: Mapping[str, Any], settings: Settings) -> None:
-    """Check the arguments of each observable of the table ``[observe]``, and that its fields are kept."""
-    refuse_unknown("observe", observe, OBSERVABLES)
-    for name, stated in observe.items():
-        where, arguments = f"observe.{name}", a_table(f"observe.{name}", stated)
-        check(OBSERVABLES[name], where, arguments)
-        if not set(_NEEDS[name]) & set(settings.fields):
-            expected = f"{' or '.join(map(repr, _NEEDS[name]))} in keep.fields"
-            raise InputError(key=where, found=arguments, expected=expected)

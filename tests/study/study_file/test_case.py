@@ -247,7 +247,7 @@ def test_key__knows_a_scan_by_its_content(read_one, tmp_path):
 def test_unit_of__other_keys_and_parts_of_values():
     lengths = ("size", "spacing", "crop.x", "crop.x.0", "shortest_wave", "filter", "filter.cutoff")
     assert {unit_of(f"surface.{key}") for key in lengths} == {"m"}
-    material = {"times.0": "s", "b.viscosity": "Pa s", "temperature": "K", "on.on.thickness": "m", "poisson": ""}
+    material = {"times.0": "s", "b.viscosity": "Pa s", "temperature": "K", "on.on.thickness": "m", "poisson": "1"}
     assert {key: unit_of(f"material.{key}") for key in material} == material
     found = [unit_of(key) for key in ("solve.time_step", "friction.load", "friction.speeds")]
     assert found == ["s", "N", "m/s"]
