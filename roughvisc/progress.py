@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -43,21 +42,18 @@ class Bars(Progress):
             speed_estimate_period=_RECENT,
         )
         self._labels: dict[str, TaskID] = {}
-        self._moving = threading.Lock()
         self._line_at = time.monotonic()
 
     def reached(self, label: str, now: float, end: float, at: str = "") -> None:
-        """Move the bar of a computation, from any thread; both are zero at its start, and `at` describes them."""
-        with self._moving:
-            if label not in self._labels:
-                self._labels[label] = self.add_task(printable(label), at="")
-            self.update(self._labels[label], completed=now, total=end or None, at=at or "starting")
+        """Move the bar of a computation; both are zero at its start, and `at` describes them."""
+        if label not in self._labels:
+            self._labels[label] = self.add_task(printable(label), at="")
+        self.update(self._labels[label], completed=now, total=end or None, at=at or "starting")
 
     def close(self, label: str) -> None:
         """Remove the bar of a computation, if there is one."""
-        with self._moving:
-            if label in self._labels:
-                self.remove_task(self._labels.pop(label))
+        if label in self._labels:
+            self.remove_task(self._labels.pop(label))
 
     def line(self, label: str) -> None:
         """Write a line on a computation, if bars are not drawn and some time has passed since the last line."""

@@ -29,17 +29,9 @@ WORKERS = click.option(
 QUIET = click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
 
 
-def number_or_text(text: str) -> float | str:
-    """Return the value of an option: a number in SI, or text with a unit, which the functions of the package check."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 def quantity(name: str, metavar: str, meaning: str, **settings: Any) -> Any:
-    """Return an option whose value is a quantity."""
-    return click.option(name, type=number_or_text, metavar=metavar, help=meaning, **settings)
+    """Return an option whose value is text with a unit, which the functions of the package check."""
+    return click.option(name, metavar=metavar, help=meaning, **settings)
 
 
 class Failure(click.ClickException):

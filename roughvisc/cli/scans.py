@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, number_or_text, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def _sides(text: str) -> Any:
     """Return one length, or two separated by a comma."""
-    sides = tuple(number_or_text(part.strip()) for part in text.split(","))
+    sides = tuple(part.strip() for part in text.split(","))
     return sides[0] if len(sides) == 1 else sides
 
 
@@ -123,7 +123,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
 @click.option("-o", "--out", type=PATH, help="Study file to write. [default: FILE's name-study.toml, here]")
 @quantity("--contact", "PART", "Final contact fraction, which sets the pressure.", default="5 %", show_default=True)
 @_reading
-def new(file: Path | None, out: Path | None, contact: Any, **options: Any) -> None:
+def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> None:
     """Write a first study for a scan, or for an example.
 
     The study file is commented and ready to run or edit. It uses the preprocessing that `roughvisc scan` recommends.

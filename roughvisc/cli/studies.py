@@ -179,7 +179,7 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
 @quantity("--accuracy", "PART", "Target relative error.", default="1%", show_default=True)
 @click.option("--quantity", help="Quantity of this error. [default: contact_area, or friction_coefficient]")
 @QUIET
-def trade(study: Path, out: Path | None, accuracy: Any, quantity: str | None, quiet: bool) -> None:
+def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, quiet: bool) -> None:
     """Measure the cost and the error of several tolerances and grids.
 
     Each run is timed and compared with the finest run. Marks the cheapest setting whose error is at most --accuracy.
