@@ -299,8 +299,8 @@ def _changed(
 
 def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) -> Case:
     """Return the checked case of the tables of a study; without a folder, paths are not resolved."""
-    tables = with_files(data, folder)
     try:
+        tables = with_files(data, folder)
         return Case(tables, origin, **parts_of(tables))
     except InputError as error:
         for key in (error.key, error.key.rpartition(".")[0]):
@@ -308,7 +308,7 @@ def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) 
             if file is not None and key.startswith("material"):  # its columns have replaced its name in the table
                 raise error.prefixed(str(file)) from error
         text = value_at(data, error.key, None)
-        if text is None or in_si(text, error.key, data, folder) != error.found:
+        if text == error.found or in_si(text, error.key, data, folder) != error.found:
             raise
         message = str(error).replace(repr(error.found), repr(text))
         raise type(error)(message, key=error.key, found=text, expected=error.expected) from error
