@@ -18,7 +18,7 @@ REALISATIONS, REALISATION = "realisations", "realisation"
 #: Number of the measured surface, which comes before its surrogates.
 ITSELF = 0
 #: Keys that a realisation changes.
-SURROGATE, _SEED, _SECOND_SEED = DRAWN = ("surface.realisation", "surface.seed", "surface.second.seed")
+SURROGATE, _SEED = DRAWN = ("surface.realisation", "surface.seed")
 #: Largest numbers of realisations and of cases.
 MOST, MOST_CASES = 10_000, 100_000
 
@@ -132,8 +132,8 @@ def _realisations(
 ) -> list[tuple[dict[str, Any], dict[str, int]]]:
     """Return the changes of a case for each of its realisations, and the number of each.
 
-    Realisation 0 of a scan is the scan itself; the others are its surrogates. Generated faces have consecutive seeds,
-    beginning with the stated seeds; the stated seeds of two faces decide whether any faces are equal.
+    Realisation 0 of a scan is the scan itself; the others are its surrogates. A generated surface has consecutive
+    seeds, beginning with the stated seed.
     """
     where = f"sweep.{REALISATIONS}"
     if not suits(count, int) or not 2 <= count <= MOST:
@@ -141,27 +141,18 @@ def _realisations(
     for key, value in change.items():
         data = place(data, key, value) if key.startswith("surface") else data
     surface = a_table("surface", data.get("surface"))
-    faces = {_SEED: surface, _SECOND_SEED: a_table("surface.second", surface.get("second", {}))}
     if stated := [key for key in DRAWN if key in change] + [SURROGATE] * ("realisation" in surface):
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
-    if any("file" in face for face in faces.values()):
-        return [
-            (change | ({SURROGATE: number} if number != ITSELF else {}), {REALISATION: number})
-            for number in range(ITSELF, count + 1)
-        ]
-    seeds = {key: face.get("seed") for key, face in faces.items() if face.get("generate") == "self_affine"}
-    if not seeds:
-        made = f"generate = {surface.get('generate')!r}"
-        raise InputError(key=where, found=made, expected="a scan, or generate = 'self_affine'")
-    for key, seed in seeds.items():
-        if not isinstance(seed, int) or "amplitudes" not in faces[key]:
-            kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
-            expected = f"a whole number as {key}, and {key.removesuffix('seed')}amplitudes: {kinds}"
-            raise InputError(key=where, found=count, expected=expected)
-    return [
-        (change | {key: seed + number for key, seed in seeds.items()}, {REALISATION: number + 1})
-        for number in range(count)
-    ]
+    if "file" in surface or "file" in a_table("surface.second", surface.get("second", {})):
+        surrogates = [{SURROGATE: number} for number in range(ITSELF + 1, count + 1)]
+        return [(change | one, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
+    made, seed = surface.get("generate"), surface.get("seed")
+    if made != "self_affine" or "second" in surface:
+        raise InputError(key=where, found=f"generate = {made!r}", expected="a scan, or one face of 'self_affine'")
+    if not isinstance(seed, int) or "amplitudes" not in surface:
+        kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
+        raise InputError(key=where, found=count, expected=f"a whole number as seed, and amplitudes: {kinds}")
+    return [(change | {_SEED: seed + number}, {REALISATION: number + 1}) for number in range(count)]
 
 
 def place(tables: Any, key: str, value: Any, above: str = "") -> Any:

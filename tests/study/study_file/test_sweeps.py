@@ -90,19 +90,13 @@ def test_realisations__are_crossed_with_lists_and_belong_to_their_table(realised
     assert [case.varied["realisation"] for case in kinds] == [0, 1, 2]
 
 
-def test_realisations__of_two_generated_faces_draw_both(realised):
-    faces = GAUSSIAN | {"second": GAUSSIAN | {"seed": 50}}
-    cases = realised(faces, {"realisations": 3}, boundary="periodic")
-    assert [(c.surface["seed"], c.surface["second"]["seed"]) for c in cases] == [(5, 50), (6, 51), (7, 52)]
-    assert len(realised(GAUSSIAN | {"second": GAUSSIAN}, {"realisations": 3}, boundary="periodic")) == 3
-
-
 @pytest.mark.parametrize(
     ("surface", "sweep"),
     [
         (GAUSSIAN, {"realisations": 1}),
         (GAUSSIAN, {"realisations": [6, 24]}),
         (ROUGH, {"realisations": 3}),
+        (GAUSSIAN | {"second": GAUSSIAN}, {"realisations": 3}),
         (GAUSSIAN, {"realisations": 3, "surface.seed": [1, 2]}),
         (SCAN | {"realisation": 2}, {"realisations": 3}),
         ({"generate": "sphere", "radius": "1 mm", "size": "0.1 mm", "shape": 9}, {"realisations": 3}),
