@@ -108,8 +108,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     say(console, surface_table(file, Path(), options, found.steps))
     picture = plot or Path(f"{file.stem}.png")
     if not picture.exists():
-        write_figure(rv.plot.surface(levelled), picture)
-    say_path(console, "Picture", picture)
+        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture))
     if to:
         with atomic_write(to) as temporary:
             rv.save_scan(height, temporary)
@@ -149,8 +148,6 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     if out.suffix.lower() != ".toml" or out.exists():
         raise InputError(f"{out}: already exists, or is not a .toml file: expected another name (--out)")
     if file is None:
-        for option in (name for name, value in options.items() if value is not None):
-            raise InputError(key=option, found=options[option], expected="FILE, which it belongs to")
         shipped = rv.example_scan().read_bytes()
         if source.exists() and source.read_bytes() != shipped:
             raise InputError(f"{source}: already exists and differs from the example: expected your own FILE")
