@@ -363,10 +363,9 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
     settings = replace(settings, boundary=boundary)
     if isinstance(experiment, Loading) and isinstance(settings.times, tuple):
-        end = experiment.program.duration
-        for time in [time for time in settings.times if time > end * (1 + _ROUNDING)]:
-            expected = f"a time up to the end of the program, {end:g} s"
-            raise InputError(key="keep.times", found=time, expected=expected)
+        end, last = experiment.program.duration, max(settings.times, default=0.0)
+        if last > end * (1 + _ROUNDING):
+            raise InputError(key="keep.times", found=last, expected=f"times up to the end of the program, {end:g} s")
     for name, value, why in experiment.unsupported(settings):
         key = f"{TABLE_OF[name]}.{name}"
         raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)
