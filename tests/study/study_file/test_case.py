@@ -47,7 +47,7 @@ def test_read_study__units_become_si(read_one):
         ({"program.0.load": None, "program.0.laod": 1}, "program.0", None),
         ({"program.1.control": "force"}, "program.1.control", "force"),
         ({"keep.fields": ["presure"]}, "keep.fields", ["presure"]),
-        ({"keep.times": [6, "7 s"]}, "keep.times", None),
+        ({"keep.times": [1, "7 s"]}, "keep.times", 7.0),
     ],
     ids=str,
 )

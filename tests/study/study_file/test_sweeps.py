@@ -117,6 +117,7 @@ def test_realisations__are_refused_if_the_surface_has_none(realised, surface, sw
         ({"title.x": [1]}, "title.x"),
         ({"observe.leakage.viscosity": [1, 2]}, "observe.leakage.viscosity"),
         ([{"program.0.load": [1, 2], "solve.tolerance": [1e-3]}], "sweep.0"),
+        ([], "sweep"),
     ],
 )
 def test_sweep__is_refused_at_the_key(read, sweep, key):
