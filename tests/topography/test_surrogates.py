@@ -49,6 +49,12 @@ def test_surrogates__of_mirror_images_are_as_large_as_what_was_measured():
         np.testing.assert_array_equal(found[axis], scan[axis])
 
 
+def test_surrogates__of_a_regular_wave_are_as_large_as_the_wave():
+    """Its values are symmetric, but no part of it is the image of another one."""
+    waves = rv.wavy(1e-6, 1e-4, (3e-4, 2e-4), (50, 44))
+    assert rv.surrogates(waves, 1, seed=1)[0].shape == waves.shape
+
+
 def test_surrogates__of_a_scan_are_periodic_and_have_its_slope():
     scan = rv.crop(rough((90, 104)), x=(0, 6e-4))
     found = rv.surrogates(scan, 8, seed=1)
