@@ -1,5 +1,7 @@
 """Figures by their artists: what is drawn, and in which units."""
 
+import itertools
+
 import matplotlib
 import numpy as np
 import pytest
@@ -22,6 +24,16 @@ def images(figure):
     return [image for ax in figure.axes for image in ax.images]
 
 
+def boxes(figure):
+    """Return name -> extent of each panel with its labels, the legend, and each text. [pixel]"""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    found = {f"panel {number}": ax.get_tightbbox(renderer) for number, ax in enumerate(figure.axes)}
+    artists = [*figure.legends, *figure.texts]
+    return found | {f"text {number}": one.get_window_extent(renderer) for number, one in enumerate(artists)}
+
+
 DRAWN = {
     "history": plot.history,
     "loop": lambda ds: plot.history(ds, "force", over="approach"),
@@ -38,12 +50,18 @@ DRAWN = {
 
 @pytest.mark.parametrize("draw", DRAWN)
 @pytest.mark.parametrize("make", [made.rough_creep, made.open_contact])
-def test_every_figure__is_drawn_without_a_warning_and_leaves_no_global_state(draw, make):
+def test_every_figure__has_nothing_cut_off_or_overlapping_and_leaves_no_global_state(draw, make):
     before = dict(matplotlib.rcParams)
     figure = DRAWN[draw](make())
-    FigureCanvasAgg(figure).draw()
+    found = boxes(figure)
     assert dict(matplotlib.rcParams) == before
     assert all(ax.lines or ax.images or ax.collections or ax.patches or not ax.axison for ax in figure.axes)
+    width, height = figure.get_size_inches() * figure.dpi
+    for name, box in found.items():
+        assert min(box.x0, box.y0, width - box.x1, height - box.y1) >= 0, name
+    for (name, box), (other, its) in itertools.combinations(found.items(), 2):
+        overlap = min(box.x1, its.x1) - max(box.x0, its.x0), min(box.y1, its.y1) - max(box.y0, its.y0)
+        assert min(overlap) < 2, (name, other)
 
 
 @pytest.mark.parametrize("draw", [plot.maps, plot.section])
