@@ -73,8 +73,10 @@ def _error(source: xr.Dataset) -> str:
     if not half.size:
         return "-"
     sides = set(np.ravel(source["direction"].values).tolist())
-    sign = {1: "+", -1: "-"}.get(sides.pop(), "±") if len(sides) == 1 else "±"
-    return sign + " to ".join(dict.fromkeys(_percent(np.expm1(one)) for one in (half.min(), half.max())))
+    side = sides.pop() if len(sides) == 1 else 0
+    ends = np.abs(np.expm1(half * (side or 1)))  # of an error in both directions, the larger part upwards
+    sign = {1: "+", -1: "-"}.get(side, "±")
+    return sign + " to ".join(dict.fromkeys(map(_percent, (ends.min(), ends.max()))))
 
 
 def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
