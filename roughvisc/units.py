@@ -114,14 +114,17 @@ def number(
     elif isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an integer of hundreds of digits
             found = float(value)
-    bounds = {"above": (gt, above), "at least": (ge, least), "up to": (le, most), "below": (lt, below)}
-    limits = {word: one for word, one in bounds.items() if one[1] is not None}
-    too_small = above == 0 and found < sys.float_info.min  # its reciprocal overflows
-    if math.isfinite(found) and not too_small and all(compare(found, limit) for compare, limit in limits.values()):
+    is_within = math.isfinite(found) and not (above == 0 and found < sys.float_info.min)  # its reciprocal overflows
+    words = []
+    bounds = (("above", gt, above), ("at least", ge, least), ("up to", le, most), ("below", lt, below))
+    for word, compare, limit in bounds:
+        if limit is not None:
+            is_within = is_within and compare(found, limit)
+            words.append(f"{word} {limit:g}")
+    if is_within:
         return found
     kind = "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit,"
-    words = " and ".join(f"{word} {limit:g}" for word, (_, limit) in limits.items())
-    expected = f"{kind} {words}" if words else kind.rstrip(",")
+    expected = f"{kind} {' and '.join(words)}" if words else kind.rstrip(",")
     named = f"{key}: " if key else ""
     raise InputError(
         f"{named}found {short_repr(value)}{problem}: expected {expected}", key=key, found=value, expected=expected

@@ -5,7 +5,7 @@ import pytest
 from support import scene
 
 import roughvisc as rv
-from roughvisc.mechanics.memory_choice import choose_memory
+from roughvisc.mechanics.memory import choose_memory
 from roughvisc.mechanics.stepping import march
 
 DURATION = 2.0

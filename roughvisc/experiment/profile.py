@@ -162,7 +162,7 @@ def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> D
     """
     gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
     whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    if not (body.can_crop and profile.all_present) or min(shape) < WORTH_CROPPING or math.isinf(approach):
+    if body.kernel.raises_surface or not profile.all_present or min(shape) < WORTH_CROPPING or math.isinf(approach):
         return whole
     near = np.argwhere(gap <= MARGIN * approach)
     if not near.size:
@@ -205,7 +205,8 @@ def choose_surface(
     """
     body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
     times = enlarged or 0
-    if settings.boundary == "free" and settings.edge == "error" and (body.can_crop or is_indenter(profile.height)):
+    can_adapt = not body.kernel.raises_surface or is_indenter(profile.height)
+    if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
             profile = Profile(enlarged_indenter(profile.height), settings.missing, body.kernel)

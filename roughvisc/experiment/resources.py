@@ -18,8 +18,7 @@ from roughvisc.errors import InputError, TooLargeError
 from roughvisc.experiment.rows import memory_of
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import arrays_of
-from roughvisc.mechanics.memory import Memory
-from roughvisc.mechanics.memory_choice import LayerMemory
+from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT
 from roughvisc.settings import Settings
@@ -197,7 +196,7 @@ def require_loading(shape: tuple[int, int], program: Program, settings: Settings
     rows = times if isinstance(times, int) else len(times)
     rows = rows if in_memory and settings.device == "cpu" else 0  # kept fields are on the host
     is_free = settings.boundary == "free" and settings.edge == "error"
-    part = 0.0 if is_free and body.can_crop else 1.0  # the domain is not known yet
+    part = 0.0 if is_free and not body.kernel.raises_surface else 1.0  # the domain is not known yet
     require_memory(shape, partial(march_bytes, settings, memory, rows=rows, part=part), settings.device)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.neighbours import area_bounds
-from roughvisc.mechanics.memory_choice import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program, instant
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings
@@ -137,7 +137,7 @@ def memory_of(body: Body, program: Program, settings: Settings, **options: Any) 
     body, program, settings
         Body, program and settings of the case.
     **options
-        Further arguments of :func:`~roughvisc.mechanics.memory_choice.choose_memory`.
+        Further arguments of :func:`~roughvisc.mechanics.memory.choose_memory`.
 
     Notes
     -----

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.materials.creep import Material
-from roughvisc.mechanics.memory_choice import Choice
+from roughvisc.mechanics.memory import Choice
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
 from roughvisc.topography.indenters import is_indenter

@@ -220,11 +220,6 @@ class Body:
             raise InputError(key="kernel", found=self.kernel, expected="a kernel, derived from Kernel")
 
     @property
-    def can_crop(self) -> bool:
-        """Whether a part of a surface suffices in free space: no cell deeper than the approach touches."""
-        return not self.kernel.raises_surface
-
-    @property
     def materials(self) -> tuple[Material, ...]:
         """Materials of the body."""
         return (self.material,)

@@ -150,7 +150,7 @@ class Grid:
             fast = scipy.fft.next_fast_len
             self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
         if symbol is None and boundary == "free":
-            symbol = self.symbol_of(kernel)
+            symbol = free_space_symbol(kernel, self.points, spacing)
         elif symbol is None:  # without the shortest waves of a mirrored surface, which are zero at the cells
             symbol = np.ascontiguousarray(periodic_symbol(kernel, self.period, spacing)[: shape[0], : shape[1]])
         self.symbol = xp.asarray(symbol)

@@ -490,7 +490,7 @@ class Program:
                 return segment.control == control
         return True
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Length of the program. [s]"""
         return self.corners[-1]
@@ -506,7 +506,7 @@ class Program:
         loads = [(s.end or 0.0) + abs(s.amplitude) for s in self.segments if s.control == "load"]
         return max(loads, default=0.0)
 
-    @property
+    @cached_property
     def time_scale(self) -> float:
         """Shortest time in which a controlled quantity changes by its largest value; infinite without a change. [s]
 

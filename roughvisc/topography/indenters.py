@@ -160,12 +160,13 @@ def highest(h: xr.DataArray) -> float:
     >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
     (0.0, True, True)
     """
-    known = _known(h)
-    is_within = known is not None and all(
-        float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2
-        for axis, side, centre in zip("xy", *known[1:], strict=True)
-    )
-    return 0.0 if is_within else float(np.nanmax(h.values))
+    known, highest_cell = _known(h), float(np.nanmax(h.values))
+    if known is None:
+        return highest_cell
+    for axis, side, centre in zip("xy", *known[1:], strict=True):
+        if not float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2:
+            return highest_cell
+    return 0.0
 
 
 def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
@@ -180,12 +181,13 @@ def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, flo
         (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
         cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
-        cells = [h[axis].values / side - 0.5 for axis, side in zip("xy", cell, strict=True)]
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
+    for axis, side in zip("xy", cell, strict=True):
+        at = h[axis].values / side - 0.5
+        if np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6:
+            return None
     near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
-    if any(np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6 for at in cells):
-        return None
     if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
         return None
     return evaluate, cell, centre

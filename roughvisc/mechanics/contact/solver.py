@@ -146,9 +146,8 @@ def solve_contact(
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
         start, start_displacement = coarse_guess(grid, gap, load), None
     if not overwrite:
-        gap, start, start_displacement = (
-            one if one is None else one.copy() for one in (gap, start, start_displacement)
-        )
+        gap, start = gap.copy(), None if start is None else start.copy()
+        start_displacement = None if start_displacement is None else start_displacement.copy()
 
     # Divide pressures and lengths by one pressure, and measure lengths from the lowest point: the load is then one.
     lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
