@@ -20,7 +20,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import RoughviscError
-from roughvisc.mechanics.contact.neighbours import neighbours
+from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.indenters import is_indenter, remade

@@ -21,7 +21,7 @@ from roughvisc.experiment.rows import area_error, error_columns, kept_times, len
 from roughvisc.experiment.warnings import loading_warnings, table_warning
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body, has_finite_mean
-from roughvisc.mechanics.contact.neighbours import contact_area
+from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program

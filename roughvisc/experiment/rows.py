@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.neighbours import area_bounds
+from roughvisc.mechanics.contact.solver import area_bounds
 from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program, instant
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step

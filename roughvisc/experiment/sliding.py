@@ -22,7 +22,7 @@ from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.experiment.warnings import border_warning, slope_warning, stands_alone, table_warning, wake_warning
 from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.neighbours import contact_area, faces_between
+from roughvisc.mechanics.contact.solver import contact_area, faces_between
 from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state

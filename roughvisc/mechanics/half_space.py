@@ -6,11 +6,12 @@ The displacement under a point force is ``1 / (pi r)``.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.mechanics.quadrature import cell_mean
+from roughvisc.mechanics.quadrature import rule
 
 Array = NDArray[np.float64]
 
@@ -89,4 +90,29 @@ def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> 
         if depth:
             corner -= depth * np.arctan(a * b / (depth * np.sqrt(a**2 + b**2 + depth**2)))
         total += sx * sy * corner
+    return total
+
+
+def cell_mean(
+    function: Callable[[Array], Array], x: NDArray, y: NDArray, sides: tuple[float, float], points: tuple[int, int]
+) -> Array:
+    """Return the mean of a function of the distance over a cell, by Gauss quadrature.
+
+    Parameters
+    ----------
+    function : callable
+        Takes distances. [m]
+    x, y : ndarray
+        Positions relative to the centre of the cell, which broadcast. [m]
+    sides : tuple of float
+        Cell sides. [m]
+    points : tuple of int
+        Gauss points along each side.
+    """
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+    (along_x, share_x), (along_y, share_y) = map(rule, points)
+    for a, part_a in zip(along_x * sides[0] / 2, share_x / 2, strict=True):
+        square = (x + a) ** 2
+        for b, part_b in zip(along_y * sides[1] / 2, share_y / 2, strict=True):
+            total += part_a * part_b * function(np.sqrt(square + (y + b) ** 2))
     return total

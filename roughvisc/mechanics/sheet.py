@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.mechanics.body import Body, Kernel, check_one_body
-from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.half_space import cell_mean, love_kernel
 from roughvisc.mechanics.materials.creep import Material
-from roughvisc.mechanics.quadrature import cell_mean, panels
+from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import support
 
-from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.contact import long_waves, solve_contact, solver
 from roughvisc.mechanics.grid import Grid
 
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
@@ -44,10 +44,11 @@ def solved_on_both(xp, boundary, gap, present=None, **given):
 @BOUNDARIES
 def test_wide_contact__is_the_same_on_a_device(monkeypatch, xp, boundary):
     """With a first guess on half the cells and the second level of the preconditioner."""
-    for name, value in {"COARSE_FROM": 40, "BLOCKS_FROM": 40, "SPOTS": 0.0}.items():
-        monkeypatch.setattr(solver, name, value)
-    used, blocks = [], solver.LongWaves.pressure
-    monkeypatch.setattr(solver.LongWaves, "pressure", lambda self, rest: used.append(rest) or blocks(self, rest))
+    monkeypatch.setattr(solver, "COARSE_FROM", 40)
+    monkeypatch.setattr(solver, "BLOCKS_FROM", 40)
+    monkeypatch.setattr(long_waves, "SPOTS", 0.0)
+    used, blocks = [], long_waves.LongWaves.pressure
+    monkeypatch.setattr(long_waves.LongWaves, "pressure", lambda self, rest: used.append(rest) or blocks(self, rest))
     solved_on_both(xp, boundary, support.rough_gap((52, 41)), load=30.0)
     assert len(used) > 6
 

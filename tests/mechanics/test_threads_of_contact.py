@@ -8,7 +8,7 @@ import pytest
 from scipy import fft
 
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.contact import long_waves, solve_contact, solver
 from roughvisc.mechanics.grid import Grid
 
 
@@ -26,7 +26,7 @@ def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
     for name, value in {"COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
     monkeypatch.setattr(solver, "BLOCKS_FROM", 1)
-    monkeypatch.setattr(solver, "SPOTS", 0.0)
+    monkeypatch.setattr(long_waves, "SPOTS", 0.0)
     one, *others = (solve_contact(on_threads(threads, boundary), gap, load=60.0) for threads in (1, 2, 3))
     assert one.iterations > 3
     assert np.abs(one.pressure - whole.pressure).sum() < 2e-3 * whole.pressure.sum()

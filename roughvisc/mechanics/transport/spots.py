@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.contact.neighbours import neighbours
+from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary, Grid
 
 Array = NDArray[np.float64]
