@@ -97,7 +97,7 @@ def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], da
         Number of first arguments that are data.
     """
     with suppress(DataNeeded):
-        call(function, where, table, *[NoData() for _ in range(data)])
+        call(function, where, table, *[NoData()] * data)
 
 
 @cache

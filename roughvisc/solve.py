@@ -205,10 +205,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     steps = pd.DataFrame(recorder.plain)
     kept = steps[steps["kept"]].sort_values("place", kind="stable")
     attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
-    variables: dict[str, Any] = {
-        name: (axis, kept[name].to_numpy()) for name in kept.columns.drop(["kept", "place", axis])
-    }
-    variables["height"] = ("x", "y"), np.asarray(height.values, dtype=float), attributes
+    variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
+    for name in kept.columns.drop(["kept", "place", axis]):
+        variables[name] = axis, kept[name].to_numpy()
     for name in settings.fields:
         field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
         variables[name] = (axis, "x", "y"), field

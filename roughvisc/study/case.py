@@ -178,8 +178,12 @@ class Case:
 
     def to_json(self) -> str:
         """Return the case as JSON; :meth:`from_json` makes a case with the same key from it."""
-        about = {"varied": dict(self.varied), "origin": self.origin and str(self.origin.absolute())}
-        return json.dumps({**self.tables, **{name: value for name, value in about.items() if value}})
+        stated = dict(self.tables)
+        if self.varied:
+            stated["varied"] = dict(self.varied)
+        if self.origin:
+            stated["origin"] = str(self.origin.absolute())
+        return json.dumps(stated)
 
     @classmethod
     def from_json(cls, text: str) -> Case:

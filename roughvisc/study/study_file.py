@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -358,7 +359,7 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         settings = call(Settings, "", stated)
     except InputError as error:
         raise located(error, TABLE_OF[error.key.partition(".")[0]]) from error
-    boundary = known_boundary(settings, experiment.boundary, lambda: surface_boundary(tables["surface"]))
+    boundary = known_boundary(settings, experiment.boundary, partial(surface_boundary, tables["surface"]))
     if boundary is None:
         raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
     settings = replace(settings, boundary=boundary)

@@ -31,10 +31,12 @@ def border_mismatch(h: xr.DataArray) -> tuple[float, float]:
         :data:`JUMP`, the repeated surface has a step. [-]
     """
     values = h.transpose("x", "y").values
-    across = [_rms(np.take(values, 0, axis) - np.take(values, -1, axis)) for axis in (0, 1)]
-    beside = [_rms(np.diff(values, axis=axis)) for axis in (0, 1)]
-    x, y = (one / other if other > 0 else 0.0 for one, other in zip(across, beside, strict=True))
-    return x, y
+    ratios = []
+    for axis in (0, 1):
+        across = _rms(np.take(values, 0, axis) - np.take(values, -1, axis))
+        beside = _rms(np.diff(values, axis=axis))
+        ratios.append(across / beside if beside > 0 else 0.0)
+    return ratios[0], ratios[1]
 
 
 def period_of(h: xr.DataArray) -> list[float]:

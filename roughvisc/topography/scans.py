@@ -209,7 +209,7 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     if source_key == "generate":
         check_recipe(where, source)
     else:
-        check_keys(open_scan, where, {key: value for key, value in source.items() if key != "file"}, 1)
+        check_keys(open_scan, where, split(source, "file")[1], 1)
     if is_second:
         one_of(f"{where}.flip", placing.pop("flip", "x"), ("x", "y", "none"))
         check(combine, where, placing | {"align": "centre"}, 2)

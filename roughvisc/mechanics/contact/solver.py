@@ -425,7 +425,10 @@ def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterat
 
 def faces_between(contact: Array, free: Array, boundary: Boundary, outside: bool = False) -> int:
     """Return the number of faces between contact cells and free cells, see :func:`neighbours`."""
-    return sum(int(np.count_nonzero(contact & beside)) for beside in neighbours(free, boundary, outside))
+    faces = 0
+    for beside in neighbours(free, boundary, outside):
+        faces += int(np.count_nonzero(contact & beside))
+    return faces
 
 
 def contact_area(

@@ -16,6 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
@@ -110,7 +111,7 @@ def compute(
         "case_key": case.key,
         "surface_sha256": case.surface_sha256,
     }
-    dataset.attrs = provenance | {name: value for name, value in dataset.attrs.items() if name not in _IN_THE_CASE}
+    dataset.attrs = provenance | split(dataset.attrs, *_IN_THE_CASE)[1]
     return dataset.assign_coords(labels_of_case(json.loads(stated)))
 
 

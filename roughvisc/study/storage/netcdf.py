@@ -293,7 +293,13 @@ def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Var
         for dimension, size in variable.sizes.items():
             if dimension not in place.dimensions and dimension not in getattr(place.parent, "dimensions", ()):
                 place.createDimension(str(dimension), size)
-        encoding = encoding_of(str(name), variable)
+        encoding: dict[str, Any] = {"fill_value": False}
+        if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:  # may have missing values
+            encoding["fill_value"] = variable.dtype.type(np.nan)
+        if variable.ndim:
+            encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
+            if variable.nbytes > _TINY and name not in _DENSE:
+                encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
         stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
         stored.set_auto_maskandscale(False)
         if "chunksizes" in encoding:  # chunks are written whole; by default the library caches 64 MB per variable
@@ -301,19 +307,6 @@ def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Var
         stored.setncatts(attributes)
         declared.append((stored, variable))
     return declared
-
-
-def encoding_of(name: str, variable: xr.Variable) -> dict[str, Any]:
-    """Return the arguments of netCDF4 to create a variable; coordinates have no fill value."""
-    encoding: dict[str, Any] = {"fill_value": False}
-    if variable.dtype.kind == "f" and name in VARIABLES and name not in _COORDINATES:
-        encoding["fill_value"] = variable.dtype.type(np.nan)
-    if not variable.ndim:
-        return encoding
-    encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
-    if variable.nbytes > _TINY and name not in _DENSE:
-        encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
-    return encoding
 
 
 def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
