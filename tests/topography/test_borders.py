@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from scan_files import ROOT
 
 import roughvisc as rv
 from roughvisc.experiment.base import boundary_of
 from roughvisc.topography.borders import is_periodic
 from roughvisc.topography.conditioning import boundary_after, condition
-from roughvisc.topography.scans import surface_boundary
 
 SIDE, SHAPE = (1e-3, 1.2e-3), (24, 20)
 BALL, TIP, PUNCH = rv.sphere(1e-2, SIDE, SHAPE), rv.cone(0.1, SIDE, SHAPE), rv.flat_punch(3e-4, SIDE, SHAPE)
@@ -32,6 +32,7 @@ CAP = rv.sphere(2e-3, SIDE, SHAPE, exact=True)
         (rv.mirror(SCAN), "periodic"),
         (rv.resample(rv.mirror(SCAN), (32, 32)), "periodic"),
         (ROUGH * 2, "periodic"),
+        (rv.open_scan(ROOT / "surfaces" / "self_affine.toml"), "periodic"),
         (SCAN, None),
     ],
 )
@@ -66,13 +67,5 @@ def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
     for step, value in values.items():
         found = is_periodic(condition(height, {step: value}))
         assert (boundary_after({step: value}, "periodic") == "periodic") == found, step
-
-
-@pytest.mark.parametrize(
-    ("steps", "expected"),
-    [("", "free"), ("level = 1", None)],
-)
-def test_card__says_by_its_text_what_its_heights_say(tmp_path, steps, expected):
-    path = tmp_path / "ball.toml"
-    path.write_text(f'generate = "sphere"\nradius = "1 cm"\nsize = "1 mm"\nshape = [12, 10]\n{steps}\n')
-    assert surface_boundary({"file": str(path)}) == boundary_of(rv.open_scan(path)) == expected
+    assert is_periodic(rv.combine(height, height))
+    assert not is_periodic(rv.combine(height, SCAN))

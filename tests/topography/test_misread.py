@@ -199,16 +199,6 @@ def test_no_data__is_not_seen_in_the_flat_pits_of_a_texture(tmp_path):
     assert not np.isnan(h).any()
 
 
-def test_no_data__of_few_points_is_named_in_the_refusal(tmp_path):
-    z = ROUGH.copy()
-    z[0, :2] = 1e7
-    np.save(tmp_path / "m.npy", z)
-    with pytest.raises(Exception, match="no_data"):
-        open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
-    h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um", no_data=1e7)
-    assert int(np.isnan(h).sum()) == 2
-
-
 def test_height_scale__opens_a_file_that_states_a_wrong_unit():
     path = FILES / "micron_5.x3p"
     with pytest.raises(Exception, match="height_scale"):

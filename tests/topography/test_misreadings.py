@@ -26,20 +26,6 @@ def write_xyz(path, heights=None, shuffled=True):
     return path
 
 
-# -- separated values, heights of metres -----------------------------------------------------------------------------
-
-
-def test_separated_values__empty_ones_are_missing_and_words_are_refused(tmp_path):
-    path = tmp_path / "scan.csv"
-    path.write_text("1,2,3,4\n5,,7,8\n9,10,11,12\n")
-    h = open_scan(path, unit="um", spacing=1e-6)
-    assert h.shape == (4, 3)
-    assert np.argwhere(np.isnan(h.values)).tolist() == [[1, 1]]
-    assert float(h[2, 1]) == pytest.approx(7e-6)
-    path.write_text("1,2,3,4\n5,six,7,8\n9,10,11,12\n")
-    assert "line 2" in refusal(path, unit="um", spacing=1e-6)
-
-
 # -- headings ----------------------------------------------------------------------------------------------------------
 
 POINTS = [(0.5 * i, 0.25 * j, 0.125 * i + 0.5 * j) for j in range(4) for i in range(6)]
@@ -138,22 +124,6 @@ def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):
     np.testing.assert_array_equal(open_scan(path, unit="nm"), h)
     path.write_text("# Width: 2,5 µm\n# Height: 7,5 µm\n" + "1 2 3 4 5\n" * 5)  # the header alone has decimals
     np.testing.assert_allclose(spacing(open_scan(path, unit="nm")), (5e-7, 1.5e-6), rtol=1e-12)
-
-
-def test_matrix__lies_the_same_way_in_text_and_in_numpy(tmp_path):
-    """A letter as it is written, first line first: rows run along x in every file of a matrix."""
-    letter = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], float)
-    np.save(tmp_path / "f.npy", letter)
-    for name, separator in (("f.csv", ","), ("f.txt", " ")):
-        np.savetxt(tmp_path / name, letter, delimiter=separator)
-    for name, kind in (("f.npy", "NumPy array"), ("f.csv", "CSV matrix"), ("f.txt", "text matrix")):
-        h = open_scan(tmp_path / name, unit="um", spacing=(1e-6, 2e-6))
-        assert h.sizes == {"x": 4, "y": 5}
-        np.testing.assert_allclose([h.sel(y=y) for y in h.y], 1e-6 * letter)
-        assert f"{kind}, its rows are taken to run along x and the first to be y = 0" in h.attrs["orientation"]
-        message = refusal(tmp_path / name)
-        assert "unit" in message
-        assert "spacing" in message
 
 
 @pytest.mark.parametrize("separator", [";", ",", "\t", " "])

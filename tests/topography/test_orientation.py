@@ -1,6 +1,4 @@
-"""Which way up a map lies, told by features: a letter, the camera image in a file."""
-
-import struct
+"""Which way up a map lies: told by the camera image in a file, and said for every format."""
 
 import numpy as np
 import pytest
@@ -9,25 +7,6 @@ from scan_files import SCANS, real
 from roughvisc.topography.formats.registry import supported_formats
 from roughvisc.topography.orientation import orientation, top_line_first
 from roughvisc.topography.scans import open_scan
-
-#: The letter F as it is read, first line at the top.
-LETTER = np.array([[1, 1, 1, 1], [1, 0, 0, 0], [1, 1, 1, 0], [1, 0, 0, 0], [1, 0, 0, 0]], dtype="<f4")
-
-
-def write_tmd(path, lines):
-    """A file of GelSight's, as readtmd.m of the maker reads it: lines from the top, lengths and heights in mm."""
-    head = b"Binary TrueMap Data File v2.0\r\n\0" + b"Created by TrueMap v6\r\n\0"
-    rows, columns = lines.shape
-    path.write_bytes(head + struct.pack("<2I4f", columns, rows, 0.4, 0.5, 0, 0) + (1e-3 * lines).tobytes())
-    return path
-
-
-def test_tmd__letter_is_read_as_it_stands(tmp_path):
-    h = open_scan(write_tmd(tmp_path / "coin.tmd", LETTER))
-    assert h.shape == (4, 5)
-    as_drawn = h.values.T[::-1]  # y upwards: the first line drawn is that of the largest y
-    np.testing.assert_allclose(as_drawn, 1e-6 * LETTER, atol=1e-12)
-    assert h.attrs["orientation"].startswith("verified")
 
 
 @real

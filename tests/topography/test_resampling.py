@@ -1,14 +1,13 @@
 """Surfaces on other grids: against waves, polynomials and contacts that are known on any grid."""
 
 import numpy as np
-import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import examples, shapes
 
 import roughvisc as rv
-from roughvisc.topography.borders import is_mirrored, is_periodic
+from roughvisc.topography.borders import is_mirrored
 
 SIZE = (1e-3, 0.8e-3)
 #: Waves of a surface: numbers over the sides, amplitude [m] and phase; none shorter than a seventh of a side.
@@ -64,24 +63,3 @@ def test_resample__a_mirrored_surface_stays_its_own_mirror_image():
         assert is_mirrored(found)
         quarter = rv.resample(half, [n // 2 for n in shape], periodic=False)  # cosines: the mirror images are in them
         np.testing.assert_allclose(found, rv.mirror(quarter), rtol=0, atol=1e-12 * float(abs(half).max()))
-
-
-MADE = {
-    "self_affine": rv.self_affine(SIZE, (21, 16), hurst=0.9, rms_slope=0.1, seed=1),
-    "wavy": rv.wavy(1e-6, 1e-4, SIZE, (50, 48)),
-    "mirror": rv.mirror(sum_of_waves((13, 9)).isel(x=slice(7))),
-}
-
-
-@pytest.mark.parametrize("h", MADE.values(), ids=MADE)
-def test_is_periodic__of_what_was_made_to_repeat_as_long_as_it_does(h, tmp_path):
-    h.to_netcdf(tmp_path / "h.nc")
-    turned = rv.rotate90(h)
-    for same in (h, 2 * h, rv.invert(h), turned, rv.combine(h, h), rv.level(h, 0), rv.resample(h, (40, 33))):
-        assert is_periodic(same)
-    assert is_periodic(xr.load_dataarray(tmp_path / "h.nc"))
-    assert turned.attrs["period"] == pytest.approx(h.attrs["period"][::-1])
-    limits = (float(h.x[1]), float(h.x[-1]))
-    others = [rv.crop(h, x=limits), h.isel(x=slice(1, None)), rv.level(h), rv.gaussian_filter(h, 3.1e-4)]
-    others += [h + 0.1 * h.x, rv.combine(h, sum_of_waves(h.shape).assign_coords(x=h.x, y=h.y))]
-    assert not any(is_periodic(other) for other in others)
