@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.solver import area_bounds
+from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
 from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program, instant
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
@@ -249,5 +249,8 @@ def area_error(step: Step, scene: Scene, pressure: Any, gap: Any, counted: float
         opening = (pressure > 0) & (pressure <= off)
         inside += scene.grid.cell_area * int(xp.count_nonzero(opening))
         outside += scene.grid.cell_area * int(xp.count_nonzero(closing))
-    lower, upper = area_bounds(counted, area, inside, outside)
+    # A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four
+    # faces. Its area exceeds the correction for its faces: the area grows with each cell, and never exceeds the count.
+    most = 1 + 4 * PERIMETER_CORRECTION
+    lower, upper = max(area - most * inside, 0.0), min(area + most * outside, counted + outside)
     return float(max(area - lower, upper - area))

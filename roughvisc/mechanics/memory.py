@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -129,6 +129,19 @@ class Memory:
         self.weights: Any = np.append(self.compliances, self.glassy)
         #: Whether the response is independent of the history.
         self.is_elastic = not bool(self.compliances.any())
+        #: Rates at which errors of the history decay while the displacement is held [1/s], and their parts in an error
+        #: that is equal in all modes. The modes decay together, because ``glassy v = -sum_i c_i m_i``.
+        self.rates, self.parts = np.zeros(1), np.ones(1)
+        if self.glassy > 0 and not self.is_elastic:
+            active = self.compliances > 0
+            own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
+            driven = np.where(own > 0, own, 1.0)
+            equal = np.where(own > 0, 1.0, 1 / weights)  # of the fluidity: what relaxes at the rate fluidity / glassy
+            # diag(own) + driven weights^T, in a basis in which it is symmetric
+            root = np.sqrt(driven * weights)
+            rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
+            self.rates = np.maximum(rates, 0.0)
+            self.parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
         self.fields = 2 if keeps_pressure else 1
         self.may_ring = self.is_stiff(duration)
 
@@ -230,27 +243,9 @@ class Memory:
         return History(rolled(history.fields), rolled(history.modes), earlier, history.step)
 
     def remaining(self, time: float) -> float:
-        """Return the part of an error of the history that relaxation leaves after a time. [s]
-
-        At a held displacement ``glassy v = -sum_i c_i m_i``, so that the modes decay together.
-        """
-        if self.glassy == 0 or self.is_elastic:
-            return 1.0
-        rates, parts = self._relaxation
-        return float(np.clip((parts * np.exp(-rates * time)).sum() / parts.sum(), 0.0, 1.0))
-
-    @cached_property
-    def _relaxation(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rates at which errors decay [1/s], and their parts in an error that is equal in all modes."""
-        active = self.compliances > 0
-        own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
-        driven = np.where(own > 0, own, 1.0)
-        equal = np.where(own > 0, 1.0, 1 / weights)  # of the fluidity: what relaxes at the rate fluidity / glassy
-        # diag(own) + driven weights^T, in a basis in which it is symmetric
-        root = np.sqrt(driven * weights)
-        rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
-        parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
-        return np.maximum(rates, 0.0), parts
+        """Return the part of an error of the history that relaxation leaves after a time. [s]"""
+        left = (self.parts * np.exp(-self.rates * time)).sum() / self.parts.sum()
+        return float(np.clip(left, 0.0, 1.0))
 
     def recursion(self, step: float, last: float, rule: Rule) -> tuple[np.ndarray, ...]:
         """Return the weights of ``m_new = own m + earlier m_before + before v + new v_new``.
@@ -433,7 +428,9 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
 
 def _series(material: Material, shortest: float, duration: float, tolerance: float) -> tuple[Prony, float]:
     """Return the series of a material and its error; a program of jumps needs the instantaneous compliance only."""
-    if duration > 0 or (isinstance(material, Prony) and material.longest == math.inf):
+    if isinstance(material, Prony) and material.longest == math.inf:
+        return material, 0.0
+    if duration > 0:
         return series(material, shortest, duration, tolerance)
     glassy = float(material.creep_compliance(0.0))
     return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson), 0.0

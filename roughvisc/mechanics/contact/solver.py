@@ -451,34 +451,3 @@ def contact_area(
     # a face across x is dy long and lies in a strip dx wide, and the other way round
     strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, boundary, outside)
     return counted, max(counted - strip, 0.0)
-
-
-def area_bounds(counted: Array, area: Array, inside: Array, outside: Array) -> tuple[Array, Array]:
-    """Return bounds on a contact area, if some cells are uncertain. [m2]
-
-    Parameters
-    ----------
-    counted, area : float or ndarray
-        Contact area, counted and corrected, see :func:`contact_area`. [m2]
-    inside, outside : float or ndarray
-        Area of the uncertain cells in contact, and of the uncertain cells out of contact. [m2]
-
-    Returns
-    -------
-    lower, upper : float or ndarray
-        `area` lies between them. [m2]
-
-    Notes
-    -----
-    A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four faces.
-    The area of a cell exceeds the correction for its faces. The area therefore grows with each cell that enters the
-    contact, and never exceeds the count.
-
-    Examples
-    --------
-    >>> lower, upper = area_bounds(10.0, 9.0, 1.0, 0.5)
-    >>> round(float(lower), 3), round(float(upper), 3)
-    (7.648, 9.676)
-    """
-    most = 1 + 4 * PERIMETER_CORRECTION
-    return np.maximum(area - most * inside, 0.0), np.minimum(area + most * outside, counted + outside)
