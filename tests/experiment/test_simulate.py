@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from support import at_rows
 
 import roughvisc as rv
@@ -52,14 +51,6 @@ def test_analytic_profile__grows_and_ends_as_on_a_large_grid():
     assert "grown from" in grown.attrs["history"]
 
 
-def test_recipe_that_no_longer_holds__does_not_grow():
-    with xr.set_options(keep_attrs=True):
-        scaled = rv.sphere(1e-3, size=(62e-6, 58e-6), shape=(31, 29)) * 0.5
-    assert "recipe" in scaled.attrs
-    with pytest.raises(rv.EdgeContactError):
-        simulate(scaled, program=rv.Program().load(0.1, over=0), boundary="free")
-
-
 def test_zero_load__is_open():
     ds = simulate(program=rv.Program().load(2e-3, over=0).hold(0.5).load(0, over=0).hold(0.5), times=[0.25, 0.75])
     assert [STATUS_MEANINGS[i] for i in at_rows(ds).status.values] == ["converged", "open"]
@@ -87,9 +78,7 @@ def test_kept_times__are_counted_listed_or_snapped(times, expected):
         ({"height": BALL.where(BALL.max() > BALL)}, "height is missing at 2 of 1054"),
         ({"height": BALL / (BALL.max() > BALL)}, "height holds infinite"),
         ({"height": BALL * np.nan}, "height is missing everywhere"),
-        ({"height": BALL.values}, "height: found ndarray"),
         ({"height": BALL.assign_attrs(units="K")}, "height: .* K'"),
-        ({"height": BALL[[0, 1, 5]]}, "height: coordinate 'x'"),
         ({"program": rv.Program()}, "program"),
         ({"times": [2.0]}, "times holds 2 s"),
         ({"boundary": "periodic", "program": rv.Program().approach(1e-3, over=1)}, "approach goes to 0.001 m"),

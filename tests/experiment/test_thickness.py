@@ -8,7 +8,7 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc.mechanics.sheet import Sheet
-from roughvisc.study.case import Case, read_cases
+from roughvisc.study.case import Case
 
 RADIUS, THICKNESS = 1e-3, 1e-4
 
@@ -43,14 +43,8 @@ def test_wave_in_full_contact__has_the_pressure_of_its_symbol(poisson, base, con
 STUDY = BALL.replace("[[program]]", 'thickness = "0.1 mm"\nbase = "slipping"\n[[program]]', 1)
 
 
-@pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "gel.toml"
-    path.write_text(STUDY)
-    return read_cases(path)[0]
-
-
-def test_study__presses_the_sheet_that_it_states(case, tmp_path):
+def test_study__presses_the_sheet_that_it_states(study, tmp_path):
+    (case,) = study(STUDY)
     assert case.body.kernel == Sheet(1e-4, 0.5, "slipping")
     ds = rv.run(case, out=tmp_path / "out", progress=False)
     assert ds.attrs["thickness"] == 1e-4
@@ -75,15 +69,15 @@ def test_sheet_far_thinner_than_its_cells__is_a_squeeze_film_or_springs(poisson,
     assert float(ds.approach[-1]) == pytest.approx(depth, rel=1e-3)
 
 
-def test_python__refuses(case):
-    load = rv.Program().load(1e-3, over=0)
+def test_python__refuses():
+    load, ball = rv.Program().load(1e-3, over=0), rv.sphere(RADIUS, 2e-4, 9)
     thick = rv.Body(rv.elastic(1e6), Sheet(1.0))
     with refused("material", thick):
-        pressed(case.height(), thick, load)
+        pressed(ball, thick, load)
     with refused("kernel", 1e-4):
         rv.Body(rv.elastic(1e6), 1e-4)
     for two in (rv.pair(rv.elastic(1e6), rv.elastic(2e6)), rv.pair(rv.power_law(1e-7, 1e-6, 0.3), rv.elastic(1e9))):
         with pytest.raises(rv.InputError, match="a pair of bodies"):
-            pressed(case.height(), two, load)
+            pressed(ball, two, load)
     with refused("material"):
-        pressed(case.height(), rv.from_relaxation(5e5, [5e5], [0.05], bulk_modulus=1e9), load)
+        pressed(ball, rv.from_relaxation(5e5, [5e5], [0.05], bulk_modulus=1e9), load)

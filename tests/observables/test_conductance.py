@@ -2,7 +2,6 @@
 
 import math
 
-import dask.array
 import numpy as np
 import pytest
 import xarray as xr
@@ -69,12 +68,6 @@ def test_wrong_resistivities__are_refused(ball, resistivity, message):
     with pytest.raises(InputError) as caught:
         conductance(ball, resistivity)
     assert message in str(caught.value)
-
-
-def test_results__on_dask_are_alike_and_lazy(ball):
-    lazy = conductance(ball.chunk(time=1), (1, 1))
-    assert isinstance(lazy["thermal_conductance"].data, dask.array.Array)
-    xr.testing.assert_allclose(lazy.compute(scheduler="synchronous"), conductance(ball, (1, 1)))
 
 
 def test_sheet__conducts_as_a_half_space():

@@ -123,8 +123,13 @@ def test_distribution__of_an_unknown_field_is_refused():
 @pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame])
 @pytest.mark.parametrize(
     "observe",
-    [observables.clusters, observables.distribution, partial(observables.distribution, name="gap")],
-    ids=["clusters", "pressure", "gap"],
+    [
+        observables.clusters,
+        observables.distribution,
+        partial(observables.distribution, name="gap"),
+        partial(observables.conductance, resistivity=(1, 1)),
+    ],
+    ids=["clusters", "pressure", "gap", "conductance"],
 )
 def test_observables__are_lazy_on_dask_and_the_same(make, observe):
     ds = make()
@@ -163,10 +168,3 @@ def test_observables__merge_with_their_result(kind):
             assert merged[name].attrs == VARIABLES[str(name)].attributes
             assert merged[name].dims == VARIABLES[str(name)].over("time")
     assert float(merged.cluster_count.max()) >= 1
-
-
-def test_clusters__pass_a_leading_dimension_through():
-    ds = xr.concat([from_maps(RING), from_maps(CHECKERBOARD[:5, :5])], dim="case", combine_attrs="override")
-    found = observables.clusters(ds.assign_coords(case=["ring", "board"]))
-    assert found["cluster_count"].dims == ("case", "time")
-    assert found["cluster_count"].values.ravel().tolist() == [1, 13]

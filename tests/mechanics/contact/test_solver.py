@@ -10,7 +10,6 @@ from support import rough_gap
 
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError
-from roughvisc.mechanics import closed_forms
 from roughvisc.mechanics.contact import solve_contact, solver
 from roughvisc.mechanics.contact.passes import cut_step
 from roughvisc.mechanics.grid import Grid
@@ -36,30 +35,6 @@ def check_optimal(operator, gap, state, precision, present=None):
 
 
 # ------------------------------------------------------------------------------------------------- exact solutions
-
-
-def hertz_errors(n, ny):
-    """Relative errors of approach and pressure on a grid with the sphere at an arbitrary place in a cell."""
-    radius, modulus, force, size = 2.0, 3.0, 0.05, 1.0
-    spacing = (size / n, size / ny)
-    x = (np.arange(n) + 0.5) * spacing[0] - 0.5037 * size
-    y = (np.arange(ny) + 0.5) * spacing[1] - 0.4951 * size
-    squared = x[:, None] ** 2 + y[None, :] ** 2
-    exact = closed_forms.hertz(radius, modulus, force)
-    area = spacing[0] * spacing[1]
-    state = solve_contact(Grid((n, ny), spacing), squared / (2 * radius), load=force / modulus / area, tolerance=1e-7)
-    off = np.abs(modulus * state.pressure - exact.pressure(np.sqrt(squared)))
-    return abs(state.approach / exact.approach - 1), np.sum(off) * area / force
-
-
-def test_hertz__converges_at_order_two_in_approach_and_three_halves_in_pressure():
-    grids = [(31, 34), (61, 68), (123, 134), (245, 270)]
-    errors = np.array([hertz_errors(*grid) for grid in grids])
-    orders = -np.polyfit(np.log([g[0] for g in grids]), np.log(errors), 1)[0]
-    assert 1.8 < orders[0] < 2.4, f"approach: {orders[0]:.2f}, errors {errors[:, 0]}"
-    assert 1.35 < orders[1] < 1.8, f"L1 pressure: {orders[1]:.2f}, errors {errors[:, 1]}"
-    assert errors[-1, 0] < 1e-4
-    assert errors[-1, 1] < 2e-3
 
 
 def full_pressure(operator, gap):
@@ -228,12 +203,6 @@ def test_steps_beyond_their_trial__keep_the_load():
         _, change, _ = cut_step(held, direction, direction, 1e-6, load=float(held.sum()))
         held += 20 * change
     assert held.sum() == pytest.approx(1, rel=1e-13)
-
-
-def test_unsolved_contact__raises():
-    operator = Grid((33, 30), (1.0, 1.0))
-    with pytest.raises(ConvergenceError, match="3 iterations"):
-        solve_contact(operator, rough_gap(operator.shape), load=10.0, tolerance=1e-8, max_iterations=3)
 
 
 @given(approach=st.floats(1e-9, 0.5), shape=shapes(1, 9), boundary=boundaries, tolerance=st.sampled_from([1e-3, 1e-9]))

@@ -63,12 +63,6 @@ def kirchhoff(gap, cell, wrap):
     return float(side[-1] @ pressure[-ny:])
 
 
-@pytest.mark.parametrize("length", [1, 2, 7, 40])
-def test_channel__cells_in_series(length):
-    gap = 1e-6 * (0.2 + np.random.default_rng(length).random((length, 1)))
-    assert_allclose(flow(gap, CELL).conductance, series(gap), rtol=1e-13, atol=0)
-
-
 @pytest.mark.parametrize("wrap", [False, True])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 5), (6, 1), (5, 2), (7, 6), (9, 11)])
 def test_network__equals_one_written_cell_by_cell(shape, wrap):
@@ -184,20 +178,6 @@ def test_slit_between_two_lakes__is_all_the_resistance():
     found = flow(gap, CELL)
     assert found.error <= 1e-6 * found.conductance
     assert_allclose(found.conductance, (1e-13) ** 3 / 12 * CELL[1] / CELL[0], rtol=1e-6, atol=0)
-
-
-def test_lengths__in_any_unit():
-    gap = random_gap((14, 11), seed=2)
-    metres, nanometres = flow(gap, CELL), flow(gap * 1e9, (CELL[0] * 1e9, CELL[1] * 1e9))
-    assert_allclose(nanometres.conductance, metres.conductance * 1e27, rtol=1e-12, atol=0)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_gap__that_is_missing_is_refused(value):
-    gap = np.ones((4, 4))
-    gap[1, 1] = value
-    with pytest.raises(ValueError, match="missing or infinite"):
-        flow(gap, CELL)
 
 
 @pytest.mark.parametrize("wrap", [False, True])
