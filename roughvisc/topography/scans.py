@@ -176,7 +176,8 @@ def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
         flip = placing.pop("flip", "x")
         placing |= {"flip": None if flip == "none" else flip, "align": "centre"}
         height = call(combine, "surface.second", placing, height, _face_height("surface.second", face))
-    steps = {name: table[name] for name in STEPS if name in table and name not in FACE_STEPS}
+    _, rest = split(table, *FACE_STEPS)
+    steps, _ = split(rest, *STEPS)
     if isinstance(steps.get("realisation"), int):
         # with a common seed, the first surrogates of all scans would deviate from their mean in the same direction
         scan = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
