@@ -16,6 +16,25 @@ RUBBER = rv.zener(3e6, 1e6, 1e5)
 QUICK_RUBBER = rv.zener(1e6, 0.3e6, 0.3e3)
 #: A layer and a base that creep in different times.
 COMPRESSIBLE, POLYMER = rv.zener(3e6, 1e6, 1e5, poisson=0.4), rv.zener(1e7, 2e6, 2e4, poisson=0.3)
+#: Retarded in 0.1 s; twice as compliant in the end.
+GEL = rv.zener(1e6, 1e6, 1e5)
+SMALL_ROUGH = rv.self_affine((1e-3, 0.8e-3), (22, 17), hurst=0.8, rms_slope=0.05, shortcut=1.5e-4, seed=4)
+#: The same with a hole.
+HOLED = SMALL_ROUGH.where((SMALL_ROUGH.x < 1.3e-4) | (SMALL_ROUGH.x > 2.8e-4) | (SMALL_ROUGH.y > 1.9e-4))
+
+OF_EACH_KIND = {
+    "elastic": rv.elastic(2e6, 0.3),
+    "series": rv.Prony(0.5, 0.1, (2.0, 1.0), (0.3, 20.0), poisson=0.3),
+    "bulk": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
+    "power law": rv.power_law(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
+    "pure power law": rv.power_law(0.0, 1.0, 0.7),
+    "table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2),
+    "noisy table": rv.creep_table((0.5, 1.0, 30.0, 1e3), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
+    "own": rv.creep(lambda t: 1.0 + np.log1p(t), poisson=0.1),
+    "pair": rv.pair(rv.elastic(8e10, 0.3), RUBBER),
+}
+OF_EACH_KIND["mixed pair"] = rv.pair(OF_EACH_KIND["power law"], OF_EACH_KIND["table"])
+OF_EACH_KIND["shifted"] = rv.shift(OF_EACH_KIND["power law"], 20.0)
 
 
 @dataclass(frozen=True)

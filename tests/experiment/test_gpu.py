@@ -6,6 +6,9 @@ from types import SimpleNamespace
 import device
 import numpy as np
 import pytest
+from samples import GEL as ZENER
+from samples import HOLED
+from samples import SMALL_ROUGH as ROUGH
 from support import BALL
 
 import roughvisc as rv
@@ -17,8 +20,6 @@ from roughvisc.settings import Settings
 from roughvisc.solve import solve
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 
-ZENER = rv.zener(1e6, 1e6, 1e5)
-ROUGH = rv.self_affine((1e-3, 0.8e-3), (22, 17), hurst=0.8, rms_slope=0.05, shortcut=1.5e-4, seed=4)
 PRESS = rv.Program().pressure(2e4, over=0).hold(0.3).pressure(5e3, over=0.1)
 GPU = rv.Numerics(device="gpu")
 
@@ -26,7 +27,6 @@ GPU = rv.Numerics(device="gpu")
 @pytest.fixture
 def gpu(monkeypatch):
     """The stand-in in CuPy's place, which must be used; SciPy transforms on both."""
-    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     asarray, shapes = device.asarray, []
     monkeypatch.setattr(
         device, "asarray", lambda values: (shapes.append(getattr(values, "shape", ())), asarray(values))[1]
@@ -35,16 +35,10 @@ def gpu(monkeypatch):
     assert shapes
 
 
-def holed():
-    values = ROUGH.values.copy()
-    values[3:6, :4] = np.nan
-    return ROUGH.copy(data=values)
-
-
 SCENES = {
     "part of a ball": (rv.sphere(1e-3, 1e-3, 71), ZENER, rv.Program().load(1e-4, over=0.1).hold(0.2), {}),
     "periodic": (ROUGH, ZENER, PRESS, {"boundary": "periodic"}),
-    "mirror, absent cells": (holed(), ZENER, PRESS, {"boundary": "mirror", "missing": "absent"}),
+    "mirror, absent cells": (HOLED, ZENER, PRESS, {"boundary": "mirror", "missing": "absent"}),
     "loss of contact": (
         ROUGH,
         rv.Prony(1e-6, 2e-7, (1e-6, 2e-6), (0.03, 0.3)),

@@ -2,27 +2,22 @@
 
 import numpy as np
 import pytest
+from samples import GEL as ZENER
+from samples import HOLED
+from samples import SMALL_ROUGH as SCAN
 from support import at_rows
 
 import roughvisc as rv
 from roughvisc.variables import FIELDS
 
-ZENER = rv.zener(1e6, 1e6, 1e5)
-SCAN = rv.self_affine((1e-3, 0.8e-3), (22, 17), hurst=0.8, rms_slope=0.05, shortcut=1.5e-4, seed=4)
 PRESS = rv.Program().pressure(2e4, over=0).hold(0.3).pressure(0, over=0.1).hold(0.1).pressure(4e4, over=0.2)
 UNIFORM = rv.Numerics(time_step=0.05)
-
-
-def holed(height):
-    values = height.values.copy()
-    values[3:6, :4] = np.nan
-    return height.copy(data=values)
 
 
 CASES = {
     "pressure": (SCAN, ZENER, PRESS, {}),
     "approach": (SCAN, ZENER, rv.Program().approach(1e-6, over=0.2).hold(0.2), {}),
-    "absent cells": (holed(SCAN), ZENER, PRESS, {"missing": "absent"}),
+    "absent cells": (HOLED, ZENER, PRESS, {"missing": "absent"}),
     "sheet": (SCAN, rv.sheet(ZENER, 2e-4), PRESS, {}),
     "layer": (SCAN, rv.layer(ZENER, 1e-4, on=rv.elastic(5e6)), PRESS, {}),
     "odd": (SCAN[:, :13], ZENER, PRESS, {}),

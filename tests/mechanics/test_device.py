@@ -15,7 +15,6 @@ SHAPE, SPACING = (23, 18), (1.0, 1.2)
 @pytest.fixture(autouse=True)
 def xp(monkeypatch):
     """The device in CuPy's place. SciPy transforms plain arrays too, as the stand-in does."""
-    monkeypatch.setenv("ROUGHVISC_TRANSFORMS", "scipy")
     return device.install(monkeypatch)
 
 

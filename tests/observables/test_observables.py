@@ -54,15 +54,6 @@ def test_clusters__counted_by_hand(mask, periodic, count):
     assert found["cluster_count"].values.tolist() == [count]
 
 
-def test_clusters__at_the_corners_of_a_periodic_map_are_one():
-    mask = np.zeros((5, 4), dtype=bool)
-    mask[[0, 0, -1, -1], [0, -1, 0, -1]] = True
-    assert int(observables.clusters(from_maps(mask))["cluster_count"][0]) == 4
-    assert int(observables.clusters(from_maps(mask, boundary="periodic"))["cluster_count"][0]) == 1
-    mask[0, 0] = mask[-1, -1] = False
-    assert int(observables.clusters(from_maps(mask, boundary="periodic"))["cluster_count"][0]) == 2
-
-
 def test_clusters__of_a_periodic_map_are_independent_of_its_origin():
     mask = np.random.default_rng(3).random((13, 18)) < 0.45
     found = observables.clusters(from_maps(mask, boundary="periodic"))

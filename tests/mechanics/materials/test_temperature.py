@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from samples import OF_EACH_KIND
 from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics.materials.creep import stiffened
 
+ELASTIC = OF_EACH_KIND["elastic"]
 GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)
 
 
@@ -25,25 +27,7 @@ def test_arrhenius__slope_over_the_inverse_temperature_is_the_activation_energy(
     assert logarithms[0] > 0 > logarithms[2]  # the cold is slow
 
 
-def own(t):
-    """J = 4e-6 (1 - exp(-t/3)/2)."""
-    return 4e-6 * (1 - np.exp(-t / 3) / 2)
-
-
-MATERIALS = {
-    "elastic": rv.elastic(2e6, 0.3),
-    "series": rv.Prony(2e-7, 1e-8, (3e-7, 1e-7), (0.1, 3.0), 0.4),
-    "bulk": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
-    "power law": rv.power_law(1e-8, 1e-6, 0.3, 7.0, 0.4),
-    "noisy table": rv.creep_table((0.5, 1.0, 30.0, 700.0), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
-    "table": rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)),
-    "pair": rv.pair(rv.elastic(8e10, 0.3), rv.zener(3e6, 1e6, 1e5)),
-    "mixed pair": rv.pair(rv.elastic(8e10, 0.3), rv.power_law(1e-8, 1e-6, 0.5)),
-    "own": rv.creep(own, 0.3),
-}
-
-
-@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+@pytest.mark.parametrize("material", OF_EACH_KIND.values(), ids=OF_EACH_KIND)
 @pytest.mark.parametrize("factor", [1e-3, 40.0])
 def test_scaled__is_the_material_in_reduced_time_or_stiffer(material, factor):
     t = np.array([0.0, 1e-3, 0.4, 6.0, 500.0])
@@ -60,7 +44,7 @@ def test_scaled__is_the_material_in_reduced_time_or_stiffer(material, factor):
 
 
 def test_shifted__a_table_ends_later_in_the_cold():
-    cold = rv.shift(MATERIALS["table"], 10.0)
+    cold = rv.shift(rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)), 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
     with pytest.raises(rv.InputError, match="table ends at 7000 s"):
         cold.contact_compliance(7001.0)
@@ -72,12 +56,12 @@ def test_shifted__a_table_ends_later_in_the_cold():
         (lambda: rv.wlf(248.0, 300.0, 17.44, 51.6), "temperature"),
         (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "wlf_c1"),
         (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
-        (lambda: rv.shift(MATERIALS["elastic"], 0.0), "factor"),
-        (lambda: rv.shift(MATERIALS["elastic"], np.nan), "factor"),
-        (lambda: rv.shift(MATERIALS["elastic"], "2 K"), "factor"),
+        (lambda: rv.shift(ELASTIC, 0.0), "factor"),
+        (lambda: rv.shift(ELASTIC, np.nan), "factor"),
+        (lambda: rv.shift(ELASTIC, "2 K"), "factor"),
         (lambda: rv.shift(3.0, 2.0), "material"),
-        (lambda: stiffened(MATERIALS["elastic"], 0.0), "modulus_factor"),
-        (lambda: stiffened(MATERIALS["elastic"], np.inf), "modulus_factor"),
+        (lambda: stiffened(ELASTIC, 0.0), "modulus_factor"),
+        (lambda: stiffened(ELASTIC, np.inf), "modulus_factor"),
     ],
 )
 def test_scaling__refuses_at_the_argument(wrong, key):

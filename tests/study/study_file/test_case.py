@@ -144,18 +144,6 @@ def test_observe__is_read_in_si_and_does_not_count_in_the_key(read_one):
 
 
 @pytest.mark.parametrize(
-    "stated",
-    [
-        {"resistivity": ["5 m K/W", 0.5]},
-        {"resistivity": ["2 uohm cm", 0]},
-        {"resistivity": ["1 ohm m", 2]},
-    ],
-)
-def test_conductance__is_accepted_with_numbers_or_units(read_one, stated):
-    assert len(read_one(observe={"conductance": stated}).observed["conductance"]["resistivity"]) == 2
-
-
-@pytest.mark.parametrize(
     ("observe", "tables", "key"),
     [
         ({"leakage": {"pressure_drop": 0}}, {}, "observe.leakage.pressure_drop"),

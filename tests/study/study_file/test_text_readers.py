@@ -24,43 +24,22 @@ def written(rows, separator, mark):
     return "".join(f"{quote}{separator.join(row).replace('.', mark)}{quote}\n" for row in rows)
 
 
-def points(_):
-    return [(f"{0.5 * i:.2f}", f"{1.5 * j:.2f}", z) for j, line in enumerate(HEIGHTS) for i, z in enumerate(line)]
-
-
+POINTS = [(f"{0.5 * i:.2f}", f"{1.5 * j:.2f}", z) for j, line in enumerate(HEIGHTS) for i, z in enumerate(line)]
 SCAN = 1e-6 * np.array(HEIGHTS, float).T  # [m]
-#: name -> suffix, rows, what reads them, and the numbers that come out
-READERS = {
-    **{
-        f"matrix in {suffix}": (
-            suffix,
-            lambda _: HEIGHTS,
-            lambda path: rv.open_scan(path, unit="um", spacing=1e-6).values,
-            SCAN,
-        )
-        for suffix in ("csv", "txt", "asc", "dat")
-    },
-    **{
-        f"points in {suffix}": (
-            suffix,
-            points,
-            lambda path: rv.open_scan(path, unit="mm", height_unit="um").values,
-            SCAN,
-        )
-        for suffix in ("csv", "txt", "xyz")
-    },
-}
+#: suffix, rows, and what the file does not state
+READERS = [(suffix, HEIGHTS, {"unit": "um", "spacing": 1e-6}) for suffix in ("csv", "txt", "asc", "dat")]
+READERS += [(suffix, POINTS, {"unit": "mm", "height_unit": "um"}) for suffix in ("csv", "txt", "xyz")]
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_text__is_read_right_in_every_encoding_or_refused_by_name(reader, tmp_path):
-    suffix, rows, read, expected = READERS[reader]
+@pytest.mark.parametrize(("suffix", "rows", "options"), READERS)
+def test_text__is_read_right_in_every_encoding_or_refused_by_name(suffix, rows, options, tmp_path):
     path = tmp_path / f"numbers.{suffix}"
     for separator, mark in STYLES:
-        text = written(rows(separator), separator, mark)
+        text = written(rows, separator, mark)
         for name, encode in WRITTEN.items():
             path.write_bytes(encode(text))
-            np.testing.assert_allclose(read(path), expected, rtol=1e-12, err_msg=f"{separator!r} {mark} {name}")
+            found = rv.open_scan(path, **options)
+            np.testing.assert_allclose(found, SCAN, rtol=1e-12, err_msg=f"{separator!r} {mark} {name}")
         path.write_bytes(text.encode("utf-16-le"))  # without its mark
         with pytest.raises(InputError, match=r"numbers\.\w+: .*zero bytes"):
-            read(path)
+            rv.open_scan(path, **options)
