@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError, short_repr
@@ -20,7 +23,7 @@ from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Settings
 from roughvisc.study.case_text import value_text
-from roughvisc.study.study_file import in_si, parts_of, shift_factor, with_files
+from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files
 from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.readers import sha256
@@ -354,3 +357,62 @@ def _digest(stated: Any) -> str:
         object_hook=lambda table: {key: value for key, value in table.items() if key != "note"},
     )
     return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+# -------------------------------------------------------------------------------------- varied parameters
+
+#: Dimensions, values and attributes of a coordinate.
+Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
+
+
+def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+    """Return the varied parameters of cases in JSON; a case that does not vary one may state it, or lacks it."""
+    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
+    return {
+        key: _column([{key: value_at(case, key, None), **case.get("varied", {})}[key] for case in cases])
+        for key in keys
+    }
+
+
+def _column(values: Sequence[Any]) -> NDArray[Any]:
+    """Return values as numbers, with NaN for None, or as strings."""
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return np.array([np.nan if value is None else value for value in values])
+    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
+
+
+def labels_of(
+    parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
+) -> dict[str, Label]:
+    """Return varied parameters as coordinates; ``long_name`` is the dotted key.
+
+    Parameters
+    ----------
+    parameters : mapping
+        Dotted key -> values over `dims`: numbers in SI, or strings.
+    case : mapping
+        A case in JSON, which determines the units.
+    dims : tuple of str
+        Dimensions of the values; empty for one case.
+    """
+    labels: dict[str, Label] = {}
+    for key, values in parameters.items():
+        unit = unit_of(key, case) if values.dtype.kind in "if" else ""
+        labels[identifier(key)] = (dims, values, {"long_name": key} | ({"units": unit} if unit else {}))
+    return labels
+
+
+def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
+    """Return the varied parameters of one case in JSON as scalar coordinates."""
+    return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
+
+
+def identifier(key: str) -> str:
+    """Return a name of a varied parameter that Python and pandas accept: its dotted key with underscores.
+
+    Examples
+    --------
+    >>> identifier("program.0.load")
+    'program_0_load'
+    """
+    return key.replace(".", "_")

@@ -42,11 +42,10 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
-from roughvisc.study.case import Case, read_cases
+from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import existing_part
-from roughvisc.study.storage.sweep_data import labels_of, parameters_of
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.variables import STEPPED

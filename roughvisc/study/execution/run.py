@@ -22,7 +22,7 @@ from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
-from roughvisc.study.case import Case, program_version
+from roughvisc.study.case import Case, labels_of_case, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.folder import (
     checkpoint_path,
@@ -35,7 +35,6 @@ from roughvisc.study.storage.folder import (
 )
 from roughvisc.study.storage.index import Entry, read_entry
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
-from roughvisc.study.storage.sweep_data import labels_of_case
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,9 +13,10 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.labels import heading
 from roughvisc.observables.frames import expect_result
+from roughvisc.study.case import parameters_of
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure
 from roughvisc.study.storage.index import index_of
-from roughvisc.study.storage.sweep_data import numbers_of, parameters_of, read_sweep
+from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.study.study_file import unit_of
 from roughvisc.variables import AXES, ERRORS, GRID_ERROR, IN_TABLE, LARGEST_IN_TABLE, VARIABLES, axis_of
 

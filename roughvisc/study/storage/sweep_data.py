@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.study.case import Case
+from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.storage.folder import DAMAGED, no_results, read_json
 from roughvisc.study.storage.index import Entry, index_of
 from roughvisc.study.storage.netcdf import lazy, read_variable
-from roughvisc.study.study_file import unit_of
-from roughvisc.study.sweep_table import DRAWN, REALISATION, value_at
+from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES
 
 log = logging.getLogger("roughvisc")
@@ -31,8 +30,6 @@ log = logging.getLogger("roughvisc")
 SWEEP = ".cases.json.gz"
 #: Coordinate with the key of the case.
 CASE_KEY = "case_key"
-#: Dimensions, values and attributes of a coordinate.
-Label = tuple[tuple[str, ...], NDArray[Any], dict[str, str]]
 
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
@@ -70,59 +67,6 @@ def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
         settings = json.dumps({name: one for name, one in varied.items() if name not in (REALISATION, *DRAWN)})
         found[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
     return found
-
-
-def parameters_of(cases: Sequence[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
-    """Return the varied parameters of cases in JSON; a case that does not vary one may state it, or lacks it."""
-    keys = dict.fromkeys(key for case in cases for key in case.get("varied", {}))
-    return {
-        key: _column([{key: value_at(case, key, None), **case.get("varied", {})}[key] for case in cases])
-        for key in keys
-    }
-
-
-def _column(values: Sequence[Any]) -> NDArray[Any]:
-    """Return values as numbers, with NaN for None, or as strings."""
-    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
-        return np.array([np.nan if value is None else value for value in values])
-    return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
-
-
-def labels_of(
-    parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
-) -> dict[str, Label]:
-    """Return varied parameters as coordinates; ``long_name`` is the dotted key.
-
-    Parameters
-    ----------
-    parameters : mapping
-        Dotted key -> values over `dims`: numbers in SI, or strings.
-    case : mapping
-        A case in JSON, which determines the units.
-    dims : tuple of str
-        Dimensions of the values; empty for one case.
-    """
-    labels: dict[str, Label] = {}
-    for key, values in parameters.items():
-        unit = unit_of(key, case) if values.dtype.kind in "if" else ""
-        labels[identifier(key)] = (dims, values, {"long_name": key} | ({"units": unit} if unit else {}))
-    return labels
-
-
-def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
-    """Return the varied parameters of one case in JSON as scalar coordinates."""
-    return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
-
-
-def identifier(key: str) -> str:
-    """Return a name of a varied parameter that Python and pandas accept: its dotted key with underscores.
-
-    Examples
-    --------
-    >>> identifier("program.0.load")
-    'program_0_load'
-    """
-    return key.replace(".", "_")
 
 
 def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.Dataset:
