@@ -33,13 +33,6 @@ def ellipse(per_cycle, program=THREE, start=0.0):
     return histories(program, time, 2 + np.cos(angle), np.sin(angle))
 
 
-def test_cycle_work__of_an_ellipse_is_its_area():
-    found = observables.cycle_work(ellipse(400))
-    assert found["cycle"].values.tolist() == [1, 2, 3]
-    np.testing.assert_allclose(found["cycle_start"], [0, PERIOD, 2 * PERIOD])
-    np.testing.assert_allclose(found["cycle_work"], np.pi, rtol=1e-4)
-
-
 def test_cycle_work__of_a_punch_settles_at_the_closed_form():
     mean, amplitude, per_cycle, cycles = 4e-6, 1e-6, 128, 8
     times = np.linspace(0.0, cycles * PERIOD, per_cycle * cycles + 1)

@@ -100,15 +100,10 @@ def test_gap_distribution__leaves_out_absent_cells_and_contact():
     np.testing.assert_allclose(found["gap_density"], [[7 / 12 / 2, 5 / 12 / 2]])
 
 
-@pytest.mark.parametrize("bins", [[1.0], [0.0, 2.0, 1.0]])
-def test_distributions__refuse_bad_edges(bins):
-    with refused("bins", bins):
-        observables.distribution(from_maps(RING), "gap", bins=bins)
-
-
-def test_distribution__of_an_unknown_field_is_refused():
-    with refused("name", "height"):
-        observables.distribution(from_maps(RING), "height")
+@pytest.mark.parametrize(("key", "found"), [("bins", [1.0]), ("bins", [0.0, 2.0, 1.0]), ("name", "height")])
+def test_distribution__refuses(key, found):
+    with refused(key, found):
+        observables.distribution(from_maps(RING), **{"name": "gap", key: found})
 
 
 @pytest.mark.parametrize("make", [made.hertz_creep, made.rough_creep, made.one_frame])

@@ -69,3 +69,4 @@ def test_boundary_after__keeps_the_period_as_the_steps_themselves_do(height):
         assert (boundary_after({step: value}, "periodic") == "periodic") == found, step
     assert is_periodic(rv.combine(height, height))
     assert not is_periodic(rv.combine(height, SCAN))
+    assert not is_periodic(height.copy(data=height.values + height.x.values[:, None]))

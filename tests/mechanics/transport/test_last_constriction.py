@@ -11,24 +11,21 @@ CELLS, AMPLITUDE = 128, 0.01
 FULL = np.sqrt(2) * np.pi * AMPLITUDE  # pressure of full contact over the contact modulus
 
 
-@pytest.fixture(scope="module")
-def conductance():
-    """Of the gap of a square lattice of bumps, over the load in parts of that of full contact. [-]"""
-    wave = np.cos(2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS)
-    undeformed = AMPLITUDE * (1 - wave[:, None] * wave)
-    cell = (1 / CELLS, 1 / CELLS)
-    operator = Grid(undeformed.shape, cell, "periodic")
+WAVE = np.cos(2 * np.pi * (np.arange(CELLS) + 0.5) / CELLS)
+CELL = (1 / CELLS, 1 / CELLS)
 
-    def at(load):
-        state = solve_contact(operator, undeformed, load=load * FULL * CELLS**2, tolerance=1e-10)
-        gap = np.maximum(undeformed + state.displacement - state.approach, 0.0)
-        return flow(np.where(state.pressure > 0, 0.0, gap), cell, wrap=True).conductance
 
-    return at
+def conductance(load):
+    """Of the gap of a square lattice of bumps, at a load in parts of that of full contact. [-]"""
+    undeformed = AMPLITUDE * (1 - WAVE[:, None] * WAVE)
+    operator = Grid(undeformed.shape, CELL, "periodic")
+    state = solve_contact(operator, undeformed, load=load * FULL * CELLS**2, tolerance=1e-10)
+    gap = np.maximum(undeformed + state.displacement - state.approach, 0.0)
+    return flow(np.where(state.pressure > 0, 0.0, gap), CELL, wrap=True).conductance
 
 
 @pytest.mark.long
-def test_last_constriction__closes_with_the_exponent_of_dapp_and_mueser(conductance):
+def test_last_constriction__closes_with_the_exponent_of_dapp_and_mueser():
     """Resistance as ``(L_c - L)^-3.45`` over a decade (W. B. Dapp, M. H. Müser, EPL 109 (2015) 44001)."""
     open_, closed = 0.2, 0.25
     while closed - open_ > 1e-5:

@@ -6,6 +6,7 @@ from support import ENCODINGS
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.topography.grid import spacing
 
 #: Numbers that show a lost mark, sign or row; as they are written with a decimal point.
 HEIGHTS = [[f"{-0.25 + 1.5 * i + 0.125 * j * j:.3f}" for i in range(5)] for j in range(4)]  # line j, column i
@@ -39,6 +40,7 @@ def test_text__is_read_right_in_every_encoding_or_refused_by_name(suffix, rows, 
         for name, encode in WRITTEN.items():
             path.write_bytes(encode(text))
             found = rv.open_scan(path, **options)
+            np.testing.assert_allclose(spacing(found), options.get("spacing", (5e-4, 1.5e-3)), rtol=1e-12)
             np.testing.assert_allclose(found, SCAN, rtol=1e-12, err_msg=f"{separator!r} {mark} {name}")
         path.write_bytes(text.encode("utf-16-le"))  # without its mark
         with pytest.raises(InputError, match=r"numbers\.\w+: .*zero bytes"):
