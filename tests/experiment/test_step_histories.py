@@ -1,17 +1,28 @@
-"""Which steps a history has, and where kept times lie."""
+"""Histories at every accepted step beside fields at kept times, and where kept times lie."""
 
 import numpy as np
 
 import roughvisc as rv
 from roughvisc.experiment.rows import spread_times
 
+RADIUS, SIDE, CELLS = 1e-3, 2e-4, 33
+BALL = rv.sphere(RADIUS, SIDE, CELLS)
+
+
+def test_histories__follow_the_closed_form():
+    """Of Lee and Radok at every step; the grid's part is of second order in the cell over the contact's radius."""
+    rubber, program = rv.zener(3e6, 1e6, 2e6), rv.Program().load(1e-4, over=0.5).hold(4.0)
+    ds = rv.simulate(BALL, rubber, program, times=[4.5], tolerance=1e-3, progress=False)
+    steps = rv.observables.history(ds)
+    exact = rv.closed_forms.lee_radok(RADIUS, rubber, program).approach(steps.time.values[1:])
+    assert (abs(steps.approach.values[1:] - exact) < 1e-3 * exact + 0.1 * (SIDE / CELLS) ** 2 / RADIUS).all()
+
 
 def test_force_of_a_whole_step__is_no_history():
     # no compliance at once: under given approach the force of an implicit step is not that at its end
     soft = rv.kelvin_voigt(1e6, 1e6)
     program = rv.Program().approach(1e-6, over=0.5).hold(1.0)
-    ball = rv.sphere(1e-3, 2e-4, 33)
-    ds = rv.simulate(ball, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
+    ds = rv.simulate(BALL, soft, program, times=[0.5, 1.5], tolerance=1e-2, progress=False)
     kept = set(ds.time.values)
     assert set(rv.observables.history(ds).time.values) - {0.0} <= kept
 
