@@ -78,6 +78,7 @@ def test_kept_times__are_counted_listed_or_snapped(times, expected):
         ({"height": BALL.where(BALL.max() > BALL)}, "height is missing at 2 of 1054"),
         ({"height": BALL / (BALL.max() > BALL)}, "height holds infinite"),
         ({"height": BALL * np.nan}, "height is missing everywhere"),
+        ({"height": BALL.values}, "height: found ndarray"),
         ({"height": BALL.assign_attrs(units="K")}, "height: .* K'"),
         ({"program": rv.Program()}, "program"),
         ({"times": [2.0]}, "times holds 2 s"),
