@@ -170,8 +170,10 @@ def run_cases(
                         done = sum(one.entry is not None for one in outcomes.values())
                         text = f"{outcome.message} ({done} of {len(distinct)} cases are finished)"
                         raise OSError(errno.ENOSPC, text)
+        except (KeyboardInterrupt, SystemExit, OSError) as error:
+            log.warning("interrupted after %d of %d cases: %r", len(outcomes), len(distinct), error)
+            raise
         finally:
-            log.info("%d of %d cases have ended", len(outcomes), len(distinct))
             index = index_of(folder, [outcome.entry for outcome in outcomes.values() if outcome.entry])
             for key in [key for key, one in outcomes.items() if one.entry is None and key in index]:
                 outcomes[key] = outcome_of(index[key], reused=True)  # another run has finished it

@@ -88,7 +88,7 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     address = json.loads(by_hand.read_text())["address"]
     done = subprocess.run([*RUN, "ball.toml", "--scheduler", address], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "4, all before: nothing to compute" in done.stdout
+    assert "4, 4 of them before" in done.stdout
 
 
 @pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.thorough), 0])
