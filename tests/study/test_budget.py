@@ -1,11 +1,16 @@
 """The total uncertainty of a number: sources compared with closed forms; the grid chosen for a wanted error."""
 
+import io
+
+import click
 import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 from support import STUDY, case_of, refused
 
 import roughvisc as rv
+from roughvisc.cli.accuracy_tables import budget_table
 from roughvisc.cli.study_options import parse_targets
 from roughvisc.study.case import Case
 
@@ -151,6 +156,17 @@ def test_solves__are_kept(tmp_path, monkeypatch):
     first = stated(study, tmp_path, modulus_error=0.05)
     monkeypatch.setattr("roughvisc.study.execution.run.compute", None)
     xr.testing.assert_identical(stated(study, tmp_path, modulus_error=0.05), first)
+
+
+@pytest.mark.parametrize(("direction", "text"), [(-1, "-9.5 to 63"), (1, "+11 to 1.7e+02"), (0, "±11 to 1.7e+02")])
+def test_table__states_an_error_that_only_lowers_the_number_below_100_percent(tmp_path, direction, text):
+    found = stated(case(BALL, tmp_path), tmp_path)
+    found["half_width"].loc[{"source": "grid"}] = [0.1, 1.0]
+    found["direction"].loc[{"source": "grid"}] = direction
+    console = Console(width=200, file=io.StringIO())
+    with click.Context(click.Command("budget")):
+        console.print(budget_table(found))
+    assert text in console.file.getvalue()
 
 
 def test_finished_result__is_used(tmp_path):

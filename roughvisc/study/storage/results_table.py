@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 log = logging.getLogger("roughvisc")
 
 CASES = "cases.csv"
-#: Relative difference of the values of all realisations below which a quantity counts as prescribed.
-_ALIKE = 1e-9
 
 
 def to_table(out: str | Path) -> pd.DataFrame:
