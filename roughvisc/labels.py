@@ -133,7 +133,7 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
 def cost_of(result: xr.Dataset) -> tuple[float, float]:
     """Return the wall time [s] and the convolutions of a result; NaN if it does not state them.
 
-    A result over time has them in the history of its steps.
+    A result over time states both in the history of its steps.
     """
     steps = steps_of(result)
     known = result if steps is None else steps

@@ -339,7 +339,7 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
 
 
 def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
-    """Return the L1 distance of the pressures on two grids, at each common time. [N]
+    """Return the L1 distance between the pressures on two grids at each common time. [N]
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ _WAVES_TOGETHER = 1 << 16
 # Number of decades of the wave number times the whole thickness, below one, searched for waves that depend on the
 # half-space alone.
 _SHORT, _DECADES = 15.0, 9
-# Numbers of waves per decade at which a series is computed: the first whose interpolant is accurate enough is used. And
-# error of the interpolant, as a part of the tolerance.
+# Numbers of waves per decade at which a series is computed: the first whose interpolant is accurate enough is used.
+# Error of the interpolant, as a fraction of the tolerance.
 _WAVES_PER_DECADE, _INTERPOLATED = (10, 14, 20, 30, 45), 0.2
 # Relative error of the interpolant of elastic layers.
 _ELASTIC = 1e-6
@@ -281,12 +281,12 @@ class LayerSeries:
 
     @cached_property
     def along(self) -> Any:
-        """Interpolant of the compliances in the logarithm of the wave number."""
+        """Interpolant of the compliances over the logarithm of the wave number."""
         return scipy.interpolate.CubicSpline(np.log(self.q), self.compliances, axis=1)
 
 
 def crept(times: ArrayLike, t: ArrayLike) -> Array:
-    """Return the weights of the terms of a series after some times, shape ``(..., m + 1)``.
+    """Return the weights of the terms of a series at some ages, shape ``(..., m + 1)``.
 
     These are ``1 - exp(-t / tau_m)``, the age ``t`` itself for an infinite time, and last one.
     """

@@ -47,7 +47,7 @@ STIFF = 3.0
 #:
 #: .. [1] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, section III.5.
 LARGEST_GROWTH = 2.4
-#: Largest error of a series that replaces a material, as a part of the tolerance.
+#: Largest error of a series that replaces a material, as a fraction of the tolerance.
 SERIES_SHARE = 0.1
 #: Part of this error for the series of the materials of a layered body; the rest is for the series of its waves.
 MATERIALS_SHARE = 0.3

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Gauss nodes and weights from -1 to 1, for a number of points.
+#: Gauss-Legendre nodes and weights on [-1, 1], by number of points.
 rule = cache(np.polynomial.legendre.leggauss)
 
 
 def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
-    """Return Gauss nodes and weights on equal parts of an interval from zero."""
+    """Return Gauss nodes and weights on equal parts of the interval from zero to an end."""
     nodes, weights = rule(points)
     side = end / count
     at = (np.arange(count)[:, None] + (nodes + 1) / 2) * side

@@ -50,7 +50,7 @@ SHARE, LEAST_SHARE = 0.4, 0.2
 LEAST_CHANGE = 0.1
 #: Part of the tolerance for the error so far and the error of a pair; safety factor of the length of the next pair.
 BUDGET, PLANNED = 0.7, 0.9
-#: Tolerance of the contact solver, as a part of the tolerance.
+#: Tolerance of the contact solver, as a fraction of the tolerance.
 SOLVER_SHARE = 0.2
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade: usually, and if
 #: cells leave the contact.
@@ -93,7 +93,7 @@ ENTERED = 0.3
 #: creep in the pair over the instantaneous compliance, and its largest value. Measured on random contacts of 2 x 40
 #: cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
 SHARED, SHARED_AT_MOST = 0.1, 1.0
-#: Largest error due to cells that have just entered, at a kept time inside a pair, as a part of the tolerance.
+#: Largest error due to cells that have just entered, at a kept time inside a pair, as a fraction of the tolerance.
 UNCERTAIN = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
@@ -645,7 +645,7 @@ def step_of_pair(
     """Return the point a step ahead, and the same point with the pressure at its time if it is kept.
 
     The pressure of a soft step belongs to the step. A short additional step gives the pressure at its end. The load is
-    constant in it, or the approach changes as before. The other parameters are those of :func:`take_step`.
+    constant in it, or the approach changes as before. For the other parameters see :func:`take_step`.
     """
     is_soft = is_soft and scene.keeps(time)
     point = take_step(scene, here, time, number, guess=guess, share=MAGNIFIED if is_soft else 1.0)

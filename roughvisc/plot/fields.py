@@ -199,8 +199,8 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         One case's result; if its fields are on Dask, only the drawn frames are loaded.
     times : float or str, or a list, optional
         The nearest kept times [s], or speeds [m/s], are drawn; negative whole numbers count from the end. Default: up
-        to four times, with that of the largest contact; for friction, the lowest speed, the speed of the largest
-        friction, and the highest.
+        to four times, among them the time of the largest contact; for friction, the lowest speed, the speed of the
+        largest friction, and the highest.
     fields : sequence of str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
         ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else

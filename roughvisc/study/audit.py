@@ -457,7 +457,7 @@ class Finding:
 
     @property
     def shown(self) -> str:
-        """The number to two digits, tiny numbers as 0; empty if it is not known."""
+        """The number with two significant digits, 0 if it is tiny; empty if it is not known."""
         return "" if math.isnan(self.number) else f"{float(f'{round(max(self.number, 0.0), 9):.2g}'):g}"
 
 

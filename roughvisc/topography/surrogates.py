@@ -38,7 +38,7 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
 
     Notes
     -----
-    Phases and amplitudes are those of a Gaussian random field, as in :func:`self_affine` with Gaussian amplitudes. The
+    The surrogate is a Gaussian random field, as in :func:`self_affine` with Gaussian amplitudes. The
     spectrum is the radial average of :func:`psd`, up to the largest wave number with a complete ring. Direction and
     shape (skewness, kurtosis, ridges) of the surface are lost. A surface that is not periodic is used with its mirror
     images. A surface made by :func:`mirror` gives surfaces as large as the original part, because only that part was

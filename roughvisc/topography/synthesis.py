@@ -173,7 +173,7 @@ def self_affine(
 
 
 def whole(key: str, value: Any, least: int = 0) -> int:
-    """Return a whole number; refuse smaller numbers and other values."""
+    """Return a whole number of at least `least`; refuse any other value."""
     if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
         raise InputError(key=key, found=value, expected=f"a whole number of at least {least}")
     return int(value)

@@ -127,10 +127,10 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
 
 
 def _toml(value: Any, digits: int | None = None) -> str:
-    """Return a value as TOML, with its numbers as lengths of so many digits, unless `digits` is None."""
+    """Return a value as TOML; if `digits` is given, numbers are written as lengths with this many digits."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(one, digits)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):
         return f"[{', '.join(_toml(one, digits) for one in value)}]"
     text = value if digits is None else written_quantity(float(value), "m", digits)
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML equals JSON but for this character
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML escapes it, JSON does not

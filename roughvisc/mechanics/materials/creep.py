@@ -411,5 +411,5 @@ def check_creep(material: Material, times: Array) -> Array:
     is_possible = np.isfinite(values) & (values >= 0) & ((values > 0) | (times == 0)) & ~falls
     for at in np.flatnonzero(~is_possible)[:1]:
         found = f"creep of {material!r} is {values[at]:g} 1/Pa at {times[at]:g} s"
-        raise InputError(f"{found}: expected a positive compliance, or zero at time zero, no less than before")
+        raise InputError(f"{found}: expected a positive compliance (zero only at time zero), no less than before")
     return values[1:]

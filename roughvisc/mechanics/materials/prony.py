@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
-#: Kind of test in which a modulus or a compliance was measured.
+#: Type of test that measured a modulus or a compliance.
 Kind = Literal["shear", "tensile"]
 
 

@@ -159,7 +159,7 @@ def _conductances(mobility: Array, aspect: float, wrap: bool) -> Array:
     -------
     ndarray, shape ((2 nx + 1) * ny,)
         First the faces that the flow along the map crosses, ``nx + 1`` rows from inlet to outlet. Then the face of each
-        cell to its neighbour at larger y; that of the last column joins the borders or is closed.
+        cell to its neighbour at larger y; the face of the last column joins the borders or is closed.
     """
 
     def in_series(one: Array, other: Array) -> Array:

@@ -94,7 +94,7 @@ def require_writable(folder: Path, why: str = "") -> None:
 
 
 def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc)") -> InputError:
-    """Return the error of a file that is not what a caller expects; another file may follow under its name."""
+    """Return the error of an unexpected file. It is transient, because the file may be replaced."""
     text = f"{path}: {found}: expected {expected}"
     return InputError(text, key=str(path), found=found, expected=expected, transient=True)
 

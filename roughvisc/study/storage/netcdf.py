@@ -202,7 +202,7 @@ def verify(place: str | Path) -> dict[Path, str]:
     Raises
     ------
     InputError
-        If there are no results.
+        If the path does not exist, or the folder contains no result.
     """
     place, flaws = Path(place), {}
     if not place.exists():

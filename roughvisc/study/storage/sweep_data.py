@@ -100,7 +100,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     Raises
     ------
     InputError
-        If there are no results, or some results lie over time and others over speed.
+        If the folder contains no result, or some results lie over time and others over speed.
 
     Examples
     --------

@@ -52,7 +52,7 @@ def read_table(text: str) -> Table:
     """Return the table in a text.
 
     Values are separated by blanks, commas, semicolons or tabs. Empty values are missing heights. Lines of other text,
-    such as ``# Width: 26 um``, stay unchanged, but for a decimal comma.
+    such as ``# Width: 26 um``, stay unchanged, except that a decimal comma becomes a point.
 
     Raises
     ------
