@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import rough_gap
 
-from roughvisc.mechanics.transport.flow import flow
+from roughvisc.mechanics.transport import flow
 
 transport = pytest.importorskip("reynoldsflow.transport")
 

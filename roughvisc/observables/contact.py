@@ -12,7 +12,7 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.mechanics.transport.clusters import label_clusters
+from roughvisc.mechanics.transport import label_clusters
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import in_si
@@ -37,11 +37,10 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     InputError
         If the result contains neither ``pressure`` nor ``gap``.
     """
-    if "pressure" in dataset:
-        need(dataset, "pressure")
-        return (by_frame(dataset["pressure"]) > 0).drop_attrs(deep=False)
-    need(dataset, "gap")
-    return (by_frame(dataset["gap"]) <= 0).drop_attrs(deep=False)
+    name = "pressure" if "pressure" in dataset else "gap"
+    need(dataset, name)
+    field = by_frame(dataset[name]).drop_attrs(deep=False)
+    return field > 0 if name == "pressure" else field <= 0
 
 
 def clusters(dataset: xr.Dataset) -> xr.Dataset:
@@ -67,7 +66,7 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
     periodic = dataset.attrs.get("boundary") == "periodic"
 
     def measure(frame: np.ndarray) -> tuple[float, float, float]:
-        sizes = np.bincount(label_clusters(frame, (periodic, periodic))[0].ravel())[1:]
+        sizes = np.bincount(label_clusters(frame, (periodic, periodic)).ravel())[1:]
         return (sizes.size, sizes.mean(), sizes.max()) if sizes.size else (0.0, np.nan, np.nan)
 
     cell = math.prod(spacing(dataset, "clusters"))
@@ -117,11 +116,11 @@ def distribution(
     if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
         raise InputError(key="bins", found=bins, expected="a number, or two or more edges that increase")
 
-    def measure(frame: np.ndarray) -> tuple[np.ndarray]:
+    def measure(frame: np.ndarray) -> np.ndarray:
         values = frame[frame > 0]
         inside = np.histogram(values, edges)[0]
-        return (inside / (values.size * np.diff(edges)) if values.size else np.full(len(edges) - 1, np.nan),)
+        return inside / (values.size * np.diff(edges)) if values.size else np.full(len(edges) - 1, np.nan)
 
-    (density,) = frame_by_frame(measure, field, outputs=[(dim,)], sizes={dim: len(edges) - 1})
+    density = frame_by_frame(measure, field, outputs=[(dim,)], sizes={dim: len(edges) - 1})
     middles = {dim: (dim, (edges[1:] + edges[:-1]) / 2)}
     return label(xr.Dataset({f"{name}_density": density}).assign_coords(middles))

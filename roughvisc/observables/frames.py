@@ -1,15 +1,20 @@
-"""Application of a function of one frame to every frame of a result."""
+"""Rows of a result: checks, a function of every frame, histories of the steps, and the work of each cycle."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import expect_declared_units
-from roughvisc.variables import OTHER_DIMS, axis_of
+from roughvisc.labels import expect_declared_units, label, steps_of
+from roughvisc.variables import OTHER_DIMS, STEPPED, axis_of
+
+#: Times closer than this part of a period count as equal.
+_SAME = 1e-9
 
 
 def need(dataset: xr.Dataset, *names: str) -> None:
@@ -45,7 +50,7 @@ def frame_by_frame(
     outputs: Sequence[Sequence[str]] = ((),),
     sizes: dict[str, int] | None = None,
     over: Sequence[str] = ("x", "y"),
-) -> tuple[xr.DataArray, ...]:
+) -> Any:
     """Apply a function of the (x, y) arrays of one frame to every frame.
 
     The result is lazy if the fields are on Dask or are not read from their file yet, and computed immediately
@@ -54,7 +59,7 @@ def frame_by_frame(
     Parameters
     ----------
     function : callable
-        Returns a tuple with one number or array for each of `outputs`.
+        Returns a number or an array, or a tuple of them for several `outputs`.
     *fields : xarray.DataArray
         Over x and y and any other dimensions.
     outputs : sequence of sequence of str
@@ -64,8 +69,8 @@ def frame_by_frame(
     over : sequence of str
         Dimensions of a frame, in the order of the axes that the function takes.
     """
-    found = xr.apply_ufunc(
-        function if len(outputs) > 1 else lambda *frame: function(*frame)[0],
+    return xr.apply_ufunc(
+        function,
         *map(by_frame, fields),
         input_core_dims=[over] * len(fields),
         output_core_dims=outputs,
@@ -75,4 +80,78 @@ def frame_by_frame(
         output_dtypes=[float] * len(outputs),
         dask_gufunc_kwargs={"output_sizes": sizes or {}},
     )
-    return found if len(outputs) > 1 else (found,)
+
+
+def history(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the histories at every accepted step, under the names of the histories at the kept times.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result.
+
+    Returns
+    -------
+    xarray.Dataset
+        Force, approach, area, mean gap and work over ``time`` at every accepted step. If the Dataset carries no steps,
+        its rows are returned.
+
+    Raises
+    ------
+    InputError
+        If the Dataset contains several cases.
+    """
+    need(dataset, "time")
+    if "time" not in dataset.dims or "case" in dataset.dims:
+        raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
+    steps = steps_of(dataset)
+    if steps is not None:
+        return steps.swap_dims(step="time").drop_attrs(deep=False)
+    rows = dataset[[name for name in STEPPED if name in dataset]].drop_attrs(deep=False)
+    return rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
+
+
+def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
+    r"""Return the work done by the force in every cycle of the program, :math:`W = \oint F \, d\delta`.
+
+    If force and approach are equal at the start and the end of a cycle, the work is the energy dissipated in the cycle.
+    Otherwise a part of the work is stored, or was stored before.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One case's result with ``work``, under a program with :meth:`Program.cycle`.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``cycle_start`` [s] and ``cycle_work`` [J] over ``cycle``, the numbers of the cycles from 1. Cycles that the
+        result does not cover are left out.
+
+    Raises
+    ------
+    InputError
+        If the program has no whole cycle.
+
+    Notes
+    -----
+    The work of a cycle is the change of the variable ``work`` in the cycle, over all accepted steps. Between steps
+    ``work`` is interpolated linearly.
+    """
+    steps = history(dataset)
+    need(steps, "work")
+    times = steps["time"].values
+    segments = json.loads(dataset.attrs.get("cycles", "[]"))
+    begin = np.array([start + number * period for start, period, count in segments for number in range(count)])
+    period = np.repeat([one[1] for one in segments], [int(one[2]) for one in segments])
+    if not begin.size:
+        expected = "one case's result, under a program with a whole cycle: see Program.cycle"
+        raise InputError(key="cycles", found=segments, expected=expected)
+    covered = (times[0] <= begin + _SAME * period) & (begin + period <= times[-1] + _SAME * period)
+    begin, end = begin[covered], (begin + period)[covered]
+    work = np.interp(end, times, steps["work"]) - np.interp(begin, times, steps["work"])
+    found = xr.Dataset(
+        {"cycle_start": ("cycle", begin), "cycle_work": ("cycle", work)},
+        coords={"cycle": np.flatnonzero(covered) + 1},
+    )
+    return label(found)

@@ -17,8 +17,7 @@ from roughvisc.labels import label
 from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
-from roughvisc.observables.frames import need
-from roughvisc.observables.histories import history
+from roughvisc.observables.frames import history, need
 from roughvisc.topography.grid import nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import wavevectors

@@ -19,7 +19,6 @@ from matplotlib.patches import Patch
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage
-from roughvisc.observables.deformed import deformed
 from roughvisc.observables.frames import expect_result, need
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
@@ -272,7 +271,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     -------
     matplotlib.figure.Figure
     """
-    expect_result(dataset, "x", "y", "height", "pressure")
+    expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
     rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
     frame = largest_contact(dataset) if time is None else frames_at(dataset, time)[0]
@@ -280,7 +279,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     load, places = whole["pressure"].sum(axis).values, dataset[across].values
     index = int(load.argmax() if at is None else np.abs(places - at).argmin())
     cut = whole.isel({across: index}).load()
-    height, surface = cut["height"], deformed(dataset, float(whole[rows])).isel({across: index})
+    height, surface = cut["height"], cut["height"] + cut["gap"]
     plane, pressure = plane_unit(dataset), unit_for(cut["pressure"], "Pa")
     edges, x = plane(cell_edges(dataset[axis])), plane(dataset[axis])
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x", left=0.7)

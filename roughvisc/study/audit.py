@@ -21,8 +21,7 @@ from scipy import fft, ndimage
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, complement
-from roughvisc.observables.frames import expect_result
-from roughvisc.observables.histories import history
+from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.borders import border_mismatch, is_analytic, recipe_name
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing

@@ -11,7 +11,7 @@ from typing import Any
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.observables import study_observables
+from roughvisc.observables import OBSERVABLES
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import lock_case, lock_path, result_path
@@ -78,7 +78,8 @@ def _add(case: Case, path: Path) -> bool:
         lacking = _lacking(case, result)
         frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame
         try:
-            found = study_observables(frames, lacking).compute()
+            parts = [OBSERVABLES[name](frames, **arguments) for name, arguments in lacking.items()]
+            found = xr.merge(parts, compat="equals", join="exact").compute()
         except InputError as error:
             raise error.prefixed(str(path)) from error
         known = json.loads(result.attrs.get(OBSERVED, "{}")) | lacking

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.loading import Loading
-from roughvisc.observables.conductance import conductance
-from roughvisc.observables.leakage import leakage
+from roughvisc.observables import conductance, leakage
 from roughvisc.study.case import Case
 
 Array = NDArray[np.float64]

@@ -8,9 +8,8 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from support import refused
 
-import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.observables import leakage, study_observables
+from roughvisc.observables import leakage
 from roughvisc.variables import VARIABLES
 
 CELL = (2e-6, 3e-6)
@@ -100,12 +99,3 @@ def test_leakage__refuses_results_that_do_not_say():
         leakage(made.rough_creep().drop_vars("gap"))
     with pytest.raises(InputError, match=r"the gap is missing in 68 of 7200 cells, where the surface is absent"):
         leakage(made.rough_creep(frames=1))
-
-
-def test_asked__is_what_the_study_has():
-    ds = result(plane(), wall())
-    assert not study_observables(ds).data_vars
-    ds.attrs["case"] = '{"observe": {"leakage": {"viscosity": 0.002, "along": "y"}}}'
-    xr.testing.assert_identical(study_observables(ds), leakage(ds, viscosity=2e-3, along="y"))
-    with pytest.raises(InputError, match="observe: unknown observable 'noise': expected some of leakage"):
-        rv.observables.study_observables(ds, {"noise": {}})

@@ -109,17 +109,17 @@ def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     one = read_cases(study(fields + LEAKAGE))
     two = read_cases(study(fields + "[observe.conductance]\nresistivity = [1.0, 1.0]\n"))
     rv.run(one[0], tmp_path / "out", progress=False)
-    plain, refused = observed.study_observables, []
+    plain, refused = rv.observables.leakage, []
 
-    def meanwhile(*given):
-        monkeypatch.setattr(observed, "study_observables", plain)
+    def meanwhile(*given, **named):
+        monkeypatch.setitem(observed.OBSERVABLES, "leakage", plain)
         try:
             rv.observe(two, tmp_path / "out")
         except BlockingIOError as error:
             refused.append(error)
-        return plain(*given)
+        return plain(*given, **named)
 
-    monkeypatch.setattr(observed, "study_observables", meanwhile)
+    monkeypatch.setitem(observed.OBSERVABLES, "leakage", meanwhile)
     (path,) = rv.observe(one, tmp_path / "out")
     assert refused
     rv.observe(two, tmp_path / "out")

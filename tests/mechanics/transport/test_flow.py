@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from support import rough_gap
 
-from roughvisc.mechanics.transport import flow as solvers
-from roughvisc.mechanics.transport.flow import flow
+from roughvisc.mechanics import transport as solvers
+from roughvisc.mechanics.transport import flow
 
 CELL = (2e-6, 3e-6)
 ON_TWO_GRIDS = solvers._ON_TWO_GRIDS

@@ -5,7 +5,7 @@ import pytest
 
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.transport.flow import flow
+from roughvisc.mechanics.transport import flow
 
 CELLS, AMPLITUDE = 128, 0.01
 FULL = np.sqrt(2) * np.pi * AMPLITUDE  # pressure of full contact over the contact modulus

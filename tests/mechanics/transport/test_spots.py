@@ -8,7 +8,7 @@ from support import rough_gap
 
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.transport.spots import frozen_contact
+from roughvisc.mechanics.transport import frozen_contact
 
 #: Stiffness of a square of unit side over the contact modulus: pi times the capacity of a square plate, 0.36678742 of
 #: its side (F. H. Read, J. Comput. Phys. 133 (1997) 1).

@@ -1,1 +1,0 @@
-"""Conduction through contact spots, and leakage through the gap. Arrays only."""
