@@ -287,11 +287,12 @@ def run(
         If the contact of a step or at a speed is not solved; no result is written.
     """
     from roughvisc.study.case import Case, read_study
-    from roughvisc.study.execution.run import run_stated
+    from roughvisc.study.execution.run import result_folder, run_case
+    from roughvisc.study.storage.netcdf import open_result
 
     stated = case if isinstance(case, Case) else read_study(case)
     if want is None:
-        return run_stated(stated, out, progress=progress, threads=threads)
+        return open_result(run_case(stated, result_folder(stated, out), progress=progress, threads=threads))
     from roughvisc.study import target
 
     return target.run(stated, out, want=want, progress=progress is not False, threads=threads)

@@ -12,7 +12,7 @@ import re
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from roughvisc.errors import InputError, short_repr
@@ -142,13 +142,13 @@ def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> st
 def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
     """Return the only one of some keys in a table; refuse a table with none or several."""
     keys = list(keys)
-    found = [key for key in keys if key in table]
+    found = table.keys() & keys
     if len(found) != 1:
         expected = f"exactly one of {', '.join(keys)}"
         hint = "" if found else next(filter(None, (nearest(key, keys, "") for key in table)), "")
         message = f"{where}: found {short_repr(table)}: expected {expected}{hint}"
         raise InputError(message, key=where, found=table, expected=expected)
-    return found[0]
+    return found.pop()
 
 
 def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
@@ -202,13 +202,14 @@ def suits(value: Any, hint: Any) -> bool:
     """
     kind, inner = get_origin(hint), get_args(hint)
     if kind in (Union, types.UnionType):
-        return any(suits(value, one) for one in inner)
+        return any(map(partial(suits, value), inner))
     if kind is Literal:
         return any(value == one and isinstance(value, type(one)) for one in inner)
-    if kind is tuple and ... not in inner:
-        return isinstance(value, list | tuple) and len(value) == len(inner) and all(map(suits, value, inner))
     if kind in (tuple, Sequence):
-        return isinstance(value, list | tuple) and all(suits(one, inner[0]) for one in value)
+        if not isinstance(value, list | tuple):
+            return False
+        hints = inner if kind is tuple and ... not in inner else inner[:1] * len(value)
+        return len(value) == len(hints) and all(map(suits, value, hints))
     if hint in (float, int):
         return isinstance(value, (int, float) if hint is float else int) and not isinstance(value, bool)
     is_plain = hint is not Any and isinstance(hint, type) and not getattr(hint, "_is_protocol", False)

@@ -132,9 +132,9 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.execution.run import is_result_of, run_case
-    from roughvisc.study.storage.folder import result_path
+    from roughvisc.study.storage.folder import case_path
 
-    if is_result_of(case, result_path(folder, case.key)):
+    if is_result_of(case, case_path(folder, case.key, "result")):
         say(console, "Already finished: nothing to compute")
     with reporting(case.title, case.experiment.progress, console) as report:
         path = run_case(case, folder, progress=report, threads=threads or threads_each(1))

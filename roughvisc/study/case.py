@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,10 +131,11 @@ class Case:
     @property
     def surface_sha256(self) -> str:
         """SHA-256 of the scan's file, or of the recipe of a generated surface."""
-        return self._checksums[0][0]
+        return self.checksums[0][0]
 
     @cached_property
-    def _checksums(self) -> list[tuple[str, str]]:
+    def checksums(self) -> list[tuple[str, str]]:
+        """Checksums of the files of the surface when the case was read, as :func:`checksums_of` returns them."""
         return checksums_of(self.surface)
 
     @cached_property
@@ -147,12 +149,16 @@ class Case:
         for one in fields(self.settings):
             if (value := getattr(self.settings, one.name)) != one.default:
                 settings.setdefault(one.name, value)
-        tables = {name: self.tables.get(name) for name in ("material", "program", "friction")}
-        surface = [
-            {name: value for name, value in face.items() if name not in ("file", "second") and value is not False}
-            for face in _faces(self.surface)
-        ]
-        return _digest([tables, surface, settings, self._checksums, NUMERICS_REVISION])[:16]
+        tables = {"material": self.tables["material"]}
+        tables |= {"program": self.tables.get("program"), "friction": self.tables.get("friction")}
+        surface = []
+        for face in filter(None, (self.surface, self.surface.get("second"))):
+            stated = split(face, "file", "second")[1]
+            for name in face:
+                if face[name] is False:  # a step left out
+                    del stated[name]
+            surface.append(stated)
+        return _digest([tables, surface, settings, self.checksums, NUMERICS_REVISION])[:16]
 
     def height(self) -> xr.DataArray:
         """Return the conditioned heights of the surface, peaks up. [m]
@@ -166,7 +172,7 @@ class Case:
         """
         from roughvisc.experiment.resources import require_surface  # slow to import
 
-        before, source = self._checksums, str(self.origin or "case")
+        before, source = self.checksums, str(self.origin or "case")
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
@@ -196,7 +202,7 @@ class Case:
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
         origin, varied = data.pop("origin", None), data.pop("varied", {})
-        return replace(_case_of(data, origin and Path(origin), None), varied=varied)
+        return replace(_case_of(data, origin and Path(origin)), varied=varied)
 
 
 def read_study(path: str | Path) -> Case:
@@ -258,7 +264,7 @@ def read_cases(path: str | Path) -> list[Case]:
     cases = []
     for number, (change, drawn) in enumerate(changes):
         try:
-            cases.append(_changed(data, change, path, drawn))
+            cases.append(_case_of(data, path, path.parent, change, drawn))
         except InputError as error:
             values = ", ".join(f"{key} = {short_repr(value)}" for key, value in {**change, **drawn}.items())
             raise error.prefixed(f"{path}: case {number} ({values})" if values else str(path)) from error
@@ -285,30 +291,39 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
         If a key does not exist or a value is refused.
     """
     try:
-        changed = _changed(case.tables, changes, case.origin)
+        changed = _case_of(case.tables, case.origin, case.origin and case.origin.parent, changes)
     except InputError as error:
         raise error.prefixed(str(case.origin or "case")) from error
     return replace(changed, varied={**case.varied, **changed.varied})
 
 
-def _changed(
-    data: Mapping[str, Any], changes: Mapping[str, Any], origin: Path | None, drawn: Mapping[str, int] | None = None
+def _case_of(
+    data: Mapping[str, Any],
+    origin: Path | None,
+    folder: Path | None = None,
+    changes: Mapping[str, Any] = MappingProxyType({}),
+    drawn: Mapping[str, int] = MappingProxyType({}),
 ) -> Case:
-    """Return the case of some tables after changes; `drawn` contains the number of a realisation."""
+    """Return the checked case of the tables of a study after changes.
+
+    Parameters
+    ----------
+    data : mapping
+        Tables of the study.
+    origin : Path or None
+        The study file.
+    folder : Path, optional
+        Folder of relative paths. Default: paths are not resolved.
+    changes : mapping
+        Dotted key -> value.
+    drawn : mapping
+        Number of the realisation, if the case is one.
+    """
     for key, value in changes.items():
         data = place(data, key, value)
-    case = _case_of(data, origin, origin.parent if origin else None)
-    varied = {key: value_at(case.tables, key, value) for key, value in changes.items()}
-    if drawn:
-        varied = {key: value for key, value in varied.items() if key != SURROGATE} | drawn
-    return replace(case, varied=varied)
-
-
-def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) -> Case:
-    """Return the checked case of the tables of a study; without a folder, paths are not resolved."""
     try:
         tables = with_files(data, folder)
-        return Case(tables, origin, **parts_of(tables))
+        case = Case(tables, origin, **parts_of(tables))
     except InputError as error:
         for key in (error.key, error.key.rpartition(".")[0]):
             file = value_at(data, f"{key}.file", None)
@@ -319,16 +334,17 @@ def _case_of(data: Mapping[str, Any], origin: Path | None, folder: Path | None) 
             raise
         message = str(error).replace(repr(error.found), repr(text))
         raise type(error)(message, key=error.key, found=text, expected=error.expected) from error
-
-
-def _faces(surface: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return [surface, *([surface["second"]] if "second" in surface else [])]
+    varied: dict[str, Any] = {}
+    for key, value in changes.items():
+        if not drawn or key != SURROGATE:
+            varied[key] = value_at(tables, key, value)
+    return replace(case, varied=varied | drawn)
 
 
 def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
     found = []
-    for face in _faces(surface):
+    for face in filter(None, (surface, surface.get("second"))):
         if "file" not in face:
             found.append((_digest(split(face, "second", "missing", "flip", "offset", *STEPS)[1]), ""))
             continue
@@ -349,13 +365,12 @@ def _digest(stated: Any) -> str:
     def rounded(number: str) -> str:
         return f"{float(number) + 0.0:.15g}"  # of -0.0 and 0.0 the same
 
-    plain = json.loads(
-        json.dumps(stated),
-        parse_int=rounded,
-        parse_float=rounded,
-        parse_constant=rounded,
-        object_hook=lambda table: {key: value for key, value in table.items() if key != "note"},
-    )
+    def without_note(table: dict[str, Any]) -> dict[str, Any]:
+        table.pop("note", None)
+        return table
+
+    text, numbers = json.dumps(stated), dict.fromkeys(("parse_int", "parse_float", "parse_constant"), rounded)
+    plain = json.loads(text, object_hook=without_note, **numbers)
     return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -381,30 +396,24 @@ def _column(values: Sequence[Any]) -> NDArray[Any]:
     return np.array(["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values])
 
 
-def labels_of(
-    parameters: Mapping[str, NDArray[Any]], case: Mapping[str, Any], dims: tuple[str, ...] = ()
-) -> dict[str, Label]:
+def labels_of(parameters: Mapping[str, Any], case: Mapping[str, Any], dims: tuple[str, ...] = ()) -> dict[str, Label]:
     """Return varied parameters as coordinates; ``long_name`` is the dotted key.
 
     Parameters
     ----------
     parameters : mapping
-        Dotted key -> values over `dims`: numbers in SI, or strings.
+        Dotted key -> values over `dims`: numbers in SI, or strings; for one case, its value.
     case : mapping
         A case in JSON, which determines the units.
     dims : tuple of str
         Dimensions of the values; empty for one case.
     """
     labels: dict[str, Label] = {}
-    for key, values in parameters.items():
+    for key, stated in parameters.items():
+        values = stated if dims else _column([stated])[0]
         unit = unit_of(key, case) if values.dtype.kind in "if" else ""
         labels[identifier(key)] = (dims, values, {"long_name": key} | ({"units": unit} if unit else {}))
     return labels
-
-
-def labels_of_case(case: Mapping[str, Any]) -> dict[str, Label]:
-    """Return the varied parameters of one case in JSON as scalar coordinates."""
-    return labels_of({key: _column([value])[0] for key, value in case.get("varied", {}).items()}, case)
 
 
 def identifier(key: str) -> str:

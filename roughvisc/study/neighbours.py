@@ -26,7 +26,7 @@ from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.sweep import run_cases
 from roughvisc.study.quantities import Observable, quantity_of
-from roughvisc.study.storage.folder import result_path
+from roughvisc.study.storage.folder import case_path
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.study_file import TEMPERATURE
 from roughvisc.topography.conditioning import FACE_STEPS
@@ -274,7 +274,7 @@ def solve(
     for key, outcome in outcomes.items():
         if outcome.entry is None:
             raise RoughviscError(f"a neighbouring case failed ({distinct[key].varied}): {outcome.message}")
-    return {key: open_result(result_path(folder, key)) for key in outcomes}
+    return {key: open_result(case_path(folder, key, "result")) for key in outcomes}
 
 
 def at_rows(result: xr.Dataset, axis: str, places: Any) -> xr.Dataset:
@@ -448,7 +448,7 @@ def budget(
         raise InputError(key="quantity", found=names, expected="at least one")
     if not isinstance(case, Case):
         case = read_study(case)
-    finished = result_path(result_folder(case), case.key)
+    finished = case_path(result_folder(case), case.key, "result")
     folder = Path(out).expanduser() if out is not None else finished.parent / FOLDER
     observed = [quantity_of(case, name) for name in names]
     base, own = with_kept(case, [field for one in observed for field in one.fields]), None

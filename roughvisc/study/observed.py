@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.observables import OBSERVABLES
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.storage.folder import lock_case, lock_path, result_path
+from roughvisc.study.storage.folder import case_path, lock_case
 from roughvisc.study.storage.netcdf import open_result, write_result
 from roughvisc.study.storage.results_table import write_table
 
@@ -62,7 +62,7 @@ def observe(
     for number, case in enumerate(distinct.values()):
         if progress is not None:
             progress(number, len(distinct))
-        path = result_path(folder, case.key)
+        path = case_path(folder, case.key, "result")
         if path.exists() and _add(case, path):
             added.append(path)
     if added and len(cases) > 1:
@@ -74,8 +74,8 @@ def _add(case: Case, path: Path) -> bool:
     """Add the missing quantities of one case to its file; return whether any was missing."""
     if not _lacking(case, open_result(path)):
         return False
-    with lock_case(lock_path(path.parent, case.key)), open_result(path) as result:  # read again: it may have changed
-        lacking = _lacking(case, result)
+    with lock_case(case_path(path.parent, case.key, "lock")), open_result(path) as result:
+        lacking = _lacking(case, result)  # again, because the file may have changed
         frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame
         try:
             parts = [OBSERVABLES[name](frames, **arguments) for name, arguments in lacking.items()]

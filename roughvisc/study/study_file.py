@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
 from functools import partial
+from itertools import filterfalse
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -52,6 +53,7 @@ PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": 
 #: Table of each setting.
 TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
 TABLE_OF |= dict.fromkeys(("fields", "times"), "keep")
+_KEYS_OF = {table: [name for name, one in TABLE_OF.items() if one == table] for table in ("solve", "keep")}
 #: Observable -> fields, one of which it needs.
 _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
 #: Largest number of speeds of ``from``, ``to`` and ``count``.
@@ -115,10 +117,11 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None =
         if folder and not path.is_file():
             raise InputError(key=key, found=value, expected=f"an existing file, but there is none at {path}")
         return str(path)
-    if isinstance(value, Mapping):
-        return {name: in_si(one, f"{key}.{name}" if key else name, tables, folder) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [in_si(one, f"{key}.{number}", tables, folder) for number, one in enumerate(value)]
+    if isinstance(value, Mapping | list | tuple):
+        parts = dict(value if isinstance(value, Mapping) else enumerate(value))
+        for name, part in parts.items():
+            parts[name] = in_si(part, f"{key}.{name}" if key else name, tables, folder)
+        return parts if isinstance(value, Mapping) else list(parts.values())
     if isinstance(value, float | bool) or value is None:
         return value
     unit = unit_of(key, tables)
@@ -150,7 +153,7 @@ def unit_of(key: str, case: Mapping[str, Any] = MappingProxyType({})) -> str:
     'm'
     """
     table, *path = key.split(".")
-    names = [part for part in path if not part.isdecimal()]
+    names = list(filterfalse(str.isdecimal, path))
     if not names or key == "keep.times":  # a number in keep.times is a number of times
         return ""
     if table == "program" and names[-1] in ("mean", "amplitude", "values"):
@@ -185,7 +188,8 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     tables = in_si(data, "", data, folder)
     tables["material"] = with_columns("material", tables["material"])
     if isinstance(segments := tables.get("program"), list):
-        tables["program"] = [with_rows(f"program.{place}", one) for place, one in enumerate(segments)]
+        for place, stated in enumerate(segments):
+            segments[place] = with_rows(f"program.{place}", stated)
     if isinstance(friction := tables.get("friction"), Mapping) and "speeds" in friction:
         tables["friction"] = {**friction, "speeds": speeds_of("friction.speeds", friction["speeds"])}
     return tables
@@ -194,7 +198,9 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
 def with_columns(where: str, stated: Any) -> dict[str, Any]:
     """Return a table of a material with the columns of its CSV file, without the name of the file."""
     table = a_table(where, stated)
-    table |= {key: with_columns(f"{where}.{key}", table[key]) for key in ("a", "b", "on") if key in table}
+    for key in ("a", "b", "on"):
+        if key in table:
+            table[key] = with_columns(f"{where}.{key}", table[key])
     columns = COLUMNS.get(str(table.get("model")), {})
     if not columns or "file" not in table:
         return table
@@ -273,7 +279,8 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
         if not set(_NEEDS[name]) & set(settings.fields):
             expected = f"{' or '.join(map(repr, _NEEDS[name]))} in keep.fields"
             raise InputError(key=f"observe.{name}", found=arguments, expected=expected)
-    check(audit, "audit", a_table("audit", tables.get("audit", {})))
+    if "audit" in tables:
+        check(audit, "audit", a_table("audit", tables["audit"]))
     return {"title": title, "body": body, "experiment": experiment, "settings": settings}
 
 
@@ -349,9 +356,9 @@ def program_of(segments: Any) -> Program:
 def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
     """Return the settings of a case, with the boundary that ``auto`` resolves to."""
     stated = split(tables["surface"], "missing")[0]
-    for table in ("solve", "keep"):
+    for table in _KEYS_OF:
         here = a_table(table, tables.get(table, {}))
-        refuse_unknown(table, here, [name for name, one in TABLE_OF.items() if one == table])
+        refuse_unknown(table, here, _KEYS_OF[table])
         stated |= here
     if stated.get("times") == "all":
         del stated["times"]

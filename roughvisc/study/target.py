@@ -22,10 +22,10 @@ from roughvisc.errors import InputError
 from roughvisc.study import neighbours
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.run import is_result_of, result_folder, run_stated
+from roughvisc.study.execution.run import is_result_of, result_folder, run_case
 from roughvisc.study.quantities import QUANTITIES, quantity_of
-from roughvisc.study.storage.folder import atomic_write, result_path
-from roughvisc.study.storage.netcdf import write_dataset
+from roughvisc.study.storage.folder import atomic_write, case_path
+from roughvisc.study.storage.netcdf import open_result, write_dataset
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
 
@@ -81,7 +81,8 @@ def run(
     chosen, reasons, budgets = choose(case, want, folder, log.info, **computing)
     for name, one in budgets.items():
         write_dataset(one, folder / neighbours.FOLDER / f"budget-{name}.nc")
-    return run_stated(chosen, out, progress=False, threads=threads).assign_attrs(choice="\n".join(reasons))
+    result = open_result(run_case(chosen, folder, threads=threads))
+    return result.assign_attrs(choice="\n".join(reasons))
 
 
 def choose(
@@ -154,10 +155,10 @@ def choose(
         _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
         level -= 1
 
-    path = result_path(folder, chosen.key)
+    path = case_path(folder, chosen.key, "result")
     if not is_result_of(chosen, path):
         with atomic_write(path) as temporary:
-            shutil.copyfile(result_path(folder / neighbours.FOLDER, chosen.key), temporary)
+            shutil.copyfile(case_path(folder / neighbours.FOLDER, chosen.key, "result"), temporary)
     reasons = [f"grid: {cells}", *reached, f"tolerance: {chosen.settings.tolerance:.2g}"]
     if unknown := found[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")

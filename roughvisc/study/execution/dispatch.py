@@ -25,7 +25,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.study.case import Case
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import IN_USE, Outcome, attempt
-from roughvisc.study.storage.folder import lock_path
+from roughvisc.study.storage.folder import case_path
 
 if TYPE_CHECKING:
     from distributed import Future, Worker
@@ -115,7 +115,7 @@ def distribute(
                 outcome = _outcome(key, future)
                 if outcome.error == IN_USE and len(workers[key]) > 1 and key not in taken_over:
                     taken_over.add(key)  # a lost worker of this sweep still holds the lock
-                    lock_path(folder, key).unlink(missing_ok=True)
+                    case_path(folder, key, "lock").unlink(missing_ok=True)
                     submit([key])
                 elif outcome.kind != "interrupted":
                     yield outcome

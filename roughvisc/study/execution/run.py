@@ -13,6 +13,7 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import filterfalse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,15 +23,13 @@ from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.solve import solve
-from roughvisc.study.case import Case, labels_of_case, program_version
+from roughvisc.study.case import Case, labels_of, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.folder import (
-    checkpoint_path,
+    case_path,
     existing_part,
     lock_case,
-    lock_path,
     require_writable,
-    result_path,
     unusable,
 )
 from roughvisc.study.storage.index import Entry, read_entry
@@ -99,11 +98,14 @@ def compute(
         raise error.prefixed(str(case.origin)) if case.origin else error  # noqa: B904
     if "speed" in dataset:
         dataset = dataset.assign(reduced_speed=("speed", case.shift_factor * dataset["speed"].values))
+    title = case.title
+    for key, value in case.varied.items():
+        title += f", {key} = {json.dumps(value)}"
     now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
     ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
         "Conventions": "CF-1.11",
-        "title": case.title + "".join(f", {key} = {json.dumps(value)}" for key, value in case.varied.items()),
+        "title": title,
         "source": f"{program_version()}; {transform_library()}",
         "history": "\n".join(filter(None, [dataset.attrs.pop("history", ""), ran])),
         "case": stated,
@@ -111,7 +113,8 @@ def compute(
         "surface_sha256": case.surface_sha256,
     }
     dataset.attrs = provenance | split(dataset.attrs, *_IN_THE_CASE)[1]
-    return dataset.assign_coords(labels_of_case(json.loads(stated)))
+    data = json.loads(stated)
+    return dataset.assign_coords(labels_of(data.get("varied", {}), data))
 
 
 def run_case(
@@ -158,16 +161,16 @@ def run_case(
         If the disk is full; the last checkpoint is kept.
     """
     folder = Path(folder)
-    path = result_path(folder, case.key)
+    path = case_path(folder, case.key, "result")
     if is_result_of(case, path) and not any(folder.glob(f".{case.key}.*")):
         return path  # finished, without leftovers to remove
     require_writable(folder, "since the case is not finished")
-    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    made = list(filterfalse(Path.exists, (folder, *folder.parents)))
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        unfinished = checkpoint_path(folder, case.key)
+        unfinished = case_path(folder, case.key, "checkpoint")
         with (
-            lock_case(lock_path(folder, case.key)),
+            lock_case(case_path(folder, case.key, "lock")),
             closing(CheckpointWriter(unfinished, seconds=checkpoint_seconds, stop=stop)) as keeper,
         ):
             for torn in folder.glob(f".{case.key}.*.part.nc"):
@@ -201,14 +204,6 @@ def run_case(
             with suppress(OSError):
                 place.rmdir()
     return path
-
-
-def run_stated(
-    case: Case, out: str | Path | None = None, *, progress: bool | Progress = True, threads: int | None = None
-) -> xr.Dataset:
-    """Run a case unless its result exists, and open the result; see :func:`roughvisc.run`."""
-    path = run_case(case, result_folder(case, out), progress=progress, threads=threads)
-    return open_result(path)
 
 
 def is_result_of(case: Case, path: Path) -> bool:

@@ -19,9 +19,9 @@ from roughvisc.study.execution.cluster import default_client, local_client, requ
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import (
+    case_path,
     log_file,
     record_failure,
-    record_path,
     require_writable,
     write_json,
 )
@@ -226,6 +226,6 @@ def _record(outcome: Outcome, case: Case, folder: Path) -> None:
     for text in warnings_of(outcome.entry.attributes).values() if outcome.entry else ():
         log.info("%s: %s", outcome.key, text)
     if outcome.entry:
-        record_path(folder, outcome.key).unlink(missing_ok=True)  # the case failed before
+        case_path(folder, outcome.key, "failure").unlink(missing_ok=True)  # the case failed before
     elif outcome.kind == "failed":
         record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)

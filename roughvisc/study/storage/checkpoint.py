@@ -70,7 +70,8 @@ class CheckpointWriter(Recorder):
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
         super().append(plain, arrays)
-        self._waiting += sum(array.nbytes for array in arrays.values())
+        for array in arrays.values():
+            self._waiting += array.nbytes
         if self._waiting > _WAITING:
             self._write_rows()
 
@@ -80,20 +81,17 @@ class CheckpointWriter(Recorder):
         def read(key: tuple[Any, ...]) -> Array:
             chosen = np.array(rows, int)[key[0]]
             frames = np.empty((chosen.size, *shape))
-            for frame, row in zip(frames, chosen.flat, strict=True):
-                frame[...] = self.array(int(row), name)
+            for frame, row in zip(frames, chosen.ravel().tolist(), strict=True):
+                number = bisect_right(self._ends, row) - 1
+                if row >= self._ends[-1]:  # in memory
+                    frame[...] = self._arrays[row - self._ends[-1]][name]
+                    continue
+                if self._reading[0] != number:
+                    self._reading = number, np.load(self._rows_path(number), allow_pickle=False)
+                frame[...] = self._reading[1][f"{row}/{name}"]
             return frames[(slice(None), *key[1:])] if chosen.ndim else frames[(0, *key[1:])]
 
         return lazy(read, (len(rows), *shape))
-
-    def array(self, row: int, name: str) -> Array:
-        """Return a field of one row."""
-        number = bisect_right(self._ends, row) - 1
-        if row >= self._ends[-1]:
-            return self._arrays[row - self._ends[-1]][name]
-        if self._reading[0] != number:
-            self._reading = number, np.load(self._rows_path(number), allow_pickle=False)
-        return self._reading[1][f"{row}/{name}"]
 
     def resume(self) -> None:
         """Continue from the checkpoint if it is undamaged, otherwise from the start."""

@@ -1,8 +1,8 @@
 """Folder of results: names, locks, atomic writing of files, records of failures, and the log of sweeps.
 
 A case with the key ``K`` has the result ``K.nc``. During its run ``.K.lock`` is locked and ``.K.unfinished`` contains
-its checkpoint. During writing, a file has a hidden name that ends in ``.part`` and its suffix. A damaged result is
-renamed to ``K.nc.damaged``. The record of a failed case is ``K.failed.json``.
+its checkpoint. The record of a failed case is ``K.failed.json``. During writing, a file has a hidden name that ends in
+``.part`` and its suffix. A damaged result is renamed to ``K.nc.damaged``.
 """
 
 from __future__ import annotations
@@ -17,36 +17,28 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from filelock import FileLock, Timeout
 
 from roughvisc.errors import InputError
-from roughvisc.study.case import Case, program_version
+from roughvisc.study.case import Case
 
 log = logging.getLogger("roughvisc")
 
 #: Log of the sweeps in a folder.
 LOG = "sweep.log"
+#: Names of the files of a case.
+_NAMES = {"result": "{}.nc", "lock": ".{}.lock", "checkpoint": ".{}.unfinished", "failure": "{}.failed.json"}
 #: Errors of :func:`read_json`, and errors due to unexpected values in the file.
 DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error)
 #: Time to wait for a lock: the lock of a killed process is free when the system has removed the process. [s]
 _PATIENCE = 2.0
 
 
-def result_path(folder: Path, name: str) -> Path:
-    """Return the path of a result in a folder; the name of a case is its key."""
-    return folder / f"{name}.nc"
-
-
-def lock_path(folder: Path, key: str) -> Path:
-    """Return the path of the lock of a case in a folder."""
-    return folder / f".{key}.lock"
-
-
-def checkpoint_path(folder: Path, key: str) -> Path:
-    """Return the path of the checkpoint of a case, a folder in the results folder."""
-    return folder / f".{key}.unfinished"
+def case_path(folder: Path, key: str, what: Literal["result", "lock", "checkpoint", "failure"]) -> Path:
+    """Return the path of a file of a case in a folder; its checkpoint is a folder."""
+    return folder / _NAMES[what].format(key)
 
 
 def result_files(folder: Path) -> list[Path]:
@@ -76,7 +68,7 @@ def results_at(place: Path) -> list[Path]:
 
 def existing_part(folder: Path) -> Path:
     """Return the folder, or its nearest parent that exists."""
-    return next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    return next(filter(Path.exists, (folder, *folder.absolute().parents)))
 
 
 def require_writable(folder: Path, why: str = "") -> None:
@@ -209,21 +201,16 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
         lock.release()
 
 
-def record_path(folder: Path, key: str) -> Path:
-    """Return the path of the record of a failed case."""
-    return folder / f"{key}.failed.json"
-
-
 def record_failure(folder: Path, case: Case, **what: str) -> None:
-    """Write the record of a failed case: its message, error and traceback, the program, and the case."""
-    record = what | {"source": program_version(), "case": json.loads(case.to_json())}
-    write_text(record_path(folder, case.key), json.dumps(record, indent=1))
+    """Write the record of a failed case: its message, error and traceback, and the case."""
+    record = what | {"case": json.loads(case.to_json())}
+    write_text(case_path(folder, case.key, "failure"), json.dumps(record, indent=1))
 
 
 def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
     """Return the record of a failed case; empty without a readable record."""
     try:
-        return dict(json.loads(record_path(folder, key).read_text()))
+        return dict(json.loads(case_path(folder, key, "failure").read_text()))
     except (OSError, ValueError, TypeError):
         return {}
 

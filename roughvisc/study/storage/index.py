@@ -27,12 +27,10 @@ from roughvisc.study.case import program_version
 from roughvisc.study.storage.checkpoint import STATE
 from roughvisc.study.storage.folder import (
     DAMAGED,
-    checkpoint_path,
+    case_path,
     lock_case,
-    lock_path,
     no_results,
     read_json,
-    result_path,
     write_json,
 )
 from roughvisc.study.storage.netcdf import open_result
@@ -203,9 +201,9 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
         elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
             remove(path)
     for key in keys:
-        lock, checkpoint = lock_path(folder, key), checkpoint_path(folder, key)
+        lock, checkpoint = case_path(folder, key, "lock"), case_path(folder, key, "checkpoint")
         with suppress(OSError), lock_case(lock, patience=0.0):  # which also removes the lock
-            resumes = (checkpoint / STATE).exists() and not result_path(folder, key).exists()
+            resumes = (checkpoint / STATE).exists() and not case_path(folder, key, "result").exists()
             for path in sorted(folder.glob(f".{key}.*")):
                 if path != lock and (everything or path != checkpoint or not resumes):
                     remove(path)

@@ -12,6 +12,7 @@ import math
 import os
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -130,17 +131,20 @@ def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
             data = np.asarray(stored[...])
         variables[name] = xr.Variable(stored.dimensions, data, stored.__dict__)
     decoded = xr.decode_cf(xr.Dataset(variables, attrs=file.__dict__), decode_timedelta=False)
-    texts = {name: one.astype(str) for name, one in decoded.coords.items() if one.dtype.kind == "O"}
-    return decoded.assign_coords(texts)
+    for name in list(decoded.coords):
+        if decoded[name].dtype.kind == "O":
+            decoded[name] = decoded[name].astype(str)
+    return decoded
 
 
+@dataclass(eq=False)
 class _Lazy(BackendArray):
     """Array that a function reads."""
 
-    def __init__(
-        self, read: Callable[[Any], Any], shape: tuple[int, ...], dtype: Any, support: indexing.IndexingSupport
-    ) -> None:
-        self.read, self.shape, self.dtype, self.support = read, shape, np.dtype(dtype), support
+    read: Callable[[Any], Any]
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    support: indexing.IndexingSupport
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> NDArray[Any]:
         return indexing.explicit_indexing_adapter(key, self.shape, self.support, self.read)
@@ -164,7 +168,7 @@ def lazy(
     support : IndexingSupport
         What `read` accepts.
     """
-    return indexing.LazilyIndexedArray(_Lazy(read, shape, dtype, support))
+    return indexing.LazilyIndexedArray(_Lazy(read, shape, np.dtype(dtype), support))
 
 
 def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
@@ -278,12 +282,13 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
     place.setncatts(part.attrs)
-    labels = {str(name): set(one.dims) for name, one in part.coords.items() if name not in part.dims}
     declared = []
     for name, variable in part.variables.items():
         attributes = dict(variable.attrs)
-        if name in part.data_vars and (own := [one for one, dims in labels.items() if dims <= set(variable.dims)]):
-            attributes["coordinates"] = " ".join(own)  # marks coordinates in CF
+        if name in part.data_vars:  # CF names its coordinates in an attribute
+            for label_name, one in part.coords.items():
+                if label_name not in part.dims and set(one.dims) <= set(variable.dims):
+                    attributes["coordinates"] = f"{attributes.get('coordinates', '')} {label_name}".lstrip()
         if variable.dtype.kind == "U":
             # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length
             # if a file is open twice and one is closed
@@ -314,13 +319,16 @@ def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
     many = len(shape) > 1 and shape[-2] * shape[-1] > _MANY_CELLS
     fields = _CHUNK_OF_MANY if many else _CHUNK
     longest = fields[-len(shape) :] if len(shape) == 3 or many else (_LONGEST_CHUNK,) * len(shape)
-    return tuple(math.ceil(n / math.ceil(n / most)) for n, most in zip(shape, longest, strict=True))
+    counts = np.ceil(np.array(shape) / longest)
+    return tuple(np.ceil(np.array(shape) / counts).astype(int).tolist())
 
 
 def _write(stored: netCDF4.Variable, variable: xr.Variable) -> None:
     """Write a variable; a field in layers of one chunk, so that only one layer is in memory."""
-    together = chunks(variable.shape)[0] if variable.ndim == 3 else 0
-    for layer in [slice(first, first + together) for first in range(0, len(variable), together)] if together else [...]:
+    is_field = variable.ndim == 3
+    rows, together = (len(variable), chunks(variable.shape)[0]) if is_field else (1, 1)
+    for first in range(0, rows, together):
+        layer = slice(first, first + together) if is_field else ...
         values = variable[layer].values  # without the lock, because reading the source may need it
         with NETCDF:
             stored[layer] = values

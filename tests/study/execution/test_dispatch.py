@@ -24,7 +24,7 @@ from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.folder import record_path
+from roughvisc.study.storage.folder import case_path
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:.*Sending large graph.*:UserWarning",
@@ -207,7 +207,7 @@ def test_sweep__gives_up_for_now_a_case_whose_workers_die(study, tmp_path, by_ha
             sweep(cases[:1], tmp_path / "out", client, progress=False)
         killed.join()
         client.wait_for_workers(2, timeout=60)
-    assert not record_path(tmp_path / "out", cases[0].key).exists(), "it is not the case that failed"
+    assert not case_path(tmp_path / "out", cases[0].key, "failure").exists(), "it is not the case that failed"
 
 
 def kill_working(client, times):

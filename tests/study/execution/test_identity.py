@@ -13,7 +13,7 @@ from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.folder import record_path
+from roughvisc.study.storage.folder import case_path
 
 SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'
 STUDY = BALL[: BALL.index("generate")] + SCAN + BALL[BALL.index("level") :]
@@ -65,7 +65,7 @@ def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan
     assert f"{scan}: was changed after the study was read" in outcomes[1].message
     assert outcomes[0].entry.attributes["surface_sha256"] == before, "of what was pressed, not of what lies there now"
     assert [path.name for path in (tmp_path / "out").glob("*.nc")] == [f"{cases[0].key}.nc"]
-    assert not record_path(tmp_path / "out", cases[1].key).exists()
+    assert not case_path(tmp_path / "out", cases[1].key, "failure").exists()
     again = sweep(study, tmp_path / "out", workers=0, progress=False)
     assert set(again.case_key.values).isdisjoint(case.key for case in cases)
     xr.testing.assert_equal(

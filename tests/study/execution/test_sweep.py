@@ -20,7 +20,7 @@ from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.sweep import run_cases, sweep
-from roughvisc.study.storage.folder import record_path
+from roughvisc.study.storage.folder import case_path
 from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.results_table import CASES
 from roughvisc.study.storage.sweep_data import SWEEP
@@ -123,7 +123,7 @@ def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_p
     assert computed == [4e-3, 50.0, 5e-3], "those alike are computed once"
     assert list(ds["program_0_load"]) == [4e-3, 5e-3]
     assert "boundary" in caplog.text
-    record = json.loads(record_path(tmp_path / "out", cases[1].key).read_text())
+    record = json.loads(case_path(tmp_path / "out", cases[1].key, "failure").read_text())
     assert record["error"] == "EdgeContactError"
     assert record["case"]["varied"] == {"program.0.load": 50.0}
     assert "failed" in (tmp_path / "out" / "sweep.log").read_text()
@@ -143,7 +143,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     monkeypatch.setattr(run_module, "run_case", broken)
     with pytest.raises(RoughviscError, match="none of 4 cases could be finished; the first: ZeroDivisionError"):
         sweep(cases, tmp_path / "out", workers=0, progress=False)
-    record = json.loads(record_path(tmp_path / "out", cases[0].key).read_text())
+    record = json.loads(case_path(tmp_path / "out", cases[0].key, "failure").read_text())
     assert "return 1 / 0" in record["traceback"]
     monkeypatch.undo()
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
