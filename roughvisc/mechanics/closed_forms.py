@@ -19,12 +19,11 @@ from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
-#: Elastic solutions, for completion.
-_ELASTIC = ["cone", "flat_punch", "full_contact_pressure", "hertz", "johnson_greenwood_higginson", "westergaard"]
+__all__ = ["cone", "flat_punch", "hertz", "johnson_greenwood_higginson", "lee_radok", "westergaard"]
 
 
 def __dir__() -> list[str]:
-    return [*_ELASTIC, "lee_radok"]
+    return __all__
 
 
 @dataclass(frozen=True)
@@ -37,15 +36,12 @@ class RoundContact:
         Contact radius [m], rigid-body approach from first touch [m], normal force [N].
     pressure : callable
         Pressure at distances from the axis, zero outside the contact. [m] -> [Pa]
-    displacement : callable
-        Normal displacement of the surface at distances from the axis, inside and outside the contact. [m] -> [m]
     """
 
     radius: float
     approach: float
     force: float
     pressure: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
-    displacement: Callable[[ArrayLike], Array] = field(compare=False, repr=False)
 
     @property
     def peak_pressure(self) -> float:
@@ -69,7 +65,7 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     Returns
     -------
     RoundContact
-        ``radius``, ``approach``, ``force``, ``peak_pressure``, ``pressure(r)``, ``displacement(r)``.
+        ``radius``, ``approach``, ``force``, ``peak_pressure``, ``pressure(r)``.
 
     Raises
     ------
@@ -80,8 +76,6 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     -----
     .. math:: a^3 = \frac{3 W R}{4 E^*}, \quad \delta = \frac{a^2}{R}, \quad
               p = \frac{2 E^*}{\pi R} \sqrt{a^2 - r^2}
-
-    Far from the contact the relative rounding error of the displacement grows as ``(r/a)^2``.
 
     References
     ----------
@@ -99,13 +93,7 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
         s = np.abs(np.asarray(r, dtype=float))
         return np.asarray(2 * contact_modulus / (np.pi * sphere_radius) * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
 
-    def displacement(r: ArrayLike) -> Array:
-        s = np.abs(np.asarray(r, dtype=float))
-        out = np.maximum(s, a)
-        outside = (2 * a**2 - out**2) * np.arcsin(a / out) + a * np.sqrt((out - a) * (out + a))
-        return np.asarray(np.where(s <= a, (2 * a**2 - s**2) / 2, outside / np.pi) / sphere_radius)
-
-    return RoundContact(a, a**2 / sphere_radius, force, pressure, displacement)
+    return RoundContact(a, a**2 / sphere_radius, force, pressure)
 
 
 @quantities(slope="1 > 0", contact_modulus="Pa > 0", force="N > 0")
@@ -149,13 +137,7 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
             excess = np.where(s < a, (a - s) / s, 0.0)
             return np.asarray(contact_modulus * slope / 2 * np.log1p(excess + np.sqrt(excess * (excess + 2))))
 
-    def displacement(r: ArrayLike) -> Array:
-        s = np.abs(np.asarray(r, dtype=float))
-        out = np.maximum(s, a)
-        outside = a * np.arcsin(a / out) - out + np.sqrt((out - a) * (out + a))
-        return np.asarray(slope * np.where(s <= a, np.pi / 2 * a - s, outside))
-
-    return RoundContact(a, np.pi / 2 * slope * a, force, pressure, displacement)
+    return RoundContact(a, np.pi / 2 * slope * a, force, pressure)
 
 
 @quantities(radius="m > 0", contact_modulus="Pa > 0", force="N > 0")
@@ -197,10 +179,7 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
             inside = force / (2 * np.pi * a * np.sqrt(np.maximum((a - s) * (a + s), 0.0)))
         return np.asarray(np.where(s <= a, inside, 0.0))
 
-    def displacement(r: ArrayLike) -> Array:
-        return np.asarray(2 / np.pi * approach * np.arcsin(a / np.maximum(np.abs(np.asarray(r, dtype=float)), a)))
-
-    return RoundContact(a, approach, force, pressure, displacement)
+    return RoundContact(a, approach, force, pressure)
 
 
 @dataclass(frozen=True)
@@ -269,7 +248,7 @@ def westergaard(
     >>> round(contact.contact_fraction, 12)
     0.5
     """
-    mean, full = mean_pressure, full_contact_pressure(amplitude, wavelength, contact_modulus, waves=1)
+    mean, full = mean_pressure, np.pi * contact_modulus * amplitude / wavelength
 
     def pressure(x: ArrayLike) -> Array:
         phase = np.pi * np.asarray(x, dtype=float) / wavelength
@@ -281,42 +260,13 @@ def westergaard(
     return WavyContact(fraction * wavelength / 2, fraction, full, pressure)
 
 
-@quantities(amplitude="m > 0", wavelength="m > 0", contact_modulus="Pa > 0")
-def full_contact_pressure(
-    amplitude: Quantity, wavelength: Quantity, contact_modulus: Quantity, waves: int = 2
-) -> float:
-    """Return the mean pressure ``p*`` that closes the gap under a wavy surface.
-
-    Parameters
-    ----------
-    amplitude, wavelength : float or str
-        Amplitude ``a`` and wavelength of ``a cos(kx)`` (``waves=1``) or ``a cos(kx) cos(ky)`` (``waves=2``), with
-        ``k = 2 pi / wavelength``. [m]
-    contact_modulus : float or str
-        ``E*``. [Pa]
-    waves : {1, 2}
-        Number of wavy directions.
-
-    Returns
-    -------
-    float
-        ``pi E* a / l`` or ``sqrt(2) pi E* a / l``. [Pa]
-
-    References
-    ----------
-    .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 13.2.
-    """
-    one_of("waves", waves, (1, 2))
-    return float(np.sqrt(waves) * np.pi * contact_modulus * amplitude / wavelength)
-
-
 def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
     r"""Return a limit of the contact fraction of ``a cos(kx) cos(ky)`` on an elastic half-space.
 
     Parameters
     ----------
     mean_over_full : array_like
-        Mean pressure over ``p* = sqrt(2) pi E* a / l`` of :func:`full_contact_pressure`. [-]
+        Mean pressure over the pressure ``p* = sqrt(2) pi E* a / l`` at which the contact becomes full. [-]
     limit : {"low", "high"}
         Isolated Hertzian contacts at the crests, or isolated round gaps at the troughs.
 
