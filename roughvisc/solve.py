@@ -27,8 +27,8 @@ from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
 Progress = Callable[[float, float], None]
-#: Attributes of a surface that stay with its heights: the source, and how missing points were filled.
-_ORIGIN = ("source_file", "format", "instrument", "channel", "recipe", "filled_points", "fill_method")
+#: Attributes of a surface that stay with its heights: the source, and the number of filled points.
+_ORIGIN = ("source_file", "format", "instrument", "channel", "recipe", "filled_points")
 
 
 @dataclass(frozen=True)

@@ -132,7 +132,7 @@ def test_scan__says_what_is_there_and_draws_it(invoke, tmp_path, scan_file):
         assert words in out
     assert (tmp_path / "tilted.png").stat().st_size > 10_000
     table = tomllib.loads(out[out.index("[surface]") : out.index("Picture: ")])["surface"]
-    assert table == {"file": "tilted.nc", "level": 1, "fill": "harmonic"}
+    assert table == {"file": "tilted.nc", "level": 1, "fill": True}
     assert invoke("scan", scan_file, "--plot", "a/b.pdf", "--spacing", "2um,3 um")[0] == 0
     assert (tmp_path / "a" / "b.pdf").exists()
 
@@ -226,7 +226,7 @@ def test_scan__converts_and_writes_a_card(invoke, tmp_path, scan_file):
     assert invoke("scan", scan_file, "--to", "out/scan.x3p")[0] == 0
     assert invoke("scan", scan_file, "--card", card)[0] == 0
     np.testing.assert_array_equal(rv.open_scan(tmp_path / "out" / "scan.x3p"), rv.open_scan(scan_file))
-    expected = rv.fill(rv.level(rv.open_scan(scan_file), 1), "harmonic")  # as scan recommends
+    expected = rv.fill(rv.level(rv.open_scan(scan_file), 1))  # as scan recommends
     np.testing.assert_array_equal(rv.open_scan(card), expected)
     assert invoke("scan", card)[0] == 0
 

@@ -29,7 +29,7 @@ from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_stat
 from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import OVER_TIME, Settings
 from roughvisc.topography.framing import mirror
-from roughvisc.topography.resampling import resample_periodic
+from roughvisc.topography.spectrum import resample_periodic
 from roughvisc.units import Quantity, format_quantity, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 

@@ -22,9 +22,8 @@ from roughvisc.observables import contact, leakage
 from roughvisc.observables.frames import expect_result, need
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
-from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.filters import fill, off_plane
 from roughvisc.topography.grid import cell_edges, cell_side, checked, spacing
-from roughvisc.topography.missing_points import fill
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import Quantity, Unit, in_si, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of

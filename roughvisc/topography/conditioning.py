@@ -13,10 +13,9 @@ import xarray as xr
 
 from roughvisc.arguments import DataNeeded, a_table, call, dotted, located, refuse_unknown
 from roughvisc.errors import InputError
-from roughvisc.topography.bandwidth import gaussian_filter, level
+from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.framing import crop, invert, rotate90
-from roughvisc.topography.missing_points import fill, mask_outliers
-from roughvisc.topography.resampling import resample, without_short_waves
+from roughvisc.topography.spectrum import resample, without_short_waves
 from roughvisc.topography.surrogates import surrogate
 
 
@@ -43,7 +42,7 @@ STEPS: dict[str, Step] = {
     "invert": Step(invert),
     "level": Step(level, "order"),
     "outliers": Step(mask_outliers),
-    "fill": Step(fill, "method"),
+    "fill": Step(fill),
     "filter": Step(gaussian_filter, "cutoff"),
     "shortest_wave": Step(without_short_waves, "shortest"),
     "realisation": Step(surrogate, "number"),

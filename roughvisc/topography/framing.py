@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Real
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -12,18 +11,9 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
-from roughvisc.topography.grid import (
-    checked,
-    filled_points,
-    labelled,
-    like,
-    noted,
-    spacing,
-    with_coordinates,
-    with_filled_points,
-)
-from roughvisc.topography.missing_points import membrane
-from roughvisc.topography.resampling import resample
+from roughvisc.topography.filters import membrane
+from roughvisc.topography.grid import checked, labelled, like, noted, spacing, with_coordinates
+from roughvisc.topography.spectrum import resample
 from roughvisc.units import Quantity, number, quantities
 
 #: Largest shift of a cell border by rounding, relative to the cell.
@@ -53,12 +43,12 @@ def crop(
     InputError
         If limits are not a pair, or fewer than two cells lie within them along an axis.
     """
-    chosen = {axis: limits for axis, limits in (("x", x), ("y", y)) if limits is not None}
-    for axis, limits in chosen.items():
-        is_pair = isinstance(limits, Sequence | np.ndarray) and len(limits) == 2
-        if not (is_pair and all(isinstance(one, Real) for one in limits) and limits[0] < limits[1]):
-            raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
-        chosen[axis] = (float(limits[0]), float(limits[1]))
+    chosen: dict[str, tuple[float, float]] = {}
+    for axis, limits in (("x", x), ("y", y)):
+        if limits is not None:
+            chosen[axis] = _two_lengths(axis, limits)
+            if chosen[axis][0] >= chosen[axis][1]:
+                raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
     h = checked(h, "crop")
     part = h.sel({axis: slice(*limits) for axis, limits in chosen.items()})
     for axis, limits in chosen.items():
@@ -89,11 +79,9 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
         raise InputError(key="turns", found=turns, expected="a whole number of quarter turns")
     h = checked(h, "rotate90")
     sides = spacing(h) if turns % 2 == 0 else spacing(h)[::-1]
-    filled = filled_points(h)
     grid = labelled(np.rot90(h.values, turns), sides, h.attrs)
-    grid = with_filled_points(grid, None if filled is None else np.rot90(filled, turns))
-    kept = {} if turns % 2 == 0 else {"period": period_of(grid) if is_periodic(h) else None}
-    return noted(grid, f"rotated by {turns % 4} quarter turns counter-clockwise", **kept)
+    line = f"rotated by {turns % 4} quarter turns counter-clockwise"
+    return noted(grid, line, period=period_of(grid) if is_periodic(h) else None)
 
 
 def invert(h: xr.DataArray) -> xr.DataArray:
@@ -119,10 +107,13 @@ def combine(
     h2: xr.DataArray,
     flip: Literal["x", "y"] | None = None,
     *,
-    align: Literal["grid", "centre"] = "grid",
     offset: tuple[Quantity, Quantity] = (0.0, 0.0),
 ) -> xr.DataArray:
     """Combine two scanned faces in contact to one rigid profile, the sum of their heights.
+
+    The second face is centred on the first. The sum is on the cells of the first that the second covers completely. If
+    the cells of the second face are smaller, it is first resampled to cells of the same size (:func:`resample`). A
+    cubic spline between its cell centres then gives its heights at the cell centres of the first face.
 
     Parameters
     ----------
@@ -130,25 +121,19 @@ def combine(
         Heights of the faces, each with its peaks towards the other. [m]
     flip : {"x", "y"}, optional
         Axis along which the second face is reversed when a scan taken from above is turned over onto the first.
-        Default: `h2` is already in the coordinates of `h1`.
-    align : {"grid", "centre"}, default "grid"
-        "grid": both faces are on the same grid. "centre": the second face, turned over, is centred on the first; the
-        sum is on the cells of the first that the second covers completely. If the cells of the second face are
-        smaller, it is first resampled to cells of the same size (:func:`resample`). A cubic spline between its cell
-        centres then gives its heights at the cell centres of the first face.
+        Default: `h2` has the directions of `h1`.
     offset : pair of float or str
-        Position of the second centre relative to the first, along x and y; with `align` "centre". [m]
+        Position of the second centre relative to the first, along x and y. [m]
 
     Returns
     -------
     xarray.DataArray
-        Sum of heights on the grid of the first face, missing where either face is missing, and marked as filled where
-        either was filled. [m]
+        Sum of heights on cells of the first face, missing where either face is missing. [m]
 
     Raises
     ------
     InputError
-        If the grids differ and are not aligned by their centres, or the faces share fewer than two cells along an axis.
+        If an argument has another value, or the second face covers fewer than two cells of the first along an axis.
 
     Notes
     -----
@@ -161,41 +146,26 @@ def combine(
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
     """
     one_of("flip", flip, (None, "x", "y"))
-    one_of("align", align, ("grid", "centre"))
-    if not isinstance(offset, list | tuple | np.ndarray) or len(offset) != 2:
-        raise InputError(key="offset", found=offset, expected="a pair of lengths, along x and along y [m]")
-    apart = [number(d, "m", "offset") for d in offset]
-    if align == "grid" and any(apart):
-        raise InputError(key="offset", found=offset, expected="none with align='grid'; align='centre' takes one")
+    apart = _two_lengths("offset", offset)
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
-    about, sha = "; ".join(str(h2.attrs.get("history", "")).splitlines()), h2.attrs.get("source_sha256")
+    sha, about = h2.attrs.get("source_sha256"), "; ".join(str(h2.attrs.get("history", "")).splitlines())
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
-    if flip is not None:  # reverse heights and masks; the coordinate stays
+    if flip is not None:  # reverse heights; the coordinate stays
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
         line += f", reversed along {flip}"
-    if align == "centre":
-        h1, h2 = _on_common_cells(h1, h2, apart)
-        centre = ", ".join(f"{d:.6g}" for d in apart)
-        line += f", its centre ({centre}) m from that of the first, on {h1.shape[0]} x {h1.shape[1]} cells of the first"
-    elif h1.shape != h2.shape or not all(
-        np.allclose(h1[axis], h2[axis], rtol=0, atol=1e-6 * d) for axis, d in zip("xy", spacing(h1), strict=True)
-    ):
-        described = [f"{h.shape} cells of {spacing(h)} m from {tuple(float(h[a][0]) for a in 'xy')}" for h in (h1, h2)]
-        expected = "one grid, or align='centre' (see also resample and crop)"
-        raise InputError(f"combine: found {described[0]} and {described[1]}: expected {expected}")
-    both = like(h1, h1.values + h2.values)
-    solid = all(h.attrs.get("missing") == "absent" or np.isfinite(h.values).all() for h in (h1, h2))
-    methods = {h.attrs["fill_method"] for h in (h1, h2) if "fill_method" in h.attrs}
-    attrs = {"recipe": None, "highest": None, "fill_method": ", ".join(sorted(methods)) or None}
+    first, second = _on_common_cells(h1, h2, apart)
+    nx, ny = first.shape
+    line += f", its centre ({apart[0]:.6g}, {apart[1]:.6g}) m from that of the first, on {nx} x {ny} cells of the first"
+    both = with_coordinates(first.values + second, first["x"].values, first["y"].values, h1.attrs)
+    faces = ((h1, first.values), (h2, second))
+    solid = all(h.attrs.get("missing") == "absent" or np.isfinite(values).all() for h, values in faces)
+    attrs = {"recipe": None, "period": h1.attrs.get("period") if repeats else None}
     attrs["missing"] = "absent" if solid and np.isnan(both.values).any() else None
-    attrs["period"] = h1.attrs.get("period") if repeats else None
-    masks = [mask for mask in map(filled_points, (h1, h2)) if mask is not None]
-    both = with_filled_points(both, np.logical_or.reduce(masks) if masks else None)
     return noted(both, line + (f"; the second face: {about}" if about else ""), **attrs)
 
 
-def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> tuple[xr.DataArray, xr.DataArray]:
+def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: tuple[float, float]) -> tuple[xr.DataArray, np.ndarray]:
     """Return both faces on the cells of the first that the second covers completely.
 
     Parameters
@@ -207,8 +177,10 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> 
 
     Returns
     -------
-    first, second : xarray.DataArray
-        On the coordinates of the first. [m]
+    first : xarray.DataArray
+        The first face on these cells. [m]
+    second : ndarray
+        Heights of the second at the cell centres of the first. [m]
 
     Raises
     ------
@@ -233,18 +205,21 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: list[float]) -> 
             )
         kept[axis] = covered
         at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells
-    first = h1.isel(kept)
 
     def laid(values: np.ndarray, order: int) -> np.ndarray:
         degrees = [min(order, n - 1) for n in values.shape]
         return RectBivariateSpline(*map(np.arange, values.shape), values, kx=degrees[0], ky=degrees[1])(*at)
 
-    missing, filled = np.isnan(h2.values), filled_points(h2)
-    heights = laid(membrane(h2.values), 3)
-    heights[laid(missing.astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
-    marked = None if filled is None else laid(filled.astype(float), 1) > _ON_BORDER
-    second = with_coordinates(heights, first["x"].values, first["y"].values, h2.attrs)
-    return first, with_filled_points(second, marked)
+    second = laid(membrane(h2.values), 3)
+    second[laid(np.isnan(h2.values).astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
+    return h1.isel(kept), second
+
+
+def _two_lengths(key: str, value: Any) -> tuple[float, float]:
+    """Return the two lengths of a pair. [m]"""
+    if not isinstance(value, Sequence | np.ndarray) or len(value) != 2:
+        raise InputError(key=key, found=value, expected="a pair of lengths [m]")
+    return number(value[0], "m", key), number(value[1], "m", key)
 
 
 def mirror(h: xr.DataArray) -> xr.DataArray:

@@ -139,18 +139,6 @@ def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float,
     return sides[0], sides[1]
 
 
-def filled_points(h: xr.DataArray) -> np.ndarray | None:
-    """Return the mask over (x, y) of the points that were missing and filled in; None if no point was filled."""
-    return h["filled"].transpose("x", "y").values.astype(bool) if "filled" in h.coords else None
-
-
-def with_filled_points(h: xr.DataArray, filled: np.ndarray | None) -> xr.DataArray:
-    """Return the grid with these points marked as filled in; unmarked if `filled` is None."""
-    if filled is None:
-        return h.drop_vars("filled", errors="ignore")
-    return h.assign_coords(filled=(("x", "y"), filled, {"long_name": "height was missing and filled in"}))
-
-
 def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
     """Return the area of the whole grid, including absent cells: the area of the nominal pressure. [m2]"""
     return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))

@@ -10,12 +10,11 @@ import numpy as np
 import scipy  # imports its submodules on first use: scipy.ndimage takes 0.1 s
 import xarray as xr
 
-from roughvisc.topography.bandwidth import gaussian_filter, level
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.conditioning import STEPS
+from roughvisc.topography.filters import fill, gaussian_filter, in_large_holes, level, mask_outliers
 from roughvisc.topography.framing import crop
-from roughvisc.topography.grid import cell_edges, checked, filled_points, nominal_area, spacing
-from roughvisc.topography.missing_points import fill, in_large_holes, mask_outliers
+from roughvisc.topography.grid import cell_edges, checked, nominal_area, spacing
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
@@ -137,7 +136,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     missing = int(h.isnull().sum())
     seen, advice, step = f"{missing} ({_percent(missing / h.size)})", "", {}
     if missing:
-        advice, step = 'fill = "harmonic"; the result marks the filled points', {"fill": "harmonic"}
+        advice, step = "fill = true; the result marks the filled points", {"fill": True}
     find("Missing points", seen, advice, step, points=missing)
 
     levelled = level(h)
@@ -148,7 +147,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     seen, advice, step = f"{spikes} ({_percent(spikes / h.size)})", "", {}
     if kept is not levelled:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
-        advice, step = "outliers = true; otherwise the spikes carry the load", {"outliers": True, "fill": "harmonic"}
+        advice, step = "outliers = true; otherwise the spikes carry the load", {"outliers": True, "fill": True}
     elif spikes:
         seen += " differ strongly from their neighbours"
         advice = "too many to be spikes: check the picture; outliers = true only if the surface has no such features"
@@ -232,8 +231,7 @@ def _noise(h: xr.DataArray) -> dict[str, Any]:
         above the noise, two cells without a floor [m]; ``noisy_slopes``: share of the waves below `wavelength` in the
         mean square slope [-].
     """
-    filled = filled_points(h)
-    gaps = np.zeros(h.shape, dtype=bool) if filled is None else filled
+    gaps = h["filled"].values if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
     # points inside or at the edge of large holes are usually artefacts
     gaps = gaps | scipy.ndimage.binary_dilation(in_large_holes(gaps))
     rms = float(h.values.std())

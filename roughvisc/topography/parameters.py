@@ -7,7 +7,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from roughvisc.topography.bandwidth import off_plane
+from roughvisc.topography.filters import off_plane
 from roughvisc.topography.grid import checked, require_heights, spacing
 
 #: name -> (units, long name)

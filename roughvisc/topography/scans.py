@@ -174,7 +174,7 @@ def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
     if "second" in table:
         placing, face = split(table["second"], "flip", "offset")
         flip = placing.pop("flip", "x")
-        placing |= {"flip": None if flip == "none" else flip, "align": "centre"}
+        placing |= {"flip": None if flip == "none" else flip}
         height = call(combine, "surface.second", placing, height, _face_height("surface.second", face))
     _, rest = split(table, *FACE_STEPS)
     steps, _ = split(rest, *STEPS)
@@ -213,7 +213,7 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
         check_keys(open_scan, where, split(source, "file")[1], 1)
     if is_second:
         one_of(f"{where}.flip", placing.pop("flip", "x"), ("x", "y", "none"))
-        check(combine, where, placing | {"align": "centre"}, 2)
+        check(combine, where, placing, 2)
     elif "second" in placing:
         check_surface(placing["second"], "surface.second")
 

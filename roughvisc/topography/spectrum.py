@@ -1,18 +1,29 @@
-"""Power spectrum of heights: its modes, and their radial average."""
+"""Spectra of surfaces: power spectrum, resampling to other grids, removal of short waves.
+
+Heights belong to cell centres; the centres of the cells of two grids over the same domain differ.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
 import scipy.fft
 import xarray as xr
+from scipy import sparse
 
 from roughvisc.arguments import one_of
-from roughvisc.topography.grid import checked, require_complete, spacing
+from roughvisc.errors import InputError
+from roughvisc.topography.borders import is_periodic, period_of
+from roughvisc.topography.filters import membrane
+from roughvisc.topography.grid import checked, counts, like, noted, require_complete, spacing, with_coordinates
+from roughvisc.units import Quantity, quantities
 
-# Share of the mean square slope in the waves down to the shortest wave of a surface.
+#: Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
+#: Largest reduction of an overlap by rounding, relative to a cell.
+_ROUNDING = 1e-9
 
 
 def hann(z: np.ndarray) -> np.ndarray:
@@ -116,3 +127,154 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     }
     about = {"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"}
     return xr.Dataset(variables, attrs=about)
+
+
+def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:
+    r"""Resample to another number of cells over the same domain, with exactly the wavelengths that both grids resolve.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y). [m]
+    shape : int or pair of int
+        New number of cells ``(nx, ny)``.
+    periodic : bool, optional
+        Whether the surface is periodic in x and in y. Default: whether :func:`self_affine`, :func:`wavy` or
+        :func:`mirror` made it periodic and it is still one period (attribute ``period``).
+
+    Returns
+    -------
+    xarray.DataArray
+        Height at the centres of the new cells, with the same mean. A cell is missing if less than half of its area is
+        present. [m]
+
+    Raises
+    ------
+    InputError
+        If `shape` is not a pair of whole numbers of at least 2.
+
+    Notes
+    -----
+    A periodic surface is expanded in a Fourier series. Any other surface and its mirror images are expanded in cosines.
+    Missing points are filled as by :func:`fill` first. A coarser grid keeps the wavelengths longer than two of its
+    cells, and their slopes. Means over its cells would damp wavelengths of up to ten cells and alias shorter
+    wavelengths: on cells twice as long, the error of the contact area would be 1.2 to 1.8 times as large, and the
+    errors of mean gap and approach 2 to 100 times.
+
+    Along each axis of :math:`n` cells the Fourier transform :math:`h_k` gives, at the centres of :math:`m` cells,
+
+    .. math:: h(X_j) = \frac{1}{n} \sum_{|k| < \min(n, m) / 2} h_k \, e^{2 \pi i k j / m} e^{i \pi k (1/m - 1/n)},
+
+    where the last factor accounts for the distance between the first centres of both grids. A wavelength of exactly two
+    old cells is kept on a finer grid, as the sine that is largest at the old centres.
+    """
+    shape = counts("shape", shape)
+    h = checked(h, "resample")
+    missing, period = np.isnan(h.values), _period(h, periodic)
+    values = membrane(h.values)
+    if period:
+        heights, way = resample_periodic(values, shape), "by Fourier interpolation"
+    else:
+        heights, way = _cosines(_cosines(values, shape[0], 0), shape[1], 1), "by cosines"
+    if missing.any():
+        cells = zip(h.shape, shape, strict=True)
+        along_x, along_y = (shares(np.arange(old + 1) / old, np.arange(new + 1) / new) for old, new in cells)
+        heights[along_x @ missing @ along_y.T > 0.5 + _ROUNDING] = np.nan
+    axes = []
+    for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
+        axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
+    line = f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}"
+    return noted(with_coordinates(heights, *axes, h.attrs), line, period=period)
+
+
+@quantities(shortest="m > 0")
+def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | None = None) -> xr.DataArray:
+    """Remove all wavelengths below a limit, on the same cells.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y), without missing points. [m]
+    shortest : float or str
+        Shortest wavelength to keep; at least two cells, and shorter than the sides. [m]
+    periodic : bool, optional
+        Whether the surface repeats in x and in y; default as in :func:`resample`.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height with the same mean. A periodic surface is expanded in a Fourier series, any other surface and its mirror
+        images in cosines. The cut-off is sharp: see :func:`gaussian_filter` for a smooth one. [m]
+
+    Raises
+    ------
+    InputError
+        If points are missing or the length is out of its range.
+    """
+    h = checked(h, "without_short_waves")
+    sides, lengths, period = spacing(h), period_of(h), _period(h, periodic)
+    if not 2 * max(sides) * (1 - _ROUNDING) <= shortest < min(lengths):
+        expected = f"at least two cells, {2 * max(sides):.6g} [m], and less than the sides, {min(lengths):.6g} [m]"
+        raise InputError(key="shortest", found=shortest, expected=expected)
+    require_complete(h, "without_short_waves")
+    limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
+    if period:
+        q_x, q_y, _ = wavevectors(h.shape, sides)
+        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.rfft2(h.values), 0.0)
+        heights = scipy.fft.irfft2(heights_q, s=h.shape)
+    else:
+        q_x, q_y = (np.pi * np.arange(n) / length for n, length in zip(h.shape, lengths, strict=True))
+        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.dctn(h.values, norm="ortho"), 0.0)
+        heights = scipy.fft.idctn(heights_q, norm="ortho")
+    return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", period=period)
+
+
+def resample_periodic(values: np.ndarray, shape: tuple[int, int], *, first_kept: bool = False) -> np.ndarray:
+    """Return one period of a field at the centres of other cells, by Fourier interpolation.
+
+    Parameters
+    ----------
+    values : ndarray, shape (nx, ny)
+        Finite, at the cell centres.
+    shape : tuple of int
+        New number of cells.
+    first_kept : bool
+        Whether the new grid is shifted so that the first centres coincide, which suffices if the position of the waves
+        does not matter. Otherwise both grids cover the same domain.
+
+    Returns
+    -------
+    ndarray
+        Field of the new shape, with the same mean; see :func:`resample`.
+    """
+    for axis, count in enumerate(shape):
+        before = values.shape[axis]
+        if count == before:
+            continue
+        values_q = scipy.fft.rfft(values, axis=axis)
+        moved = 0.0 if first_kept else 0.5 / count - 0.5 / before  # from the first old centre to the first new one
+        turned = np.exp(2j * np.pi * np.arange(values_q.shape[axis]) * moved)
+        fewer = min(count, before)
+        if fewer % 2 == 0:  # a wave of two cells: a coarser grid drops it, a finer grid splits it in two halves
+            turned[fewer // 2] *= 0.0 if count < before else 0.5
+        values_q *= turned[:, None] if axis == 0 else turned
+        values = scipy.fft.irfft(values_q, n=count, axis=axis) * (count / before)
+    return values
+
+
+def _period(h: xr.DataArray, periodic: bool | None) -> list[float] | None:
+    """Return the sides of a surface that is periodic, or is taken as periodic; None for any other. [m]"""
+    repeats = is_periodic(h) if one_of("periodic", periodic, (None, True, False)) is None else periodic
+    return period_of(h) if repeats else None
+
+
+def _cosines(values: np.ndarray, count: int, axis: int) -> np.ndarray:
+    """Interpolate onto `count` cells along an axis by the cosines that both grids resolve."""
+    values_q = scipy.fft.dct(values, axis=axis, norm="ortho")
+    return scipy.fft.idct(values_q, n=count, axis=axis, norm="ortho") * math.sqrt(count / values.shape[axis])
+
+
+def shares(cells: np.ndarray, onto: np.ndarray) -> sparse.csr_array:
+    """Return the fraction of each new cell (rows) that lies in each old cell (columns), from the edges of both."""
+    common = np.minimum(onto[1:, None], cells[1:]) - np.maximum(onto[:-1, None], cells[:-1])
+    return sparse.csr_array(np.maximum(common, 0.0) / np.diff(onto)[:, None])

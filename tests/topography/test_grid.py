@@ -88,6 +88,8 @@ DOORS = {
     "parameters": rv.parameters,
     "psd": rv.psd,
 }
+#: Steps that make other cells, on which no point is marked as filled.
+OTHER_CELLS = ("resample", "rotate90", "combine", "combine, below")
 
 
 @pytest.mark.parametrize("door", DOORS)
@@ -98,7 +100,8 @@ def test_door__gives_the_same_in_any_unit(door):
     xr.testing.assert_identical(asked, before)
     if isinstance(found, xr.DataArray):
         assert found.attrs["history"].startswith(H.attrs["history"] + "\n")
-        assert (found.dims, found.name, found.filled.dtype) == (("x", "y"), "height", bool)
+        assert (found.dims, found.name) == (("x", "y"), "height")
+        assert door in OTHER_CELLS or found.filled.dtype == bool
         found.to_netcdf()  # attributes that can be written
         found, expected = (h.to_dataset(name="height") for h in (found, expected))
     for name, variable in found.variables.items():

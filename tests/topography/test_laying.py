@@ -27,7 +27,7 @@ def test_combine__a_plane_on_another_grid_stays_a_plane(flip, shape, cell):
         plane(shape, cell, (0.03, -0.07), (0.0, 1)),
     )
     offset = (1.25e-6, -0.7e-6)
-    both = rv.combine(first, second, flip, align="centre", offset=offset)
+    both = rv.combine(first, second, flip, offset=offset)
     x, y = both.x - 5e-3 - 15e-6, both.y - 21 * 1.3e-6 / 2
     signs = {None: (1, 1), "x": (-1, 1), "y": (1, -1)}[flip]
     expected = 0.1 * x + 0.03 * signs[0] * (x - offset[0]) - 0.07 * signs[1] * (y - offset[1])
@@ -47,29 +47,27 @@ def test_combine__smaller_cells_keep_the_waves_that_the_larger_ones_hold():
     x, y = ((np.arange(n) + 0.5) / n for n in (27, 16))
     fine = np.outer(np.cos(4 * np.pi * x) + np.cos(20 * np.pi * x), np.cos(3 * np.pi * y))
     first = rv.from_array(np.zeros((9, 8)), spacing=(3e-6, 4e-6))
-    both = rv.combine(first, rv.from_array(1e-7 * fine, spacing=(1e-6, 2e-6)), align="centre")
+    both = rv.combine(first, rv.from_array(1e-7 * fine, spacing=(1e-6, 2e-6)))
     x, y = ((np.arange(n) + 0.5) / n for n in (9, 8))
     expected = 1e-7 * np.outer(np.cos(4 * np.pi * x), np.cos(3 * np.pi * y))
     np.testing.assert_allclose(both, expected, rtol=0, atol=1e-18)
 
 
-def test_combine__points_missing_or_filled_in_the_second_are_so_in_the_sum():
+def test_combine__points_missing_in_the_second_are_missing_in_the_sum():
     first, heights = rv.from_array(np.zeros((4, 5)), spacing=2e-6), np.ones((8, 10)) * 1e-7
     heights[0:2, 0] = heights[2, 2] = np.nan  # half of a cell of the first, and a quarter of one
     second = rv.from_array(heights, spacing=1e-6)
-    both = rv.combine(first, second, align="centre")
+    both = rv.combine(first, second)
     assert np.isfinite(both.values).all()
     second[0, 1] = np.nan  # three quarters
-    both = rv.combine(first, second, "x", align="centre")
+    both = rv.combine(first, second, "x")
     assert np.argwhere(np.isnan(both.values)).tolist() == [[3, 0]]
-    marked = rv.combine(first, rv.fill(second, "nearest"), "x", align="centre")
-    assert np.argwhere(marked.filled.values).tolist() == [[2, 1], [3, 0]]
 
 
 def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
     # 1/R = 1/R1 + 1/R2; contact compliances add: 1/E* = (1 - nu1)/(2 G1) + (1 - nu2)/(2 G2)
     upper, lower = rv.sphere(1e-2, 1e-3, 41), rv.sphere(3e-2, (1.1e-3, 1.3e-3), (51, 45))
-    both = rv.combine(upper, lower, "x", align="centre")
+    both = rv.combine(upper, lower, "x")
     material = rv.pair(rv.elastic(2e6, 0.3), rv.elastic(1e6))
     press = rv.Program().load(0.02, over=0.0)
     ds = rv.simulate(both, material, press, boundary="free", tolerance=1e-4, progress=False)
@@ -81,23 +79,21 @@ def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
 
 def test_combine__a_recipe_is_no_longer_one_and_what_is_absent_stays_so():
     punch, ball = rv.flat_punch(2e-5, 1e-4, 21), rv.sphere(1e-3, 1e-4, 21)
-    both = rv.combine(punch, ball, align="centre")
+    both = rv.combine(punch, ball)
     assert "recipe" not in both.attrs
     assert both.attrs["missing"] == "absent"
-    assert rv.combine(ball, punch, align="centre").attrs["missing"] == "absent"
+    assert rv.combine(ball, punch).attrs["missing"] == "absent"
     gaps = ball.copy()
     gaps[0, 0] = np.nan  # of a measurement: what is there is not known
-    assert "missing" not in rv.combine(punch, gaps, align="centre").attrs
+    assert "missing" not in rv.combine(punch, gaps).attrs
 
 
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        ({"align": "corner"}, "align"),
-        ({"offset": (1e-6, 0)}, "offset"),
-        ({"align": "centre", "offset": 1e-6}, "offset"),
-        ({"align": "centre", "offset": (np.nan, 0)}, "offset"),
-        ({"align": "centre", "offset": (0, 4e-6)}, "covers 1 of 5 cells"),
+        ({"offset": 1e-6}, "offset"),
+        ({"offset": (np.nan, 0)}, "offset"),
+        ({"offset": (0, 4e-6)}, "covers 1 of 5 cells"),
         ({"flip": "z"}, "flip"),
     ],
 )

@@ -179,7 +179,7 @@ def test_card__every_step_acts(tmp_path):
     steps = """
 resample = [12, 10]
 filter = { cutoff = "12 um", keep = "short" }
-fill = "nearest"
+fill = true
 outliers = { window = 5, threshold = 9 }
 level = 2
 invert = true

@@ -61,9 +61,9 @@ def test_card_text__states_the_options_that_the_file_needs(tmp_path):
 def test_card_text__has_the_conditioning(tmp_path):
     path = write_sdf(tmp_path / "scan.sdf")
     h = rv.open_scan(path)
-    steps = {"crop": {"x": (0.0, 20 * CELL[0]), "y": (0.0, 18 * CELL[1])}, "level": 1, "fill": "harmonic"}
+    steps = {"crop": {"x": (0.0, 20 * CELL[0]), "y": (0.0, 18 * CELL[1])}, "level": 1, "fill": True}
     (tmp_path / "card.toml").write_text(card_text(path, tmp_path, {}, steps))
-    expected = rv.fill(rv.level(rv.crop(h, **steps["crop"]), 1), "harmonic")
+    expected = rv.fill(rv.level(rv.crop(h, **steps["crop"]), 1))
     np.testing.assert_array_equal(rv.open_scan(tmp_path / "card.toml"), expected)
     with pytest.raises(InputError, match="is a surface card already"):
         card_text(tmp_path / "card.toml", tmp_path, {}, {})
