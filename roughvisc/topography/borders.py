@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import xarray as xr
@@ -33,8 +34,9 @@ def border_mismatch(h: xr.DataArray) -> tuple[float, float]:
     values = h.transpose("x", "y").values
     ratios = []
     for axis in (0, 1):
-        across = _rms(np.take(values, 0, axis) - np.take(values, -1, axis))
-        beside = _rms(np.diff(values, axis=axis))
+        steps = values.take(0, axis) - values.take(-1, axis), np.diff(values, axis=axis)
+        known = [step[np.isfinite(step)] for step in steps]
+        across, beside = (math.sqrt((step**2).mean()) if step.size else 0.0 for step in known)
         ratios.append(across / beside if beside > 0 else 0.0)
     return ratios[0], ratios[1]
 
@@ -89,9 +91,3 @@ def recipe_name(h: xr.DataArray) -> str:
 def is_mirrored(h: xr.DataArray) -> bool:
     """Return whether a surface was extended by its mirror images and still repeats, see :func:`is_periodic`."""
     return MIRRORED in str(h.attrs.get("history", "")).split("\n") and is_periodic(h)
-
-
-def _rms(values: np.ndarray) -> float:
-    """Return the root mean square of the finite values; zero if there are none."""
-    known = values[np.isfinite(values)]
-    return float(np.sqrt((known**2).mean())) if known.size else 0.0

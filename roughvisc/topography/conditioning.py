@@ -16,7 +16,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.framing import crop, invert, rotate90
 from roughvisc.topography.spectrum import resample, without_short_waves
-from roughvisc.topography.surrogates import surrogate
+from roughvisc.topography.synthesis import surrogate
 
 
 class Step(NamedTuple):

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from roughvisc.arguments import DataNeeded, NoData
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import counts, labelled, noted, pair, spacing, with_coordinates
+from roughvisc.topography.grid import counts, labelled, noted, pair, with_coordinates
 from roughvisc.units import Quantity, quantities
 
 
@@ -160,13 +161,12 @@ def highest(h: xr.DataArray) -> float:
     >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
     (0.0, True, True)
     """
-    known, highest_cell = _known(h), float(np.nanmax(h.values))
-    if known is None:
-        return highest_cell
-    for axis, side, centre in zip("xy", *known[1:], strict=True):
-        if not float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2:
-            return highest_cell
-    return 0.0
+    known = _known(h)
+    has_apex = known is not None and all(
+        float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2
+        for axis, side, centre in zip("xy", *known[1:], strict=True)
+    )
+    return 0.0 if has_apex else float(np.nanmax(h.values))
 
 
 def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
@@ -211,17 +211,31 @@ _INDENTERS: dict[str, Callable[..., np.ndarray]] = {
 
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
-    size, shape = pair("size", size), counts("shape", shape, low=1)
-    h = generated(np.empty(shape), name, parameters, size)
-    x, y = h["x"].values[:, None] - size[0] / 2, h["y"].values - size[1] / 2
-    h.values = _INDENTERS[name](x, y, **parameters)
-    absent = np.isnan(h.values)
+    size, shape = pair("size", size), cells(shape)
+    x, y = ((np.arange(n) + 0.5) * (side / n) - side / 2 for side, n in zip(size, shape, strict=True))
+    heights = _INDENTERS[name](x[:, None], y, **parameters)
+    absent = np.isnan(heights)
     if absent.all():
-        expected = f"one that contains a cell centre, for cells of {spacing(h)} m"
+        expected = f"one that contains a cell centre, for {shape[0]} x {shape[1]} cells"
         raise InputError(key="radius", found=parameters["radius"], expected=expected)
-    if absent.any():
-        h.attrs["missing"] = "absent"
-    return h
+    return generated(heights, name, parameters, size, **({"missing": "absent"} if absent.any() else {}))
+
+
+def cells(shape: Any, least: int = 1) -> tuple[int, int]:
+    """Return the number of cells of a recipe along x and y.
+
+    Recipes call this function after the checks of all other arguments.
+
+    Raises
+    ------
+    InputError
+        If `shape` is neither a whole number of at least `least` nor a pair of them.
+    DataNeeded
+        If `shape` is a placeholder: the recipe has checked its other arguments.
+    """
+    if isinstance(shape, NoData):
+        raise DataNeeded("shape")
+    return counts("shape", shape, low=least)
 
 
 def generated(heights: np.ndarray, name: str, parameters: dict[str, Any], size: Any, **attrs: Any) -> xr.DataArray:

@@ -58,16 +58,16 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     require_heights(h, "parameters")
     known = h.values[np.isfinite(h.values)]
     z, gradient = known - known.mean(), _squared_slopes(h, periodic)
-    square = _mean(z**2)
+    square = (z**2).mean()
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
-            "Sa": _mean(np.abs(z)),
+            "Sa": np.abs(z).mean(),
             "Sq": np.sqrt(square),
-            "Ssk": _mean(z**3) / square**1.5,
-            "Sku": _mean(z**4) / square**2,
+            "Ssk": (z**3).mean() / square**1.5,
+            "Sku": (z**4).mean() / square**2,
             "Sz": z.max() - z.min(),
-            "Sdq": np.sqrt(_mean(gradient)),
-            "Sdr": _mean(gradient / (1 + np.sqrt(1 + gradient))),
+            "Sdq": np.sqrt(gradient.mean()),
+            "Sdr": (gradient / (1 + np.sqrt(1 + gradient))).mean(),
             "missing_fraction": (h.size - known.size) / h.size,
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}
@@ -96,11 +96,11 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
     float
         NaN if no corner counts. [-]
     """
-    return float(np.sqrt(_mean(_squared_slopes(checked(h, "rms_slope", least=1), periodic, depth))))
+    return math.sqrt(_squared_slopes(checked(h, "rms_slope", least=1), periodic, depth).mean())
 
 
 def _squared_slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> np.ndarray:
-    """Return the squared slopes at the corners of the points (i, j), (i+1, j), (i, j+1) that are all present."""
+    """Return the squared slopes at the corners of three present points, (i, j), (i+1, j), (i, j+1); NaN without one."""
     (dx, dy), (nx, ny) = spacing(h), h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
@@ -110,8 +110,4 @@ def _squared_slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) ->
     if depth < math.inf:
         lowest = np.nanmax(h.values) - depth
         counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
-    return squares[counts]
-
-
-def _mean(values: np.ndarray) -> np.float64:
-    return values.mean() if values.size else np.float64(np.nan)
+    return squares[counts] if counts.any() else np.array([np.nan])

@@ -1,12 +1,14 @@
-"""Recipes of surfaces, by their names in surface cards and studies; indenters are in :mod:`.indenters`.
+"""Recipes of waves and of self-affine roughness, and random surfaces with the spectrum of a surface.
 
-Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the recipe stays in the attributes.
+Heights are taken at the cell centres ``((i + 1/2) dx, (j + 1/2) dy)``; the recipe stays in the attributes. The module
+:mod:`.indenters` contains the indenters.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from numbers import Integral
 from typing import Any, Literal
 
@@ -14,11 +16,13 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from roughvisc.arguments import check_keys, located, one_of, split, units_of
+from roughvisc.arguments import DataNeeded, NoData, call, check_keys, one_of, split
 from roughvisc.errors import InputError
-from roughvisc.topography.grid import counts, pair
-from roughvisc.topography.indenters import cone, flat_punch, generated, sphere
-from roughvisc.topography.spectrum import wavevectors
+from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
+from roughvisc.topography.framing import mirror
+from roughvisc.topography.grid import checked, counts, labelled, noted, pair, require_complete, spacing
+from roughvisc.topography.indenters import cells, cone, flat_punch, generated, sphere
+from roughvisc.topography.spectrum import psd, wavevectors
 from roughvisc.units import Quantity, number, quantities
 
 
@@ -49,13 +53,14 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     InputError
         If a parameter is not positive and finite, `waves` is neither 1 nor 2, or the waves do not fit the domain.
     """
-    size, shape = pair("size", size), counts("shape", shape, low=1)
+    size = pair("size", size)
     one_of("waves", waves, (1, 2))
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
             expected = f"a whole number of wavelengths, so that the waves repeat; {side:.6g} m holds {periods:.6g}"
             raise InputError(key="size", found=size, expected=expected)
+    shape = cells(shape)
     repeats = (round(size[0] / wavelength), round(size[1] / wavelength) * (waves == 2))
     along_x, along_y = (np.cos(2 * np.pi * k * (np.arange(n) + 0.5) / n) for k, n in zip(repeats, shape, strict=True))
     parameters = {"amplitude": amplitude, "wavelength": wavelength, "waves": int(waves)}
@@ -137,24 +142,24 @@ def self_affine(
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     .. [2] NumPy reference, "Parallel random number generation", SeedSequence spawning.
     """
-    size, shape = pair("size", size), counts("shape", shape)
+    size = pair("size", size)
+    stated_seed = None if isinstance(seed, np.random.Generator) else whole("seed", seed)
     one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
     hurst = number(hurst, "1", "hurst", above=0, most=1.0)
     if (rms_slope is None) == (rms_height is None):
         raise InputError(key="rms_slope", found=rms_slope, expected="exactly one of rms_slope and rms_height")
-    target = rms_slope if rms_height is None else rms_height
+    shape = cells(shape, least=2)
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
-    cells = size[0] / shape[0], size[1] / shape[1]
-    finest = 2 * max(cells[0] / stretch[0], cells[1] / stretch[1])
+    sides = size[0] / shape[0], size[1] / shape[1]
+    finest = 2 * max(sides[0] / stretch[0], sides[1] / stretch[1])
     shortcut = finest if shortcut is None else shortcut
     if shortcut < finest * (1 - 1e-12):
         raise InputError(f"shortcut is {shortcut!r}: expected at least two cells, {finest:.6g} [m]")
     if rolloff is not None and rolloff < shortcut:
         raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
-    stated_seed = None if isinstance(seed, np.random.Generator) else whole("seed", seed)
     entropy = np.random.default_rng(seed).integers(1 << 32, size=4).tolist()
-    q_x, q_y, weight = wavevectors(shape, cells)
+    q_x, q_y, weight = wavevectors(shape, sides)
     q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
     inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, are outside
     amplitude = np.zeros(q.shape)
@@ -165,10 +170,9 @@ def self_affine(
     if not square:
         raise InputError(f"no wave of the domain is longer than shortcut = {shortcut:.6g} [m]: expected a larger size")
     heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
-    heights *= target / math.sqrt(square)
+    heights *= (rms_slope or rms_height) / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
-    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes}
-    parameters |= {"seed": stated_seed}
+    parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": stated_seed}
     return generated(heights, "self_affine", parameters, size, period=list(size))
 
 
@@ -218,6 +222,76 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
     return scipy.fft.irfft(scipy.fft.ifft(spectrum, axis=0, norm="forward"), ny, axis=1, norm="forward")
 
 
+def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
+    r"""Generate random surfaces with the spectrum of a surface, as models of other samples of the same roughness.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights without missing points. [m]
+    count : int
+        Number of surfaces.
+    seed : int
+        Source of random phases and amplitudes. A seed and a number define one surface, on any grid of this size.
+
+    Returns
+    -------
+    xarray.DataArray, dims (realisation, x, y)
+        Periodic surfaces with zero mean over the same cells, numbered from 1. [m]
+
+    Raises
+    ------
+    InputError
+        If points are missing, `count` is not a positive whole number, or `seed` is not valid.
+
+    Notes
+    -----
+    The surrogate is a Gaussian random field, as in :func:`self_affine` with Gaussian amplitudes. The
+    spectrum is the radial average of :func:`psd`, up to the largest wave number with a complete ring. Direction and
+    shape (skewness, kurtosis, ridges) of the surface are lost. A surface that is not periodic is used with its mirror
+    images. A surface made by :func:`mirror` gives surfaces as large as the original part, because only that part was
+    measured.
+
+    References
+    ----------
+    .. [1] B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1, appendix D.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> scan = rv.self_affine(1e-3, (31, 33), hurst=0.8, rms_height=1e-6, seed=1)
+    >>> rv.surrogates(scan, 3, seed=7).sizes["realisation"]
+    3
+    """
+    numbers = np.arange(1, whole("count", count, 1) + 1)
+    found = [surrogate(h, number, seed=seed) for number in numbers]
+    return xr.concat(found, xr.DataArray(numbers, dims="realisation", name="realisation"))
+
+
+def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
+    """Return one surface of :func:`surrogates`, by its number. [m]"""
+    entropy = [whole("seed", seed), whole("number", number, 1)]
+    h = checked(h, "surrogates")
+    require_complete(h, "surrogates")
+    if is_mirrored(h):
+        h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
+    repeating = h if is_periodic(h) else mirror(h)
+    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
+    sides = spacing(h)
+    q_x, q_y, _ = wavevectors(h.shape, sides)
+    q = np.hypot(q_x[:, None], q_y)
+    rings = np.round(spectrum["wavevector"].values / step).astype(int)
+    density = np.zeros(rings[-1] + 1)
+    density[rings] = spectrum["psd"].values
+    ring = np.maximum(np.round(q / step).astype(int), 1)
+    inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
+    variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
+    heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=True)
+    grid = labelled(heights, sides).assign_coords(x=h["x"], y=h["y"])
+    line = f"surrogate {number} of seed {seed}: random phases, gaussian amplitudes"
+    return noted(grid, line, period=period_of(grid))
+
+
 #: Function of each recipe, by its name in surface cards and studies.
 RECIPES: dict[str, Callable[..., xr.DataArray]] = {
     recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
@@ -245,11 +319,6 @@ def check_recipe(where: str, table: Mapping[str, Any]) -> None:
     recipe = RECIPES[one_of(f"{where}.generate", table["generate"], RECIPES)]
     _, stated = split(table, "generate")
     check_keys(recipe, where, stated)
-    try:
-        pair("size", stated["size"])
-        counts("shape", stated["shape"], low=2 if recipe is self_affine else 1)
-        whole("seed", stated.get("seed", 0))
-        for key in (units_of(recipe).keys() & stated) - {"size"}:
-            number(stated[key], units_of(recipe)[key], key, above=0, most=1.0 if key == "hurst" else None)
-    except InputError as error:
-        raise located(error, where) from error
+    counts(f"{where}.shape", stated["shape"], low=2 if recipe is self_affine else 1)
+    with suppress(DataNeeded):
+        call(recipe, where, stated | {"shape": NoData()})

@@ -27,6 +27,10 @@ def test_read_study__units_become_si(read_one):
     assert (case.settings.boundary, case.settings.fields, case.settings.times) == ("free", ("pressure", "gap"), None)
 
 
+WAVES = {"generate": "wavy", "amplitude": "1 um", "wavelength": "1 mm", "size": "3 mm", "shape": 24}
+ROUGH = {"generate": "self_affine", "size": "3 mm", "shape": 24, "hurst": 0.8, "rms_height": "1 um", "seed": 1}
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "found"),
     [
@@ -38,6 +42,9 @@ def test_read_study__units_become_si(read_one):
         ({"material": None}, "material", None),
         ({"surface.generate": "ball"}, "surface.generate", "ball"),
         ({"surface.generate": None}, "surface", None),
+        ({"surface": WAVES | {"shape": [24, 0]}}, "surface.shape", [24, 0]),
+        ({"surface": WAVES | {"size": "3.5 mm"}}, "surface.size", (3.5e-3, 3.5e-3)),
+        ({"surface": ROUGH | {"rms_slope": 0.1}}, "surface.rms_slope", 0.1),
         ({"surface.outliers": {"treshold": 5}}, "surface.outliers.treshold", 5),
         ({"surface.crop": {"y": ["9 mm", "1 um"]}}, "surface.crop.y", ["9 mm", "1 um"]),
         ({"surface.mirror": True}, "surface.mirror", True),
