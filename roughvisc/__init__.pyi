@@ -19,12 +19,12 @@ from roughvisc.mechanics.materials.creep import pair as pair
 from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.creep import shift as shift
 from roughvisc.mechanics.materials.creep import wlf as wlf
-from roughvisc.mechanics.materials.models import elastic as elastic
-from roughvisc.mechanics.materials.models import kelvin_voigt as kelvin_voigt
-from roughvisc.mechanics.materials.models import maxwell as maxwell
-from roughvisc.mechanics.materials.models import zener as zener
 from roughvisc.mechanics.materials.prony import Prony as Prony
-from roughvisc.mechanics.materials.relaxation import from_relaxation as from_relaxation
+from roughvisc.mechanics.materials.prony import elastic as elastic
+from roughvisc.mechanics.materials.prony import from_relaxation as from_relaxation
+from roughvisc.mechanics.materials.prony import kelvin_voigt as kelvin_voigt
+from roughvisc.mechanics.materials.prony import maxwell as maxwell
+from roughvisc.mechanics.materials.prony import zener as zener
 from roughvisc.mechanics.materials.tables import creep_table as creep_table
 from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table

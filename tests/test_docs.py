@@ -18,7 +18,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.mechanics.materials.models import MODELS
+from roughvisc.mechanics.materials import MODELS
 from roughvisc.settings import Settings
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text

@@ -33,9 +33,10 @@ ADDED = {
         }
     },
     "material": {
-        "mechanics/materials/models.py": {
+        "mechanics/materials/__init__.py": {
             "dynamic_table, pair)\n": "_OTHERS = (*_OTHERS, gel)\n",
-            "from roughvisc.units import Quantity, quantities\n": """
+            "import creep_table, dynamic_table, relaxation_table\n": """from roughvisc.units import Quantity, quantities
+
 
 @quantities(modulus="Pa", drainage="s")
 def gel(modulus: Quantity, drainage: Quantity) -> Prony:

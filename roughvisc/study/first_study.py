@@ -15,7 +15,7 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.models import zener
+from roughvisc.mechanics.materials.prony import zener
 from roughvisc.topography.conditioning import condition
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.parameters import rms_slope

@@ -24,8 +24,8 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
+from roughvisc.mechanics.materials import MODELS
 from roughvisc.mechanics.materials.creep import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, wlf
-from roughvisc.mechanics.materials.models import MODELS
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES

@@ -199,7 +199,7 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.c
 
     Examples
     --------
-    >>> from roughvisc.mechanics.materials.models import zener
+    >>> from roughvisc.mechanics.materials.prony import zener
     >>> found = complex_compliance(zener(1.0, 1.0, 1.0), [0.0, 1.0])  # C = 1/4 (1 + 1 / (1 + i w))
     >>> found.real.tolist(), found.imag.tolist()
     ([0.5, 0.375], [0.0, -0.125])

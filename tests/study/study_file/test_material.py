@@ -5,7 +5,7 @@ from samples import RUBBER
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.materials.models import MODELS
+from roughvisc.mechanics.materials import MODELS
 from roughvisc.study.case import Case, vary
 
 HEADING = "time [s], compliance [1/Pa]\n"
