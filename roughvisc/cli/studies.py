@@ -150,12 +150,10 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
     """Compute and summarise a sweep; raise its failure, if there is one."""
     from roughvisc.cli.tables import sweep_table
-    from roughvisc.study.execution.display import Display
     from roughvisc.study.execution.run import REFUSED
-    from roughvisc.study.execution.sweep import run_cases
+    from roughvisc.study.execution.sweep import Display, run_cases
     from roughvisc.study.storage.folder import LOG
-    from roughvisc.study.storage.results_table import CASES
-    from roughvisc.study.storage.sweep_data import numbers_of, sweep_cases
+    from roughvisc.study.storage.sweep_data import CASES, numbers_of, sweep_cases
 
     found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))

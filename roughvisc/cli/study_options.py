@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError
-from roughvisc.study.quantities import QUANTITIES
+from roughvisc.study.neighbours import QUANTITIES
 from roughvisc.units import is_quantity
 
 if TYPE_CHECKING:

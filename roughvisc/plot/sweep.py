@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.study.case_text import names_of, value_text
-from roughvisc.study.realisations import statistics
-from roughvisc.study.sweep_table import ITSELF, REALISATION
+from roughvisc.study.sweep_table import ITSELF, REALISATION, statistics
 from roughvisc.units import in_si
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 

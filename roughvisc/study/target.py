@@ -23,7 +23,7 @@ from roughvisc.study import neighbours
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.run import is_result_of, result_folder, run_case
-from roughvisc.study.quantities import QUANTITIES, quantity_of
+from roughvisc.study.neighbours import QUANTITIES, quantity_of
 from roughvisc.study.storage.folder import atomic_write, case_path
 from roughvisc.study.storage.netcdf import open_result, write_dataset
 from roughvisc.topography.grid import spacing

@@ -17,8 +17,16 @@ from roughvisc.experiment.rows import kept_times
 from roughvisc.labels import cost_of
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.run import result_folder
-from roughvisc.study.neighbours import is_data, on_cells, shape_on, solve, with_kept
-from roughvisc.study.quantities import QUANTITIES, quantities_of, quantity_of
+from roughvisc.study.neighbours import (
+    QUANTITIES,
+    is_data,
+    on_cells,
+    quantities_of,
+    quantity_of,
+    shape_on,
+    solve,
+    with_kept,
+)
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
 from roughvisc.variables import AXES

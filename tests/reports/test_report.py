@@ -17,9 +17,8 @@ from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.folder import write_json
-from roughvisc.study.storage.results_table import to_table
 from roughvisc.study.storage.sweep_data import SWEEP as LISTED
-from roughvisc.study.storage.sweep_data import sweep_cases
+from roughvisc.study.storage.sweep_data import sweep_cases, to_table
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = BALL.replace('"A ball"', f"'{HOSTILE}'") + '[sweep]\n"program.0.load" = ["2 mN", "10 mN", "1 mN"]\n'

@@ -103,7 +103,7 @@ def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_
 @pytest.mark.thorough
 def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     """The second begins while the first computes: it is refused, and adds its own afterwards."""
-    from roughvisc.study import observed
+    from roughvisc.observables import OBSERVABLES
 
     fields = 'fields = ["pressure", "gap"]\n'
     one = read_cases(study(fields + LEAKAGE))
@@ -112,14 +112,14 @@ def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     plain, refused = rv.observables.leakage, []
 
     def meanwhile(*given, **named):
-        monkeypatch.setitem(observed.OBSERVABLES, "leakage", plain)
+        monkeypatch.setitem(OBSERVABLES, "leakage", plain)
         try:
             rv.observe(two, tmp_path / "out")
         except BlockingIOError as error:
             refused.append(error)
         return plain(*given, **named)
 
-    monkeypatch.setitem(observed.OBSERVABLES, "leakage", meanwhile)
+    monkeypatch.setitem(OBSERVABLES, "leakage", meanwhile)
     (path,) = rv.observe(one, tmp_path / "out")
     assert refused
     rv.observe(two, tmp_path / "out")

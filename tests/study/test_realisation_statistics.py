@@ -11,10 +11,9 @@ from support import ROUGH, refused
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.realisations import over_realisations
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import to_table
-from roughvisc.study.storage.sweep_data import open_results
+from roughvisc.study.storage.sweep_data import open_results, to_table
+from roughvisc.study.sweep_table import over_realisations
 
 
 def of(values, **coords):

@@ -23,8 +23,8 @@ from distributed.core import Status
 
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import Case
-from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import IN_USE, Outcome, attempt
+from roughvisc.study.execution.sweep import Display
 from roughvisc.study.storage.folder import case_path
 
 if TYPE_CHECKING:

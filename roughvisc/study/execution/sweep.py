@@ -1,39 +1,45 @@
-"""Sweeps: many cases in this process or on Dask, with one file each; a failed case does not stop the others."""
+"""Sweeps: many cases in this process or on Dask, with one file each; their display, and their observables.
+
+A failed case does not stop the others.
+"""
 
 from __future__ import annotations
 
 import errno
 import json
 import logging
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+from rich.console import Console
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import cores
 from roughvisc.labels import warnings_of
+from roughvisc.observables import OBSERVABLES
+from roughvisc.progress import Bars, clock
 from roughvisc.study.case import Case, read_cases
+from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each
-from roughvisc.study.execution.display import Display
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
-from roughvisc.study.storage.folder import (
-    case_path,
-    log_file,
-    record_failure,
-    require_writable,
-    write_json,
-)
+from roughvisc.study.storage.folder import case_path, lock_case, log_file, record_failure, require_writable, write_json
 from roughvisc.study.storage.index import clean_folder, index_of
-from roughvisc.study.storage.results_table import write_table
-from roughvisc.study.storage.sweep_data import SWEEP, numbers_of, open_results, sweep_cases
+from roughvisc.study.storage.netcdf import open_result, write_result
+from roughvisc.study.storage.sweep_data import SWEEP, numbers_of, open_results, sweep_cases, write_table
 
 if TYPE_CHECKING:
-    import xarray as xr
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
+
+#: Attribute of a result: the arguments of each observable that it contains, as JSON.
+OBSERVED = "observed"
 
 
 def sweep(
@@ -229,3 +235,147 @@ def _record(outcome: Outcome, case: Case, folder: Path) -> None:
         case_path(folder, outcome.key, "failure").unlink(missing_ok=True)  # the case failed before
     elif outcome.kind == "failed":
         record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)
+
+
+class Display:
+    """Bars and messages of a sweep; times in seconds.
+
+    Parameters
+    ----------
+    show : bool
+        Whether to show anything.
+    console : rich.console.Console, optional
+        Default: the standard error. Without a terminal it shows a line every few seconds.
+    """
+
+    def __init__(self, show: bool = True, console: Console | None = None) -> None:
+        self._bars = Bars(console if show else Console(quiet=True))
+        self._lock = threading.Lock()
+        self._names: dict[str, str] = {}
+        self._at: dict[str, Callable[[float, float], str]] = {}
+        self._running: dict[str, float] = {}  # computed fraction of each program
+        self._ended: dict[str, Outcome] = {}
+        self._began = time.monotonic()
+
+    def begin(self, cases: Sequence[Case], numbers: Mapping[str, int]) -> None:
+        """Show the cases, in the order of the study; `numbers` gives the number of each key."""
+        for case in cases:
+            varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
+            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:60]})" if varied else "")
+            self._at[case.key] = case.experiment.progress
+        self._bars.start()
+        with self._lock:
+            self._move()
+
+    def reached(self, key: str, now: float, end: float) -> None:
+        """Move the bar of a running case, from any thread; both times are zero when it begins."""
+        with self._lock:
+            if key not in self._ended:
+                self._running[key] = now / end if end else 0.0
+                self._bars.reached(self._names[key], now, end, self._at[key](now, end) if end else "")
+                self._move()
+
+    def ended(self, outcome: Outcome) -> None:
+        """Close the bar of a case, and write the message of a failed case."""
+        with self._lock:
+            self._ended[outcome.key] = outcome
+            self._running.pop(outcome.key, None)
+            self._bars.close(self._names[outcome.key])
+            self._move()
+        if outcome.kind != "done":
+            self.say(f"{outcome.kind}: {outcome.message}", outcome.key)
+
+    def say(self, text: str, key: str = "") -> None:
+        """Write a line; with `key` the name of this case comes first."""
+        self._bars.say(f"{self._names[key]}: {text}" if key else text)
+
+    def close(self) -> None:
+        """End the display."""
+        self._bars.stop()
+        self._bars.say(f"{self._summary()}, in {clock(time.monotonic() - self._began)}")
+
+    def _move(self) -> None:
+        """Move the bar of the sweep."""
+        self._bars.reached("sweep", sum(self._running.values()) + len(self._ended), len(self._names), self._summary())
+        self._bars.line("sweep")
+
+    def _summary(self) -> str:
+        kinds = [outcome.kind for outcome in self._ended.values()]
+        parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
+        for kind in ("failed", "hindered"):
+            parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
+        return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])
+
+
+def observe(
+    cases: Sequence[Case] | str | Path,
+    out: str | Path | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Compute the quantities in ``[observe]`` of a study from its finished results, and add them to the files.
+
+    ``roughvisc run`` calls this function at the end. After :func:`roughvisc.run` and :func:`roughvisc.sweep` call it
+    with the same arguments. Quantities that a file already contains, for equal arguments, are not computed again.
+    Frames are Dask tasks, on the default client if there is one, otherwise in threads.
+
+    Parameters
+    ----------
+    cases : sequence of Case, or path
+        Cases, or their study file. Unfinished cases are skipped.
+    out : path, optional
+        Results folder. Default: ``results/`` and the name of the study, next to the study.
+    progress : callable, optional
+        Called with the number of finished cases and the total number.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files that were changed.
+
+    Raises
+    ------
+    InputError
+        If a quantity cannot be computed from a result; its file is not changed.
+    """
+    cases = read_cases(cases) if isinstance(cases, str | Path) else cases
+    distinct = {case.key: case for case in cases if case.observed}
+    folder = result_folder(cases[0], out).absolute()
+    added = []
+    for number, case in enumerate(distinct.values()):
+        if progress is not None:
+            progress(number, len(distinct))
+        path = case_path(folder, case.key, "result")
+        if path.exists() and _add(case, path):
+            added.append(path)
+    if added and len(cases) > 1:
+        write_table(folder)
+    return added
+
+
+def _add(case: Case, path: Path) -> bool:
+    """Add the missing quantities of one case to its file; return whether any was missing."""
+    if not _lacking(case, open_result(path)):
+        return False
+    with lock_case(case_path(path.parent, case.key, "lock")), open_result(path) as result:
+        lacking = _lacking(case, result)  # again, because the file may have changed
+        frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame
+        try:
+            parts = [OBSERVABLES[name](frames, **arguments) for name, arguments in lacking.items()]
+            found = xr.merge(parts, compat="equals", join="exact").compute()
+        except InputError as error:
+            raise error.prefixed(str(path)) from error
+        known = json.loads(result.attrs.get(OBSERVED, "{}")) | lacking
+        whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
+            found, compat="equals", join="exact"
+        )
+        whole.attrs = result.attrs | {"case": case.to_json(), OBSERVED: json.dumps(known)}
+        write_result(whole, path)
+    log.info("%s: added %s", path, ", ".join(lacking))
+    return True
+
+
+def _lacking(case: Case, result: xr.Dataset) -> dict[str, Any]:
+    """Return the observables that a result lacks, or contains for other arguments."""
+    before = json.loads(result.attrs.get(OBSERVED, "{}"))
+    return {name: values for name, values in case.observed.items() if before.get(name) != values}

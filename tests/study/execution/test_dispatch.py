@@ -22,8 +22,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.sweep import run_cases, sweep
+from roughvisc.study.execution.sweep import Display, run_cases, sweep
 from roughvisc.study.storage.folder import case_path
 
 pytestmark = pytest.mark.filterwarnings(

@@ -11,8 +11,7 @@ from roughvisc.api import run
 from roughvisc.errors import RoughviscError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution import run as run_module
-from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.sweep import run_cases, sweep
+from roughvisc.study.execution.sweep import Display, run_cases, sweep
 from roughvisc.study.storage.folder import case_path
 
 SCAN = 'file = "scan.npy"\nunit = "m"\nspacing = "40 um"\n'

@@ -18,12 +18,10 @@ from roughvisc.cli.study_options import connect
 from roughvisc.errors import InputError, RoughviscError, TooLargeError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import sweep as sweep_module
-from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.sweep import run_cases, sweep
+from roughvisc.study.execution.sweep import Display, run_cases, sweep
 from roughvisc.study.storage.folder import case_path
 from roughvisc.study.storage.index import INDEX
-from roughvisc.study.storage.results_table import CASES
-from roughvisc.study.storage.sweep_data import SWEEP
+from roughvisc.study.storage.sweep_data import CASES, SWEEP
 
 RUN = [sys.executable, "-m", "roughvisc", "run"]
 

@@ -9,10 +9,9 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases
-from roughvisc.study.execution.display import Display
-from roughvisc.study.execution.sweep import run_cases
+from roughvisc.study.execution.sweep import Display, run_cases
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.results_table import CASES
+from roughvisc.study.storage.sweep_data import CASES
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 #: The last two touch the border of the grid, which counts as measured and does not grow.
