@@ -1,4 +1,4 @@
-"""Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps.
+"""Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps; ``ds.roughvisc``.
 
 A result contains rows at its kept times. The history of every accepted step is a second Dataset, the group ``steps`` of
 the file. The first Dataset contains it in ``encoding``, which xarray keeps in selections and copies and does not write
@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from importlib import import_module
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 #: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
 _CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
@@ -27,6 +26,8 @@ STEPS, TITLE = "steps", "histories of every accepted step"
 _CARRIED = "roughvisc_steps"
 #: Subjects of the warnings that :func:`roughvisc.simulate` and others issue as Python warnings; the others are logged.
 ISSUED = ("tolerance", "material")
+#: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
+_ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
 
 def heading(name: str, unit: str) -> str:
@@ -158,3 +159,38 @@ def require_steps(result: xr.Dataset) -> xr.Dataset:
             expected="a result over time from rv.simulate, rv.run or rv.open_result, or a selection of its rows",
         )
     return steps
+
+
+@xr.register_dataset_accessor("roughvisc")
+class ResultAccessor:
+    """Steps, observables and figures of a result; each method calls the function of its name with this result.
+
+    ``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
+    Each function is imported at its first use.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result, or several as :func:`roughvisc.open_results` opens them.
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    @property
+    def steps(self) -> xr.Dataset:
+        """Histories of every accepted step, over ``step``."""
+        return require_steps(self._dataset)
+
+    def __getattr__(self, name: str) -> Any:
+        start = "plot_" if name.startswith("plot_") else ""
+        room, function = import_module(_ROOMS[start]), name.removeprefix(start)
+        if function not in room.__all__:
+            raise AttributeError(f"the accessor roughvisc has no {name!r}")
+        method = partial(getattr(room, function), self._dataset)
+        method.__doc__ = method.func.__doc__
+        return method
+
+    def __dir__(self) -> list[str]:
+        known = (start + name for start, module in _ROOMS.items() for name in import_module(module).__all__)
+        return [*super().__dir__(), *known]

@@ -11,6 +11,7 @@ from pathlib import PurePath
 from typing import Any
 
 from roughvisc.study.study_file import unit_of
+from roughvisc.topography.writers import toml_text
 from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.
@@ -41,22 +42,13 @@ def study_text(case: Mapping[str, Any]) -> str:
             continue
         several = isinstance(value, list) and any(isinstance(one, dict) for one in value)
         if not (several or isinstance(value, dict)):
-            text += f"{name} = {_toml(value)}\n"
+            text += f"{name} = {toml_text(value)}\n"
             continue
         for entry in value if several else [value]:
-            lines = [f"{key} = {_toml(inner)}" for key, inner in entry.items() if inner is not False]  # steps left out
+            stated = {key: inner for key, inner in entry.items() if inner is not False}  # a step left out is false
+            lines = [f"{key} = {toml_text(inner)}" for key, inner in stated.items()]
             tables += "\n".join(["", f"[[{name}]]" if several else f"[{name}]", *lines, ""])
     return text + tables
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return str(value).lower()  # true and false, inf and nan
 
 
 def names_of(keys: Sequence[str]) -> dict[str, str]:

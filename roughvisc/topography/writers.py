@@ -76,7 +76,7 @@ def card_text(
     file = Path(file)
     if file.suffix.lower() == ".toml":
         raise InputError(f"{file}: is a surface card already: expected a scan file")
-    entries = {"title": _toml(file.stem), "sha256": _toml(sha256(file))}
+    entries = {"title": toml_text(file.stem), "sha256": toml_text(sha256(file))}
     entries |= _entries(Path(os.path.relpath(file, folder)), options, steps)
     lines = ['# source = "..."      # where it comes from', '# licence = "..."     # who may use it']
     lines += ['# instrument = "..."', *(f"{key} = {value}" for key, value in entries.items())]
@@ -111,7 +111,7 @@ def _entries(file: Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -
     """Return the keys of a table ``[surface]`` and their values as TOML."""
     given = {key: value for key, value in options.items() if value is not None}
     table = {"file": file.as_posix(), **given, **steps}
-    return {key: _toml(value, _LENGTHS.get(key)) for key, value in table.items()}
+    return {key: toml_text(value, _LENGTHS.get(key)) for key, value in table.items()}
 
 
 def written_quantity(value: float, unit: str, digits: int = 6) -> str:
@@ -126,11 +126,13 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
     return f"{value / shown.factor:.{digits}g} {shown.symbol}".replace("µ", "u")
 
 
-def _toml(value: Any, digits: int | None = None) -> str:
+def toml_text(value: Any, digits: int | None = None) -> str:
     """Return a value as TOML; if `digits` is given, numbers are written as lengths with this many digits."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(one, digits)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_text(one, digits)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(_toml(one, digits) for one in value)}]"
+        return f"[{', '.join(toml_text(one, digits) for one in value)}]"
     text = value if digits is None else written_quantity(float(value), "m", digits)
+    if isinstance(text, float):
+        return str(text)  # inf and nan are Infinity and NaN in JSON
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML escapes it, JSON does not
