@@ -103,7 +103,7 @@ def audit(result: Path, **properties: Any) -> None:
     Example:
       roughvisc audit results/focus_variation-study --work-of-adhesion "50 mJ/m^2"
     """
-    from roughvisc.cli.accuracy_tables import audit_table
+    from roughvisc.cli.study_tables import audit_table
     from roughvisc.study.storage.folder import results_at
 
     given = {name: value for name, value in properties.items() if value is not None}

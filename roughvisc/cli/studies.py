@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +18,7 @@ from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
+    from distributed import Client
     from rich.console import Console
 
     from roughvisc.study.case import Case
@@ -39,7 +42,7 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
     Example:
       roughvisc plan focus_variation-study.toml
     """
-    from roughvisc.cli.plan_tables import plan_tables
+    from roughvisc.cli.study_tables import plan_tables
 
     costs = rv.plan(study, out, workers=workers)
     if not costs["refusal"].all():
@@ -89,7 +92,6 @@ def run(
       roughvisc run focus_variation-study.toml --for "5 % mean_gap"
       roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
-    from roughvisc.cli.study_options import connect
     from roughvisc.study.execution.run import result_folder
 
     cases = rv.read_cases(study)
@@ -109,11 +111,69 @@ def run(
         _run_one(cases[0], folder, console, not no_plots, settings["threads"])
 
 
+@contextmanager
+def connect(address: str | None = None, file: Path | None = None) -> Iterator[Client]:
+    """Yield a client of a running scheduler.
+
+    Parameters
+    ----------
+    address : str, optional
+        Address of the scheduler, such as ``tcp://host:8786``.
+    file : path, optional
+        File of ``dask scheduler --scheduler-file``, instead of the address.
+
+    Raises
+    ------
+    InputError
+        If the scheduler does not answer.
+    """
+    from distributed import Client  # slow to import
+    from distributed.utils import silence_logging_cmgr
+
+    if (address is None) == (file is None):
+        raise InputError("found both an address and a file of the scheduler: expected only one")
+    if file is not None and not file.is_file():
+        raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
+    try:
+        where = {"address": address} if file is None else {"scheduler_file": str(file)}
+        client = Client(**where, set_as_default=False, timeout="20s")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{file or address}: no Dask scheduler answers there ({error})") from error
+    quiet = partial(silence_logging_cmgr, logging.CRITICAL)  # the sweep reports a lost scheduler
+    with quiet("distributed"), quiet("distributed.client"), client:
+        yield client
+
+
+def parse_targets(texts: Sequence[str]) -> dict[str, str]:
+    """Return number -> wanted error from targets of ``--for`` such as ``1 % friction_coefficient``.
+
+    Raises
+    ------
+    InputError
+        If a text is not a target.
+
+    Examples
+    --------
+    >>> parse_targets(["1 % mean_gap"])
+    {'mean_gap': '1 %'}
+    """
+    from roughvisc.study.neighbours import QUANTITIES  # slow to import
+    from roughvisc.units import is_quantity
+
+    found: dict[str, str] = {}
+    for text in texts:
+        amount, _, name = text.strip().rpartition(" ")
+        if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
+            expected = f"a target such as '1 % contact_area', once for each number, of {', '.join(QUANTITIES)}"
+            raise InputError(key="for", found=text, expected=expected)
+        found[name] = amount
+    return found
+
+
 def _chosen(
     case: Case, targets: tuple[str, ...], folder: Path, console: Console, plots: bool, **computing: Any
 ) -> Case:
     """Return the case with grid and tolerance for some target errors, and show the budget of each target."""
-    from roughvisc.cli.study_options import parse_targets
     from roughvisc.study.target import choose
 
     tell = partial(say, console)
@@ -189,7 +249,7 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
       roughvisc trade focus_variation-study.toml
       roughvisc trade focus_variation-study.toml --accuracy 0.1% --quantity mean_gap
     """
-    from roughvisc.cli.accuracy_tables import trade_table
+    from roughvisc.cli.study_tables import trade_table
     from roughvisc.study.execution.run import result_folder
     from roughvisc.study.trade import FOLDER
     from roughvisc.units import number
@@ -243,7 +303,7 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:
     """Print, write and draw the budget of a result."""
-    from roughvisc.cli.accuracy_tables import budget_table
+    from roughvisc.cli.study_tables import budget_table
 
     console.print(budget_table(found))
     _write(console, "Budget", found, folder / f"budget-{name}.nc", rv.plot.budget if plots else None)

@@ -10,8 +10,8 @@ from rich.console import Console
 from support import STUDY, case_of, refused
 
 import roughvisc as rv
-from roughvisc.cli.accuracy_tables import budget_table
-from roughvisc.cli.study_options import parse_targets
+from roughvisc.cli.studies import parse_targets
+from roughvisc.cli.study_tables import budget_table
 from roughvisc.study.case import Case
 
 BALL = {

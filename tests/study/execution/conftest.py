@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from roughvisc.cli.study_options import connect
+from roughvisc.cli.studies import connect
 
 
 @pytest.fixture(scope="session")

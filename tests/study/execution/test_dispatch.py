@@ -17,7 +17,7 @@ from distributed import Client, LocalCluster
 from support import BALL, LOADS, LONG, assert_same, numbers, refused
 
 import roughvisc as rv
-from roughvisc.cli.study_options import connect
+from roughvisc.cli.studies import connect
 from roughvisc.errors import RoughviscError
 from roughvisc.study.execution import dispatch
 from roughvisc.study.execution import sweep as sweep_module

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from support import BALL, LONG, assert_same, numbers, refused
 
-from roughvisc.cli.study_options import connect
+from roughvisc.cli.studies import connect
 from roughvisc.errors import InputError, RoughviscError, TooLargeError
 from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import sweep as sweep_module
