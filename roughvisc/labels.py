@@ -1,4 +1,4 @@
-"""Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps; ``ds.roughvisc``.
+"""Result Datasets: labels of their variables as :mod:`roughvisc.variables` declares them, warnings, rows and steps.
 
 A result contains rows at its kept times. The history of every accepted step is a second Dataset, the group ``steps`` of
 the file. The first Dataset contains it in ``encoding``, which xarray keeps in selections and copies and does not write
@@ -165,8 +165,8 @@ def require_steps(result: xr.Dataset) -> xr.Dataset:
 class ResultAccessor:
     """Steps, observables and figures of a result; each method calls the function of its name with this result.
 
-    ``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, ``ds.roughvisc.plot_maps()`` is ``rv.plot.maps(ds)``.
-    Each function is imported at its first use.
+    ``ds.roughvisc.clusters()`` is ``rv.observables.clusters(ds)``, and ``ds.roughvisc.plot_maps()`` is
+    ``rv.plot.maps(ds)``. Each function is imported at its first use.
 
     Parameters
     ----------
