@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -10,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.base import Problem
+from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.labels import ISSUED, warnings_of
+from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body, as_body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
-from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
+from roughvisc.settings import Boundary, Edge, Missing, Numerics, Problem, Settings
 from roughvisc.solve import solve
 from roughvisc.study import storage as storage  # registers ds.roughvisc
 from roughvisc.units import Quantity, quantities
@@ -25,6 +26,7 @@ from roughvisc.units import Quantity, quantities
 if TYPE_CHECKING:
     from roughvisc.study.case import Case
 
+log = logging.getLogger("roughvisc")
 Progress = Callable[[float, float], None]
 
 
@@ -120,18 +122,16 @@ def simulate(
     >>> bool(ds.contact_area[1] > ds.contact_area[0])
     True
     """
-    settings = Settings(
-        **_stated(numerics),
-        boundary=boundary,
-        tolerance=tolerance,
-        times=times,
-        fields=fields,
-        missing=missing,
-        edge=edge,
-        grid_error=grid_error,
-    )
-    problem = Problem(height, as_body(material), settings)
-    return _warned(solve(problem, Loading(program), progress=progress, threads=threads), 3)
+    settings = {
+        "boundary": boundary,
+        "tolerance": tolerance,
+        "times": times,
+        "fields": fields,
+        "missing": missing,
+        "edge": edge,
+        "grid_error": grid_error,
+    }
+    return _solved(height, material, Loading(program), settings, numerics, progress, threads, level=3)
 
 
 @quantities(speeds="m/s", load="N", pressure="Pa")
@@ -217,26 +217,34 @@ def friction(
     1
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
-    settings = Settings(
-        **_stated(numerics), boundary=boundary, tolerance=tolerance, fields=fields, grid_error=grid_error
-    )
-    problem = Problem(height, as_body(material), settings)
-    found = solve(problem, curve, progress=progress, threads=threads)
-    return _warned(found.assign_attrs(title="Steady sliding"), 4)
+    settings = {"boundary": boundary, "tolerance": tolerance, "fields": fields, "grid_error": grid_error}
+    found = _solved(height, material, curve, settings, numerics, progress, threads, level=4)
+    return found.assign_attrs(title="Steady sliding")
 
 
-def _stated(numerics: Numerics) -> dict[str, Any]:
-    """Return the settings of a ``Numerics``; anything else is refused."""
+def _solved(
+    height: xr.DataArray,
+    material: Material | Body,
+    experiment: Experiment,
+    settings: dict[str, Any],
+    numerics: Numerics,
+    progress: bool | Progress,
+    threads: int | None,
+    level: int,
+) -> xr.Dataset:
+    """Return the result of an experiment.
+
+    Missed tolerances and sparse tables become Python warnings at a level of the stack; other warnings are logged.
+    """
     if not isinstance(numerics, Numerics):
-        raise InputError(f"numerics is {numerics!r}: expected rv.Numerics(...)")
-    return vars(numerics)
-
-
-def _warned(dataset: xr.Dataset, level: int) -> xr.Dataset:
-    """Issue a Python warning for missed tolerances and sparse tables, and return the result."""
+        raise InputError(key="numerics", found=numerics, expected="rv.Numerics(...)")
+    problem = Problem(height, as_body(material), Settings(**vars(numerics), **settings))
+    dataset = solve(problem, experiment, progress=progress, threads=threads)
     for subject, text in warnings_of(dataset.attrs).items():
-        if subject in ISSUED:
+        if subject in ("tolerance", "material"):
             warnings.warn(text, UserWarning, level)
+        else:
+            log.warning("%s", text)
     return dataset
 
 

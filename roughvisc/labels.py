@@ -8,6 +8,7 @@ to files.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from functools import partial
 from importlib import import_module
@@ -19,13 +20,9 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
 
-#: CF names of the axes; with an attribute ``axis`` on x and y ParaView would wrap the surface on a sphere.
-_CARTESIAN = {"time": "T", "x": "X", "y": "Y"}
 #: Group of the steps in a result's file, and its title.
 STEPS, TITLE = "steps", "histories of every accepted step"
 _CARRIED = "roughvisc_steps"
-#: Subjects of the warnings that :func:`roughvisc.simulate` and others issue as Python warnings; the others are logged.
-ISSUED = ("tolerance", "material")
 #: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
 _ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
@@ -72,8 +69,6 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
         attributes.update(one.attributes)
         if errors := " ".join(filter(dataset.__contains__, ERRORS[str(name)])):
             attributes["ancillary_variables"] = errors
-        if name in _CARTESIAN:
-            attributes["cartesian_axis"] = _CARTESIAN[str(name)]
     return labelled
 
 
@@ -85,12 +80,7 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
     >>> warnings_of({"warnings": "slope: too steep"})
     {'slope': 'too steep'}
     """
-    return dict(line.split(": ", 1) for line in str(attributes.get("warnings", "")).splitlines())
-
-
-def warnings_text(warnings: Mapping[str, str]) -> str:
-    """Return the text of the attribute ``warnings``, with one line per warning; empty warnings are left out."""
-    return "\n".join(f"{subject}: {' '.join(text.split())}" for subject, text in warnings.items() if text)
+    return dict(re.findall("^(.+?): (.+)$", str(attributes.get("warnings", "")), re.MULTILINE))
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import multiprocessing
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -15,11 +17,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.experiment.base import Experiment, Outgrown, Problem, Rows
+from roughvisc.errors import InputError
+from roughvisc.experiment.base import Experiment, Outgrown, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.resources import threads_for
-from roughvisc.labels import ISSUED, TITLE, label, warnings_of, with_steps
+from roughvisc.labels import TITLE, label, with_steps
+from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.indenters import highest
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
@@ -53,6 +56,7 @@ class Checkpoint:
     wall_time: float = 0.0
 
 
+@dataclass(eq=False)
 class Recorder:
     """Rows of a solve, kept in memory.
 
@@ -61,17 +65,15 @@ class Recorder:
     latest : Checkpoint
         Checkpoint from which the solve continues.
     plain : list of dict
-        Values of the rows, with ``kept`` and ``place``.
+        Values of the rows, with ``kept``.
     in_memory : bool
         Whether fields stay in memory.
     """
 
-    in_memory = True
-
-    def __init__(self) -> None:
-        self.latest = Checkpoint()
-        self.plain: list[dict[str, Any]] = []
-        self._arrays: list[Mapping[str, Array]] = []
+    latest: Checkpoint = Checkpoint()
+    plain: list[dict[str, Any]] = field(default_factory=list)
+    in_memory: ClassVar[bool] = True
+    _arrays: list[Mapping[str, Array]] = field(default_factory=list)
 
     def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
         """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
@@ -83,7 +85,10 @@ class Recorder:
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""
-        return np.stack([self._arrays[row][name] for row in rows])
+        frames = np.empty((len(rows), *shape))
+        for frame, row in zip(frames, rows, strict=True):
+            frame[...] = self._arrays[row][name]
+        return frames
 
     def restart(self) -> None:
         """Delete all rows, because the solve starts again."""
@@ -138,9 +143,6 @@ def solve(
     with fft.set_workers(threads_for(threads)):
         with bar as report:
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
-        for subject, text in warnings_of(dataset.attrs).items():
-            if subject not in ISSUED:
-                log.warning("%s", text)
         if settings.grid_error and isinstance(experiment, Loading):
             # coarser grids may have another area: convert nominal pressures to loads on the given area
             loads = Loading(experiment.program.on_area(nominal_area(height)))
@@ -152,8 +154,39 @@ def solve(
                 return found.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
-    kept = [name for name in dataset.data_vars if experiment.axis != "time" or name not in OF_STEPS]
-    return label(dataset[sorted(kept, key=list(VARIABLES).index)])  # main results first
+    if experiment.axis == "time":
+        dataset = dataset.drop_vars(OF_STEPS, errors="ignore")
+    return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    from dask.system import CPU_COUNT
+
+    return int(CPU_COUNT)
+
+
+def threads_for(requested: int | None) -> int:
+    """Return the number of threads of a case that this process computes.
+
+    Parameters
+    ----------
+    requested : int or None
+        Requested number. None: the value of ``scipy.fft.set_workers``. If it is not set either: all cores in the main
+        thread of a process that ``multiprocessing`` did not start, otherwise one.
+
+    Raises
+    ------
+    InputError
+        If the request is not a positive whole number.
+    """
+    if requested is not None:
+        if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
+            raise InputError(key="threads", found=requested, expected="a whole number of at least 1, or None")
+        return requested
+    stated = int(fft.get_workers())
+    alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+    return cores() if stated == 1 and alone else stated
 
 
 def solve_on_grid(
@@ -171,7 +204,7 @@ def solve_on_grid(
                 took = spent + time.perf_counter() - began
                 if row.values:
                     values = {experiment.axis: row.at, **row.values, "wall_time": took}
-                    recorder.append(values | {"kept": row.kept, "place": row.place}, row.fields)
+                    recorder.append(values | {"kept": row.kept}, row.fields)
                     count += 1
                 if report is not None:
                     report(row.done, rows.end)
@@ -203,22 +236,38 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = pd.DataFrame(recorder.plain)
-    kept = steps[steps["kept"]].sort_values("place", kind="stable")
-    attributes = {"highest": highest(height)} | {name: height.attrs[name] for name in _ORIGIN if name in height.attrs}
+    kept = steps[steps["kept"]]
+    attributes: dict[str, Any] = {"highest": highest(height)}
+    for name in _ORIGIN:
+        if name in height.attrs:
+            attributes[name] = height.attrs[name]
     variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
-    for name in kept.columns.drop(["kept", "place", axis]):
+    for name in kept.columns.drop(["kept", axis]):
         variables[name] = axis, kept[name].to_numpy()
     for name in settings.fields:
-        field = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
-        variables[name] = (axis, "x", "y"), field
+        found = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
+        variables[name] = (axis, "x", "y"), found
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
     coordinates = {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values}
     made = {"Conventions": "CF-1.11", "boundary": settings.boundary, "tolerance": settings.tolerance}
     made["history"] = str(height.attrs.get("history", ""))
-    dataset = rows.finish(xr.Dataset(variables, coordinates, made))
+    dataset, warnings = rows.finish(xr.Dataset(variables, coordinates, made))
+
+    tables, lines = list[str](), list[str]()
+    for material in rows.problem.body.materials:
+        if material.warning and material.warning not in tables:
+            tables.append(material.warning)
+    for subject, text in (warnings | {"material": " ".join(tables)}).items():
+        if text:
+            lines.append(f"{subject}: {' '.join(text.split())}")
+    if lines:
+        dataset.attrs["warnings"] = "\n".join(lines)
     if axis != "time":
         return dataset
     steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
-    every = {name: (STEP, steps[name].to_numpy()) for name in ("time", *STEPPED) if name in steps}
+    every = {}
+    for name in ("time", *STEPPED):
+        if name in steps:
+            every[name] = STEP, steps[name].to_numpy()
     return with_steps(dataset, label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time")))

@@ -16,7 +16,7 @@ ADDED = {
         "settings.py": {'    grid_error: bool | Literal["auto"] = "auto"\n': "    suction: float = 0.0\n"},
         "api.py": {
             "    edge: Edge = Settings.edge,\n": "    suction: float = 0.0,\n",
-            "        edge=edge,\n": "        suction=suction,\n",
+            '        "edge": edge,\n': '        "suction": suction,\n',
         },
     },
     "variable": {

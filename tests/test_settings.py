@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from support import refused
 
 import roughvisc as rv
-from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.settings import WORDS, Numerics, Settings
+from roughvisc.settings import WORDS, Numerics, Problem, Settings
 from roughvisc.study.case import Case, vary
 from roughvisc.variables import FIELDS
 

@@ -27,9 +27,9 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     Example:
       roughvisc plot results/focus_variation-study --out figures
     """
-    from roughvisc.experiment.resources import cores
     from roughvisc.plot import save_sweep_figures
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files
+    from roughvisc.solve import cores
     from roughvisc.study.storage.folder import results_at
 
     paths = results_at(result)
@@ -53,7 +53,7 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from roughvisc.experiment.resources import cores
+    from roughvisc.solve import cores
 
     say_path(screen(), "Report", rv.report(results, out, processes=cores()))
 

@@ -7,96 +7,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
-from roughvisc.settings import GRID_ERROR_CELLS, OPEN_BOUNDARY, Settings, known_boundary
-from roughvisc.topography.borders import is_mirrored, is_periodic, recipe_name
-from roughvisc.topography.grid import checked
-from roughvisc.topography.indenters import is_indenter
-from roughvisc.topography.synthesis import BOUNDARIES
+from roughvisc.settings import Problem, Settings
 
 Array = NDArray[np.float64]
-
-
-def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
-    """Return the boundary that a surface was made for; None for scans, plain arrays and all other surfaces.
-
-    The user must state the boundary if this function returns None. The recipe of an indenter counts only if it
-    reproduces the heights, because the grid may have to grow. The recipe of waves or roughness, and the record of
-    mirroring, count only if the attribute ``period`` gives the sides of the grid and the borders meet
-    (:func:`is_periodic`).
-
-    Parameters
-    ----------
-    h : xarray.DataArray, dims (x, y)
-        Heights. [m]
-
-    Returns
-    -------
-    {"free", "periodic"} or None
-        ``free`` for an indenter; ``periodic`` for waves, self-affine roughness and mirrored surfaces.
-
-    Examples
-    --------
-    >>> from roughvisc.topography.indenters import sphere
-    >>> from roughvisc.topography.synthesis import wavy
-    >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
-    >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
-    ('free', 'periodic', None)
-    """
-    if is_indenter(h):
-        return "free"
-    made = BOUNDARIES.get(recipe_name(h)) == "periodic" and is_periodic(h)
-    return "periodic" if made or is_mirrored(h) else None
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Surface, body and settings of an experiment.
-
-    Attributes
-    ----------
-    height : xarray.DataArray, dims (x, y)
-        Profile, peaks up. [m]
-    body : Body
-        The body under it.
-    settings : Settings
-        Numerical settings and the fields to keep.
-    """
-
-    height: xr.DataArray
-    body: Body
-    settings: Settings
-
-    def resolved(self, experiment: Experiment) -> Problem:
-        """Return the problem that an experiment computes: ``auto`` is replaced in boundary and grid error.
-
-        Raises
-        ------
-        InputError
-            If the heights are invalid, the boundary must be stated, or a setting has no meaning in the experiment.
-        """
-        height, settings = checked(self.height, "height", least=1), self.settings
-        boundary = known_boundary(settings, experiment.boundary, partial(boundary_of, height))
-        if boundary is None:
-            name = height.attrs.get("source_file", "height")
-            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
-        grid_error, (fewest, most) = settings.grid_error, GRID_ERROR_CELLS
-        if grid_error == "auto":  # only if no further field has to be kept
-            needs_pressure = experiment.axis == "time" and "pressure" not in settings.fields
-            grid_error = fewest <= height.size <= most and not needs_pressure
-        settings = replace(settings, boundary=boundary, grid_error=grid_error)
-        for name, found, why in experiment.unsupported(settings):
-            raise InputError(f"{name} is {found!r}: {why}")
-        return replace(self, height=height, settings=settings)
 
 
 @dataclass(frozen=True)
@@ -113,8 +34,6 @@ class Row:
         Kept fields.
     kept : bool
         Whether the row belongs to the result; otherwise only to the history of all steps.
-    place : int
-        Sort key of the rows of the result; rows with equal keys stay in the order of computation.
     state : Any
         Plain value from which the rows continue after this one; None if they cannot.
     done : float
@@ -125,7 +44,6 @@ class Row:
     values: dict[str, Any] = field(default_factory=dict)
     fields: Mapping[str, Array] = field(default_factory=dict)
     kept: bool = True
-    place: int = 0
     state: Any = None
     done: float = 0.0
 
@@ -159,8 +77,8 @@ class Rows(ABC):
         """
 
     @abstractmethod
-    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result, with its attributes, from a Dataset of the values and fields of its rows."""
+    def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+        """Return the result with its attributes from the values and fields of its rows, and warnings by subject."""
 
 
 class Experiment(ABC):
@@ -204,6 +122,6 @@ class Experiment(ABC):
     def progress(self, done: float, end: float) -> str:
         """Return the progress in words."""
 
+    @abstractmethod
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that this experiment does not support: name, value and expected value."""
-        yield from ()

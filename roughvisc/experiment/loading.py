@@ -14,12 +14,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
-from roughvisc.experiment.base import Experiment, Outgrown, Problem, Row, Rows
+from roughvisc.experiment.accuracy import area_error, error_columns, loading_warnings, memory_of
+from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
-from roughvisc.experiment.resources import require_loading
-from roughvisc.experiment.rows import area_error, error_columns, kept_times, length_of, memory_of
-from roughvisc.experiment.warnings import loading_warnings, table_warning
-from roughvisc.labels import warnings_text
+from roughvisc.experiment.resources import WORTH_ASKING, require_loading
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
@@ -27,7 +25,7 @@ from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
-from roughvisc.settings import Settings
+from roughvisc.settings import Problem, Settings, kept_times
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
@@ -89,6 +87,15 @@ class Loading(Experiment):
         """Return all accepted steps; the kept ones are rows of the result."""
         return LoadingRows(problem, self.program, state, in_memory=in_memory)
 
+    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
+        """Yield the settings that do not fit the program: name, value and expected value."""
+        if self.program.slides and settings.boundary != "periodic":
+            yield "boundary", settings.boundary, "'periodic' for a program that slides (rv.mirror unfolds a surface)"
+        end = self.program.duration
+        if settings.time_step != "auto" and settings.time_step < 4 * math.ulp(end):
+            resolution = f"at the end of the program, {end:g} s, times have a resolution of {math.ulp(end):.2g} s"
+            yield "time_step", settings.time_step, f"a longer step: {resolution}"
+
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body at the end of the program, and the time scale of the program."""
         return body.facts(self.program.duration) | {"time_scale": self.program.time_scale}
@@ -132,10 +139,11 @@ class LoadingRows(Rows):
     ) -> None:
         height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
         xp = arrays_of(settings.device)
-        require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory)
+        if height.size >= WORTH_ASKING:
+            require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory)
         given = Profile(height, settings.missing, body.kernel)
         program = program.on_area(given.area)
-        check_program(given, body, program, settings)
+        check_program(given, program, settings.boundary)
 
         before = (None, 0) if state is None else (state.enlarged, state.outgrown)
         profile, self.domain, enlarged, self.reaches_border = choose_surface(given, problem, program, *before)
@@ -193,8 +201,9 @@ class LoadingRows(Rows):
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
             # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
-            if kept or (not every and (by_load or not scene.is_soft(length_of(step, scene)))):
-                values, fields = self._row(step, stated, kept)
+            length = max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
+            if kept or (not every and (by_load or not scene.is_soft(length))):
+                values, fields = self._row(step, length, stated, kept)
             yield Row(point.time, values, fields, kept, state=state, done=point.time)
 
     def _reach_border(self, time: float) -> None:
@@ -211,13 +220,17 @@ class LoadingRows(Rows):
             "edge='accept' to treat the scan outline as a punch"
         )
 
-    def _row(self, step: Step, stated: dict[str, float], kept: bool) -> tuple[dict[str, Any], dict[str, Array]]:
+    def _row(
+        self, step: Step, length: float, stated: dict[str, float], kept: bool
+    ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a step, and its fields on the whole surface.
 
         Parameters
         ----------
         step : Step
             An accepted step.
+        length : float
+            Length of the step; zero for a jump. [s]
         stated : dict
             Its stated errors.
         kept : bool
@@ -243,13 +256,11 @@ class LoadingRows(Rows):
         else:
             effective = to_host(displaced[-1])
             mean_gap = profile.mean_gap + domain.mean_displacement(effective) - point.approach
-        row: dict[str, Any] = {
+        row: dict[str, Any] = stated | {
             "force": point.force,
             "approach": point.approach,
             "nominal_pressure": point.force / self.area,
             "work": step.state.work,
-            "time_error": stated["time_error"],
-            "residual": stated["residual"],
             "convolutions": step.state.convolutions,
             "status": STATUS_MEANINGS.index(status),
             "contact_area": area,
@@ -269,35 +280,34 @@ class LoadingRows(Rows):
             }
         if not kept:
             return row, {}
-        row |= stated | {"contact_area_error": area_error(step, scene, pressure, gap, counted, area)}
+        row["contact_area_error"] = area_error(step, scene, length, pressure, gap, counted, area)
 
-        names, found = self.problem.settings.fields, {"pressure": pressure, "displacement": displacement, "gap": gap}
-        kept_fields = {name: to_host(found[name]) for name in names}
-        if is_whole:
-            if "gap" in names:
-                kept_fields["gap"] = np.where(profile.present, kept_fields["gap"], np.nan)
-            return row, kept_fields
-        whole = {"pressure": np.zeros(domain.shape)}
-        if "displacement" in names or "gap" in names:
-            whole["displacement"] = domain.displacement(effective)
-            whole["gap"] = np.maximum(profile.gap + whole["displacement"] - point.approach, 0.0)
-        for name, field in kept_fields.items():
-            whole[name][domain.cells] = field
-        return row, {name: whole[name] for name in names}
+        names, beyond = self.problem.settings.fields, dict[str, Array]()  # fields outside the domain
+        if not is_whole:
+            beyond["pressure"] = np.zeros(domain.shape)
+            if "displacement" in names or "gap" in names:
+                beyond["displacement"] = domain.displacement(effective)
+                beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
+        fields = {}
+        for name in names:
+            fields[name] = to_host({"pressure": pressure, "displacement": displacement, "gap": gap}[name])
+            if beyond:
+                beyond[name][domain.cells] = fields[name]
+                fields[name] = beyond[name]
+        if "gap" in names:
+            fields["gap"] = np.where(profile.present, fields["gap"], np.nan)
+        return row, fields
 
-    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result with its attributes: the memory model, numbers for an audit, and warnings."""
+    def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+        """Return the result with the memory model and numbers for an audit, and its warnings."""
         scene, choice, body = self.scene, self.choice, self.problem.body
         loaded = self._profile.height[self.domain.cells]
         warnings = loading_warnings(scene, self._profile, dataset, choice, loaded=loaded, border=self._border)
-        warnings["material"] = table_warning(body.materials)
         attributes = Loading(scene.program).facts(body, self.problem.height)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
         if cycles := scene.program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
-        if text := warnings_text(warnings):
-            attributes["warnings"] = text
-        return dataset.assign_attrs(attributes)
+        return dataset.assign_attrs(attributes), warnings
 
 
 def on_device(value: Any, xp: Any) -> Any:
@@ -311,24 +321,28 @@ def on_device(value: Any, xp: Any) -> Any:
     return value
 
 
-def check_program(profile: Profile, body: Body, program: Program, settings: Settings) -> None:
-    """Check that surface, material, program and settings are compatible.
+def check_program(profile: Profile, program: Program, boundary: str) -> None:
+    """Check that surface and program are compatible.
 
     Parameters
     ----------
     profile : Profile
         The surface.
-    body, program, settings
-        Body, program and settings of the case. Nominal pressures of the program are converted to loads.
+    program : Program
+        The loading program. Nominal pressures are converted to loads.
+    boundary : {"free", "periodic", "mirror"}
+        Boundary of the grid.
 
     Raises
     ------
     InputError
-        If they are incompatible. The message names the segment or the setting, and the expected value.
+        If they are incompatible. The message names the segment and the expected value.
     """
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
-    boundary = settings.boundary
+    # Beyond full contact the approach does not determine the pressure. If cells are absent, the body bulges into
+    # them, and every approach has a definite force.
+    can_fill = boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel)
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
         where, shortest = f"program.{number}", min(segment.duration, segment.period)
         what = "the period of a cycle" if segment.period < segment.duration else "a segment"
@@ -339,31 +353,15 @@ def check_program(profile: Profile, body: Body, program: Program, settings: Sett
                 f"{least:.2g} s, which the resolution of the time allows, and an end by {LARGEST:g} s"
             )
         if segment.slide is not None:
-            if boundary != "periodic":
-                why = "in free space the wake of the profile would leave the grid"
-                if boundary == "mirror":
-                    why = "mirror images would slide towards each other, unfold the surface by rv.mirror"
-                expected = f"'periodic' for a program that slides: {why}"
-                raise InputError(key="boundary", found=boundary, expected=expected)
             if number == 0:
                 raise InputError(f"{where} slides before there is a load: expected load, pressure or approach before")
             try:
                 segment.slide.cells(profile.spacing)
             except InputError as error:
                 raise error.prefixed(where) from None
-    duration = program.duration
-    if settings.time_step != "auto" and settings.time_step < 4 * math.ulp(duration):
-        raise InputError(
-            f"time_step is {settings.time_step!r} s and the program ends at {duration:g} s, which has a resolution of "
-            f"{math.ulp(duration):.2g} s: expected a longer step"
-        )
-    # Beyond full contact the approach does not determine the pressure. If cells are absent, the body bulges into
-    # them, and every approach has a definite force.
-    if boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel):
-        for number, segment in enumerate(program.segments):
-            largest = (segment.end or 0.0) + abs(segment.amplitude)
-            if segment.control == "approach" and segment.end is not None and largest >= profile.mean_gap:
-                raise InputError(
-                    f"program.{number}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is "
-                    f"full at {profile.mean_gap:.6g} m: expected less"
-                )
+        largest = (segment.end or 0.0) + abs(segment.amplitude)
+        if can_fill and segment.control == "approach" and segment.end is not None and largest >= profile.mean_gap:
+            raise InputError(
+                f"{where}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is "
+                f"full at {profile.mean_gap:.6g} m: expected less"
+            )

@@ -17,12 +17,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.experiment.base import Problem
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
-from roughvisc.settings import Missing, Settings
+from roughvisc.settings import Missing, Problem, Settings
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.indenters import grown, highest, is_indenter
 
@@ -114,6 +113,8 @@ class Domain:
         Least undeformed gap outside the rectangle; infinite if the rectangle is the whole surface. [m]
     kernel : Kernel
         Kernel of the body.
+    is_whole : bool
+        Whether the rectangle is the whole surface.
     """
 
     cells: tuple[slice, slice]
@@ -121,11 +122,7 @@ class Domain:
     spacing: tuple[float, float]
     outside: float
     kernel: Kernel
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the rectangle is the whole surface."""
-        return math.isinf(self.outside)
+    is_whole: bool = True
 
     def displacement(self, effective: Array) -> Array:
         """Return the displacement of the whole surface under an effective pressure [-] on the rectangle. [m]"""
@@ -145,33 +142,6 @@ class Domain:
     def _mean_influence(self) -> Array:
         """Mean displacement of the surface under unit pressure on each cell: the kernel is symmetric. [m]"""
         return self._whole.displacement(np.full(self.shape, 1 / math.prod(self.shape)))[self.cells]
-
-
-def choose_domain(profile: Profile, body: Body, approach: float = math.inf) -> Domain:
-    """Return the part of a surface that may touch before a given approach is reached.
-
-    Parameters
-    ----------
-    profile : Profile
-        The surface.
-    body : Body
-        Body under it. The domain is the whole surface unless space and time separate in the body and a load never
-        raises the surface next to it.
-    approach : float
-        Estimated largest approach. Default: the domain is the whole surface. [m]
-    """
-    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
-    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    if body.kernel.raises_surface or not profile.all_present or min(shape) < WORTH_CROPPING or math.isinf(approach):
-        return whole
-    near = np.argwhere(gap <= MARGIN * approach)
-    if not near.size:
-        return whole
-    first, last = np.maximum(near.min(axis=0) - RIM, 0), np.minimum(near.max(axis=0) + RIM + 1, shape)
-    cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
-    inside = np.zeros(shape, bool)
-    inside[cells] = True
-    return whole if inside.mean() > LARGEST_PART else replace(whole, cells=cells, outside=float(gap[~inside].min()))
 
 
 def choose_surface(
@@ -197,7 +167,8 @@ def choose_surface(
     profile : Profile
         The surface; an indenter is enlarged until the expected contact does not reach its border.
     domain : Domain
-        Part of the surface on which the contact is solved.
+        Part of the surface on which the contact is solved. It is the whole surface unless space and time separate in
+        the body and a load never raises the surface next to it.
     enlarged : int
         Number of times that the surface was enlarged.
     reaches_border : bool
@@ -214,7 +185,18 @@ def choose_surface(
         while enlarged is None and at_border and (larger := enlarged_indenter(profile.height)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             approach, at_border = estimated(profile, compliance, program)
-    domain = choose_domain(profile, body, approach * GROWTH**outgrown)
+    approach *= GROWTH**outgrown
+    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
+    domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    can_crop = not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
+    near = np.argwhere(gap <= MARGIN * approach) if can_crop and math.isfinite(approach) else np.empty((0, 2))
+    if near.size:
+        first, last = np.maximum(near.min(axis=0) - RIM, 0), np.minimum(near.max(axis=0) + RIM + 1, shape)
+        cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
+        inside = np.zeros(shape, bool)
+        inside[cells] = True
+        if inside.mean() <= LARGEST_PART:
+            domain = replace(domain, cells=cells, outside=float(gap[~inside].min()), is_whole=False)
     return profile, domain, times, at_border
 
 

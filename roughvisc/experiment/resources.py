@@ -1,10 +1,8 @@
-"""Cores and memory of a run: available memory, memory of a run, and the refusal of a run that does not fit."""
+"""Memory of a run: available memory, memory of a run, and the refusal of a run that does not fit."""
 
 from __future__ import annotations
 
 import math
-import multiprocessing
-import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,10 +10,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy import fft
 
-from roughvisc.errors import InputError, TooLargeError
-from roughvisc.experiment.rows import memory_of
+from roughvisc.errors import TooLargeError
+from roughvisc.experiment.accuracy import memory_of
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import arrays_of
 from roughvisc.mechanics.memory import LayerMemory, Memory
@@ -70,36 +67,6 @@ def memory_available(device: str = "cpu") -> Available:
         if limit:
             found.append(Available(float(limit - taken), "left of the Dask worker's memory limit"))
     return min(found, key=lambda one: one.size)
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    from dask.system import CPU_COUNT
-
-    return int(CPU_COUNT)
-
-
-def threads_for(requested: int | None) -> int:
-    """Return the number of threads of a case that this process computes.
-
-    Parameters
-    ----------
-    requested : int or None
-        Requested number. None: the value of ``scipy.fft.set_workers``. If it is not set either: all cores in the main
-        thread of a process that ``multiprocessing`` did not start, otherwise one.
-
-    Raises
-    ------
-    InputError
-        If the request is not a positive whole number.
-    """
-    if requested is not None:
-        if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
-            raise InputError(key="threads", found=requested, expected="a whole number of at least 1, or None")
-        return requested
-    stated = int(fft.get_workers())
-    alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
-    return cores() if stated == 1 and alone else stated
 
 
 # ---------------------------------------------------------------------------------------------------- memory of a run
@@ -189,8 +156,6 @@ def require_loading(shape: tuple[int, int], program: Program, settings: Settings
     TooLargeError
         If it does not fit. The message gives the needed and the available memory, and a grid that fits.
     """
-    if math.prod(shape) < WORTH_ASKING:
-        return
     memory = memory_of(body, program, settings).memory
     times = program.segments if settings.times is None else settings.times  # one row for each segment, or more
     rows = times if isinstance(times, int) else len(times)

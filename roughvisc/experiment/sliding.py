@@ -15,30 +15,27 @@ from numpy.typing import NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.experiment.base import Experiment, Problem, Row, Rows
+from roughvisc.experiment.accuracy import border_warning, slope_warning, stands_alone, wake_warning
+from roughvisc.experiment.base import Experiment, Row, Rows
 from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_errors, grid_uncertainty, hidden_opening
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
-from roughvisc.experiment.warnings import border_warning, slope_warning, stands_alone, table_warning, wake_warning
-from roughvisc.labels import warnings_text
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area, faces_between
 from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
-from roughvisc.settings import OVER_TIME, Settings
+from roughvisc.settings import OVER_TIME, Problem, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.spectrum import resample_periodic
-from roughvisc.units import Quantity, format_quantity, quantities, unit_for
+from roughvisc.units import Quantity, format_quantity, number, quantities, unit_for
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
 
 Array = NDArray[np.float64]
 
-#: Fields that a row may have.
-_FIELDS = ("pressure", "gap")
 #: Direction -> quarter turns of the grid, counter-clockwise, after which the profile moves along +x.
 _QUARTERS = {"x": 0, "-y": 1, "-x": 2, "y": 3}
 # A profile is constant across the motion if its change there is below this fraction of its range.
@@ -84,13 +81,11 @@ class SteadySliding(Experiment):
     boundary: ClassVar[Boundary] = "periodic"
 
     def __post_init__(self) -> None:
-        try:
-            speeds = np.atleast_1d(np.asarray(self.speeds, dtype=float))
-        except (TypeError, ValueError):
-            speeds = np.array([])
-        if speeds.ndim != 1 or not speeds.size or not (np.isfinite(speeds) & (speeds > 0)).all():
-            raise InputError(key="speeds", found=self.speeds, expected="positive numbers [m/s]")
-        object.__setattr__(self, "speeds", tuple(speeds.tolist()))
+        speeds = np.atleast_1d(np.asarray(self.speeds, dtype=object)).tolist()
+        if not speeds:
+            raise InputError(key="speeds", found=self.speeds, expected="at least one speed [m/s]")
+        positive = partial(number, unit="m/s", key="speeds", above=0)
+        object.__setattr__(self, "speeds", tuple(map(positive, speeds)))
         one_of("direction", self.direction, _QUARTERS)
         if self.load is None and self.pressure is None:
             raise InputError(key="load", expected="a load, or a pressure")
@@ -105,7 +100,7 @@ class SteadySliding(Experiment):
         return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
-        """Return the steady states, from the lowest speed to the highest; the state is their number so far.
+        """Return the steady states in the order of the speeds; the state is their number so far.
 
         With mirror boundaries the surface is unfolded first: sliding breaks the symmetry.
         """
@@ -118,14 +113,14 @@ class SteadySliding(Experiment):
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that steady sliding does not support: name, value and expected value."""
         if settings.boundary not in ("periodic", "mirror"):
-            yield "boundary", settings.boundary, "steady sliding repeats: expected 'periodic' or 'mirror'"
+            yield "boundary", settings.boundary, "'periodic' or 'mirror', because steady sliding repeats"
         if settings.boundary == "mirror" and self.load is not None:
-            yield "boundary", "mirror", "the surface is unfolded to four times its area: expected a pressure"
+            yield "boundary", "mirror", "a pressure for the surface, which is unfolded to four times its area"
         if "displacement" in settings.fields:
-            yield "fields", "displacement", f"of steady sliding expected some of {', '.join(_FIELDS)}"
+            yield "fields", "displacement", "some of pressure, gap in steady sliding"
         for name in OVER_TIME:
             if (found := getattr(settings, name)) != (usual := getattr(Settings, name)):
-                yield name, found, f"of steady sliding expected the default, {usual!r}"
+                yield name, found, f"the default in steady sliding, {usual!r}"
 
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body after the time in which the surface slides past a point, at the lowest speed."""
@@ -161,26 +156,9 @@ class SlidingGrid:
             turned, dy = turned[:, :1], dy * turned.shape[1]
         return cls(np.ascontiguousarray(turned), (dx, dy))
 
-    @property
-    def period(self) -> float:
-        """Length of the surface along the motion. [m]"""
-        return self.gap.shape[0] * self.spacing[0]
-
     def law(self, body: Body, speed: float, tolerance: float) -> Body:
         """Return the body with materials that represent its own at the frequencies of a speed. [m/s]"""
         return body.over_frequencies(speed * 2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]), tolerance)
-
-    def coarser(self, factor: float) -> SlidingGrid:
-        """Return the gap on cells longer by about a factor, with the waves that these cells can resolve."""
-        nx, ny = self.gap.shape
-        shape = coarser_shape((nx, ny), factor, False)
-        gap = resample_periodic(self.gap, shape, first_kept=True)
-        dx, dy = self.spacing
-        return SlidingGrid(np.ascontiguousarray(gap - gap.min()), (dx * nx / shape[0], dy * ny / shape[1]))
-
-    def areas(self, contact: NDArray[np.bool_]) -> tuple[float, float]:
-        """Return the area of cells in contact, counted and corrected for the grid. [m2]"""
-        return contact_area(contact, ~contact, self.spacing[0] * self.spacing[1], "periodic")
 
     def opening(self, found: SteadyState) -> Array:
         """Return the gap of a steady state. [m]"""
@@ -188,7 +166,7 @@ class SlidingGrid:
 
 
 class SlidingRows(Rows):
-    """Steady states of one curve, from the lowest speed to the highest.
+    """Steady states of one curve, in the order of the speeds.
 
     Parameters
     ----------
@@ -197,7 +175,7 @@ class SlidingRows(Rows):
     curve : SteadySliding
         Speeds, load and direction.
     found : int
-        Number of speeds already solved, the lowest ones.
+        Number of speeds already solved, the first ones.
     """
 
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
@@ -211,19 +189,22 @@ class SlidingRows(Rows):
         self._force = float(curve.load) if curve.load is not None else float(curve.pressure or 0.0) * profile.area
         #: The grid of the surface, and up to two coarser grids for the error of the grid.
         self._grids = [SlidingGrid.of(profile.gap, profile.spacing, curve.direction)]
+        self._period = self._grids[0].gap.shape[0] * self._grids[0].spacing[0]
         if problem.settings.grid_error:
-            for factor in (2.0, 4.0):
-                few = self._grids[0].coarser(factor)
-                if few.gap.shape != self._grids[-1].gap.shape:
-                    self._grids.append(few)
+            (nx, ny), (dx, dy) = self._grids[0].gap.shape, self._grids[0].spacing
+            for factor in (2.0, 4.0):  # on longer cells, with the waves that these can resolve
+                few = coarser_shape((nx, ny), factor, False)
+                if few != self._grids[-1].gap.shape:
+                    gap = resample_periodic(self._grids[0].gap, few, first_kept=True)
+                    gap = np.ascontiguousarray(gap - gap.min())
+                    self._grids.append(SlidingGrid(gap, (dx * nx / few[0], dy * ny / few[1])))
             if len(self._grids) == 1:
                 log.warning("no grid error: %d x %d cells cannot be coarsened", *profile.gap.shape)
 
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
         grid, tolerance, xp = self._grids[0], self._settings.tolerance, arrays_of(self._settings.device)
-        for done, place in enumerate(np.argsort(self._curve.speeds)[self._done :], self._done + 1):
-            speed = self._curve.speeds[place]
+        for done, speed in enumerate(self._curve.speeds[self._done :], self._done + 1):
             law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
             states, across, convolutions, creep = [], 0.0, 0, 0.0
             for cells in self._grids:
@@ -244,25 +225,25 @@ class SlidingRows(Rows):
                 row |= sliding_grid_errors(self._grids, states)
             if stands_alone(self._profile.height, found.pressure, 0):
                 for one in law.materials:  # without an end of the creep nothing counts as recovered
-                    crept = float(one.contact_compliance(grid.period / speed))
+                    crept = float(one.contact_compliance(self._period / speed))
                     creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
             row["convolutions"] = convolutions
             row["creep_left"] = creep  # left when the next contact arrives
-            yield Row(speed, row, fields, place=int(place), state=done, done=float(done))
+            yield Row(speed, row, fields, state=done, done=float(done))
 
     def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a steady state, and its fields in the frame of the surface."""
         force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
-        counted, contact_area = self._grids[0].areas(found.pressure > 0)
-        gap = self._grids[0].opening(found)
-        status = "full_contact" if (found.pressure > 0).all() else "converged"
+        grid, contact = self._grids[0], found.pressure > 0
+        counted, touching = contact_area(contact, ~contact, grid.spacing[0] * grid.spacing[1], "periodic")
+        gap, status = grid.opening(found), "full_contact" if contact.all() else "converged"
         row = {
             "force": force,
             "nominal_pressure": force / area,
             "approach": found.approach,
-            "contact_area": contact_area,
+            "contact_area": touching,
             "contact_area_counted": counted,
-            "contact_fraction": contact_area / area,
+            "contact_fraction": touching / area,
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
@@ -276,20 +257,17 @@ class SlidingRows(Rows):
             fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self._profile.gap.shape))
         return row, fields
 
-    def finish(self, dataset: xr.Dataset) -> xr.Dataset:
-        """Return the result with the direction, numbers for an audit, and warnings."""
+    def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+        """Return the result with the direction and numbers for an audit, and its warnings."""
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         warnings = {
             "slope": slope_warning(height, "periodic", np.inf),
             "border": border_warning(height),
-            "wake": wake_warning(left, self._grids[0].period),
-            "material": table_warning(self._body.materials),
+            "wake": wake_warning(left, self._period),
         }
         attributes = self._curve.facts(self.problem.body, height) | {"direction": self._curve.direction}
-        if text := warnings_text(warnings):
-            attributes["warnings"] = text
-        return dataset.drop_vars("creep_left").assign_attrs(attributes)
+        return dataset.drop_vars("creep_left").assign_attrs(attributes), warnings
 
 
 def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:
@@ -312,8 +290,9 @@ def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadySta
         return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
     runs = []
     for cells, state in zip(grids, states, strict=True):
-        area, gap = cells.areas(state.pressure > 0)[1], float(cells.opening(state).mean())
-        runs.append((state.power_force, area, state.approach, gap))
+        contact, cell_area = state.pressure > 0, cells.spacing[0] * cells.spacing[1]
+        area = contact_area(contact, ~contact, cell_area, "periodic")[1]
+        runs.append((state.power_force, area, state.approach, float(cells.opening(state).mean())))
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
     errors = {}
     for name, values in zip(_QUANTITIES, np.transpose(runs), strict=True):

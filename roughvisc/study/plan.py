@@ -25,14 +25,13 @@ from scipy import fft
 from scipy.special import erf, erfinv
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.experiment.base import Problem, Rows
+from roughvisc.experiment.base import Rows
 from roughvisc.experiment.loading import LoadingRows
 from roughvisc.experiment.resources import (
     PART,
     PROCESS,
     Available,
     amount,
-    cores,
     curve_bytes,
     march_bytes,
     memory_available,
@@ -42,6 +41,8 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
+from roughvisc.settings import Problem
+from roughvisc.solve import cores
 from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder

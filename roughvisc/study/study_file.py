@@ -374,7 +374,6 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         end, last = experiment.program.duration, max(settings.times, default=0.0)
         if last > end * (1 + _ROUNDING):
             raise InputError(key="keep.times", found=last, expected=f"times up to the end of the program, {end:g} s")
-    for name, value, why in experiment.unsupported(settings):
-        key = f"{TABLE_OF[name]}.{name}"
-        raise InputError(f"{key}: found {value!r}: {why}", key=key, found=value, expected=why)
+    for name, value, expected in experiment.unsupported(settings):
+        raise InputError(key=f"{TABLE_OF[name]}.{name}", found=value, expected=expected)
     return settings

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty, pressure_distance
 from roughvisc.experiment.loading import Loading
-from roughvisc.experiment.rows import kept_times
 from roughvisc.labels import cost_of
+from roughvisc.settings import kept_times
 from roughvisc.study.case import Case, read_study, vary
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.neighbours import (

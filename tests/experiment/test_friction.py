@@ -68,7 +68,7 @@ def test_persson__is_that_of_the_surface_as_it_slides(curve):
     ("settings", "key", "found"),
     [
         ({"speeds": []}, "speeds", []),
-        ({"speeds": [1.0, -1.0]}, "speeds", [1.0, -1.0]),
+        ({"speeds": [1.0, -1.0]}, "speeds", -1.0),
         ({"pressure": None}, "load", None),
         ({"load": 1.0}, "pressure", PRESS["pressure"]),
         ({"pressure": 0.0}, "pressure", 0.0),

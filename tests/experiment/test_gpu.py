@@ -13,10 +13,9 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli import main
-from roughvisc.experiment.base import Problem
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.body import as_body
-from roughvisc.settings import Settings
+from roughvisc.settings import Problem, Settings
 from roughvisc.solve import solve
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 

@@ -11,7 +11,8 @@ from support import ROUGH, refused
 import roughvisc as rv
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.resources import Available, cores, memory_available, threads_for
+from roughvisc.experiment.resources import Available, memory_available
+from roughvisc.solve import cores, threads_for
 from roughvisc.study.case import read_cases
 
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")

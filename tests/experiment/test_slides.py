@@ -7,7 +7,7 @@ from samples import QUICK_RUBBER as RUBBER
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.experiment.grid_error import pressure_distance
-from roughvisc.experiment.rows import kept_times
+from roughvisc.settings import kept_times
 
 SIDE = 1e-3
 PRESS = rv.Program().pressure(1e4, over=0).hold(2e-3)

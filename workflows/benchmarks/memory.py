@@ -10,8 +10,8 @@ import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
+from roughvisc.experiment.accuracy import memory_of
 from roughvisc.experiment.resources import PROCESS, march_bytes
-from roughvisc.experiment.rows import memory_of
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.run import run_case
 from roughvisc.study.storage.netcdf import open_result

@@ -10,7 +10,8 @@ from importlib import metadata
 from typing import TYPE_CHECKING
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.resources import PART, PROCESS, cores
+from roughvisc.experiment.resources import PART, PROCESS
+from roughvisc.solve import cores
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.base import Problem
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
+from roughvisc.settings import Problem
 from roughvisc.solve import solve
 from roughvisc.study.case import Case, labels_of, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -190,9 +190,8 @@ def run_case(
                 except KeyboardInterrupt:
                     keeper.save()
                     raise
-                stated = warnings_of(dataset.attrs)
-                for complaint in filter(None, (stated.get("tolerance"), stated.get("material"))):
-                    log.warning("%s: %s", path, complaint)
+                for text in warnings_of(dataset.attrs).values():
+                    log.warning("%s: %s", path, text)
             keeper.remove()
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):

@@ -20,10 +20,10 @@ import xarray as xr
 from rich.console import Console
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.experiment.resources import cores
 from roughvisc.labels import warnings_of
 from roughvisc.observables import OBSERVABLES
 from roughvisc.progress import Bars, clock
+from roughvisc.solve import cores
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each

@@ -1,0 +1,314 @@
+"""Accuracy of a result: the memory of the body for the kept rows, stated errors, and warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from roughvisc.experiment.profile import Profile
+from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
+from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.program import Program
+from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
+from roughvisc.settings import Settings, kept_times
+from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
+from roughvisc.topography.indenters import is_indenter
+from roughvisc.topography.parameters import rms_slope
+from roughvisc.units import format_quantity
+
+Array = NDArray[np.float64]
+#: Errors inherited from the contact solver in earlier steps: of the pressure, over the tolerance, and of the approach.
+#: Measured on rows whose other errors are small.
+INHERITED, INHERITED_APPROACH = 0.02, 0.005
+#: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
+LEAST = 0.015
+#: Error of the work due to the contact solver, over its error of the pressure times the largest force and approach.
+OF_WORK = 0.2
+#: Error of the pressure at the edge of contact, over the mean error of the pressure.
+SOLVER_AT_EDGE = 3.0
+#: Unrecovered part of the creep after a period from which a result warns. Measured error of the friction of a sphere on
+#: a period of 6 to 11 contact radii, with a retarded compliance of 1 and 9 times the instantaneous one: 0.4 to 0.6 % if
+#: 1e-6 of the creep is left, 5 to 6 % if 1 to 2 % are left, 26 % if 7 to 12 % are left.
+_LEFT = 0.01
+#: A contact is a single one if a gap without contact spans at least this part of the period along the motion.
+_FREE = 0.25
+#: Root mean square slope beyond which a result warns. The half-space is loaded as if its surface were flat. The error
+#: is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, here 4.5 % (K. L. Johnson,
+#: Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
+LARGEST_SLOPE = 0.3
+
+
+def memory_of(body: Body, program: Program, settings: Settings, **options: Any) -> Choice:
+    """Return the memory of a body for the kept rows of a program.
+
+    Parameters
+    ----------
+    body, program, settings
+        Body, program and settings of the case.
+    **options
+        Further arguments of :func:`~roughvisc.mechanics.memory.choose_memory`.
+
+    Notes
+    -----
+    ``shortest`` is the shortest age above zero at which the compliance affects the kept rows; zero for a program of
+    jumps alone. Let ``h`` be the shortest interval between a corner of the program and the next kept time. Only
+    pressure applied in the last part ``f`` of the interval has an age below ``f h``. If the compliance is exact at age
+    zero, its error at these ages is at most the creep, which is less than ``f C(h)`` over the interval. With ``f`` a
+    tenth of the tolerance this equals the error allowed at longer ages. No step is shorter than a millionth of a
+    segment, so a smaller ``f`` is not needed.
+    """
+    shortest, kept = math.inf, kept_times(program, settings.times)
+    for segment in program.segments:
+        if segment.duration > 0:
+            shortest = min(shortest, segment.duration, segment.period)
+    if math.isinf(shortest):
+        shortest = 0.0
+    elif kept is None:
+        shortest *= SHORTEST_PAIR
+    else:
+        corners, times = np.array(program.corners), np.array(kept)
+        after = np.searchsorted(times, corners, side="right")
+        corners, after = corners[after < times.size], after[after < times.size]
+        shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
+        shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
+    return choose_memory(body, program.duration, settings.tolerance, shortest, **options)
+
+
+def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[float, float]) -> dict[str, float]:
+    """Return the stated errors of a step.
+
+    Parameters
+    ----------
+    step, scene : Step, Scene
+        An accepted step.
+    series_error : float
+        Relative error of the series that represents the material.
+    largest : tuple of float
+        Largest force [N] and approach [m] of the kept rows so far, to which errors are relative.
+
+    Returns
+    -------
+    dict
+        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``approach_error`` [m],
+        ``work_error`` [J].
+
+    Notes
+    -----
+    The stated error is the sum of the errors of the time steps, of the contact solver in this and earlier steps, and
+    of the series. Under a given load the solver's error of the approach is the duality gap over the load, which is of
+    second order in the error of the pressure. The errors of the series and of the work are relative to the largest
+    values of all steps: values left after unloading are differences of large values. Errors of the work add up.
+    """
+    point, state, apart = step.point, step.state, step.difference
+    control = scene.program.segments[step.segment].control
+    given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
+    largest_force, largest_approach = largest
+    loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
+    of_force = series_error * loaded
+    unit = scene.tolerance if largest_force > 0 else 0.0
+    solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
+    work = scene.stated[0] * abs(state.work_apart) + state.work_curved
+    work += (OF_WORK * solved + series_error) * loaded * reached
+    force = approach = 0.0
+    if control == "approach" or not given:
+        force = apart.force + solved * point.force + of_force
+    if control == "load" or not given:
+        approach = apart.approach + point.solver_error_approach + series_error * reached
+        approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
+    pressure = (apart.pressure + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
+    per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
+    return {
+        "time_error": max(apart.pressure / per_force, apart.force / per_force, apart.approach / per_approach),
+        "stated_error": max(pressure, force / per_force, approach / per_approach),
+        "residual": point.solver_error,
+        "approach_error": approach,
+        "work_error": work,
+    }
+
+
+def area_error(step: Step, scene: Scene, length: float, pressure: Any, gap: Any, counted: float, area: float) -> float:
+    """Return the error of the contact area due to time steps and contact solver. [m2]
+
+    The solver may misjudge a contact cell if its pressure is below the error of the pressure at the edge. It may
+    misjudge an open cell if this pressure would close the gap of the cell.
+
+    Parameters
+    ----------
+    step, scene : Step, Scene
+        An accepted step.
+    length : float
+        Length of the step; zero for a jump. [s]
+    pressure, gap : array, shape (nx, ny)
+        Pressure [Pa] and gap between the surfaces. [m]
+    counted, area : float
+        Contact area, counted and corrected for the grid. [m2]
+    """
+    point, apart, xp = step.point, step.difference, scene.grid.xp
+    inside, outside = apart.inside, apart.outside
+    if counted > 0 and point.solver_error > 0:
+        off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
+        closed = off * scene.grid.self_influence * scene.memory.compliance(length)
+        closing = (pressure == 0) & (gap <= closed)
+        if scene.present is not None:
+            closing &= scene.present
+        opening = (pressure > 0) & (pressure <= off)
+        inside += scene.grid.cell_area * int(xp.count_nonzero(opening))
+        outside += scene.grid.cell_area * int(xp.count_nonzero(closing))
+    # A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four
+    # faces. Its area exceeds the correction for its faces: the area grows with each cell, and never exceeds the count.
+    most = 1 + 4 * PERIMETER_CORRECTION
+    lower, upper = max(area - most * inside, 0.0), min(area + most * outside, counted + outside)
+    return float(max(area - lower, upper - area))
+
+
+# ---------------------------------------------------------------------------------------------------------- warnings
+
+
+def loading_warnings(
+    scene: Scene, profile: Profile, dataset: xr.Dataset, choice: Choice, *, loaded: xr.DataArray, border: float | None
+) -> dict[str, str]:
+    """Return the warnings about a loading by subject; a text is empty if it does not apply.
+
+    Parameters
+    ----------
+    scene, profile : Scene, Profile
+        Input of the time stepping, and the surface.
+    dataset : Dataset
+        The result.
+    choice : Choice
+        Memory of the body.
+    loaded : DataArray
+        Heights of the domain, the part of the surface on which the contact was solved. [m]
+    border : float or None
+        End of the first step in which contact reached the border of a free surface. [s]
+    """
+    boundary, end, limit, warnings = scene.grid.boundary, scene.program.duration, scene.tolerance, dict[str, str]()
+    errors = dataset["stated_error"].values
+    missed = errors[errors > limit]
+    if missed.size:
+        warnings["tolerance"] = (
+            f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
+            f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
+        )
+        if scene.time_step is not None:
+            warnings["tolerance"] += " The time step is fixed, and not chosen by the tolerance."
+        if scene.program.slides:
+            warnings["tolerance"] += (
+                " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
+            )
+    approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
+    warnings["slope"] = slope_warning(loaded, boundary, approach)
+    if boundary == "periodic":
+        warnings["border"] = border_warning(profile.height)
+    if border is not None:
+        warnings["edge"] = (
+            f"Contact reached the border of the surface, first in the step to {border:.3g} s: there the surface acts "
+            "as a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "
+            '"accept").'
+        )
+
+    wakes, pressure = [], dataset["pressure"][-1].values if "pressure" in dataset else None
+    for axis in (0, 1):
+        period = profile.height.shape[axis] * profile.spacing[axis]
+        path, left = 0.0, dict[float, float]()
+        for segment in scene.program.segments:
+            if segment.slide is not None and segment.slide.axis == axis:
+                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
+                crept = scene.memory.compliance(min(period / speed, end))
+                left[speed] = 1.0 - crept / scene.memory.compliance(end)
+        # on a shorter path the contact does not reach the next wake
+        if path >= period / 2 and stands_alone(profile.height, pressure, axis):
+            wakes.append(wake_warning(left, period))
+    warnings["wake"] = " ".join(wakes)
+
+    off = max(choice.series_error, choice.misfit)
+    if off > limit:
+        warnings["series"] = (
+            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
+            f"{limit:g} (memory): no passive material comes nearer to it."
+        )
+    return warnings
+
+
+def border_warning(height: xr.DataArray) -> str:
+    """Return a warning if opposite borders of a periodic surface [m] do not meet, else ''."""
+    x, y = border_mismatch(height)
+    if max(x, y) <= JUMP:
+        return ""
+    return (
+        f"The surface repeats with a step: opposite borders differ {x:.2g} (x) and {y:.2g} times (y) as much as "
+        "neighbouring rows. Use boundary = 'mirror'."
+    )
+
+
+def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
+    """Return a warning if a surface is too steep for small slopes, else ''.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    boundary : {"free", "periodic", "mirror"}
+        In free space only cells whose undeformed gap is at most the approach can touch, and only their slopes count.
+    approach : float
+        Largest approach at kept times, from the highest cell. [m]
+    """
+    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else np.inf)
+    if not slope > LARGEST_SLOPE:
+        return ""
+    return (
+        f"The rms slope of the loaded surface is {slope:.2g}: the method assumes small slopes, with an error of the "
+        f"order of the squared slope. Beyond {LARGEST_SLOPE:g} the results are a rough estimate."
+    )
+
+
+def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> bool:
+    """Return whether a periodic contact is a single one, from the recipe of its surface or from its pressure.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        Heights. The contact of an indenter is single, the contact of a regular wave is not. [m]
+    pressure : ndarray, shape (nx, ny), or None
+        Pressure. The contact of any other surface is single if a gap without contact spans a quarter of the period or
+        more. [Pa]
+    axis : {0, 1}
+        Axis of the motion.
+    """
+    if is_indenter(height):
+        return True
+    if is_analytic(height) or pressure is None or not (pressure > 0).any():
+        return False
+    touching = np.flatnonzero((pressure > 0).any(axis=1 - axis))
+    count = pressure.shape[axis]
+    free = np.diff(touching, append=touching[0] + count) - 1
+    return bool(free.max() >= _FREE * count)
+
+
+def wake_warning(left: Mapping[float, float], period: float) -> str:
+    """Return a warning if contacts slide into each other's wake, else ''.
+
+    Parameters
+    ----------
+    left : mapping
+        Speed of a single contact [m/s] -> unrecovered part of the creep after a period.
+    period : float
+        Period along the motion. [m]
+    """
+    speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
+    if not speeds:
+        return ""
+    slowest = format_quantity(speeds[0], "m/s")
+    where = f"at {slowest}" if len(speeds) == 1 else f"from {slowest} on"
+    percent = float(f"{100 * max(left.values()):.2g}")
+    return (
+        f"The surface repeats every {format_quantity(period, 'm')}, and {where} the contact slides into the wake of "
+        f"the one before: after a period up to {percent:g} % of the creep has not recovered. Friction and area are "
+        "those of a row of such contacts; those of a single one are not known. Use a longer period."
+    )
