@@ -37,10 +37,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import repeat
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,8 +112,7 @@ def label_clusters(mask: Mask, wrap: tuple[bool, bool] = (False, False)) -> NDAr
     return sparse.csgraph.connected_components(graph, directed=False)[1][labels]
 
 
-@dataclass(frozen=True)
-class Flow:
+class Flow(NamedTuple):
     """Flow between two sides of a map, for a unit of pressure drop over viscosity.
 
     Attributes
@@ -378,9 +376,8 @@ def frozen_contact(
         contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
     stiffness, off, pressure = _punch(contact, spacing, boundary, tolerance)
     ends, opens, scatter = _edge_energies(rimmed, rim, pressure, spacing)
-    images = math.prod(
-        2 for axis in (0, 1) if np.array_equal(contact, np.flip(contact, axis))
-    )  # their faces have equal errors
+    # the faces of mirror images have equal errors
+    images = 2 ** sum(np.array_equal(contact, np.flip(contact, axis)) for axis in (0, 1))
     error = off + _SHARED * opens + _SCATTER * math.sqrt(images) * scatter
     if ends == 0:
         return stiffness, error
@@ -425,17 +422,15 @@ def _edge_energies(
     pressure : ndarray, shape (nx, ny)
         Pressure of the punch. [-]
     """
-    ends = opens = squares = 0.0
-    strips = [side * spacing[0] * spacing[1] for side in (spacing[0], spacing[0], spacing[1], spacing[1])]
-    pairs = zip(neighbours(contact, "free"), neighbours(rim, "free"), strict=True)
-    for strip, (touching, material) in zip(strips, pairs, strict=True):
-        at_edge = (contact & ~touching)[1:-1, 1:-1]
-        energy = strip * pressure**2
-        open_faces = at_edge & material[1:-1, 1:-1]
-        opens += float(np.sum(energy, where=open_faces))
-        squares += float(np.sum(energy**2, where=open_faces))
-        ends += float(np.sum(energy, where=at_edge & ~material[1:-1, 1:-1]))
-    return ends, opens, math.sqrt(squares)
+    touching, material = (np.stack([*neighbours(one, "free")]) for one in (contact, rim))
+    faces = (contact & ~touching)[:, 1:-1, 1:-1]  # towards each of the four neighbours
+    energy = (np.repeat(spacing, 2) * spacing[0] * spacing[1])[:, None, None] * pressure**2
+    opens = faces & material[:, 1:-1, 1:-1]
+
+    def total(terms: Array, counted: Mask) -> float:
+        return float(np.sum(terms, axis=(1, 2), where=counted).sum())
+
+    return total(energy, faces & ~opens), total(energy, opens), math.sqrt(total(energy**2, opens))
 
 
 def _staircase(contact: Mask) -> float:

@@ -122,5 +122,4 @@ def distribution(
         return inside / (values.size * np.diff(edges)) if values.size else np.full(len(edges) - 1, np.nan)
 
     density = frame_by_frame(measure, field, outputs=[(dim,)], sizes={dim: len(edges) - 1})
-    middles = {dim: (dim, (edges[1:] + edges[:-1]) / 2)}
-    return label(xr.Dataset({f"{name}_density": density}).assign_coords(middles))
+    return label(xr.Dataset({f"{name}_density": density}, {dim: (edges[1:] + edges[:-1]) / 2}))

@@ -142,11 +142,11 @@ def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
     need(steps, "work")
     times = steps["time"].values
     segments = json.loads(dataset.attrs.get("cycles", "[]"))
-    begin = np.array([start + number * period for start, period, count in segments for number in range(count)])
-    period = np.repeat([one[1] for one in segments], [int(one[2]) for one in segments])
-    if not begin.size:
+    cycles = [(start + number * period, period) for start, period, count in segments for number in range(count)]
+    if not cycles:
         expected = "one case's result, under a program with a whole cycle: see Program.cycle"
         raise InputError(key="cycles", found=segments, expected=expected)
+    begin, period = np.transpose(cycles)
     covered = (times[0] <= begin + _SAME * period) & (begin + period <= times[-1] + _SAME * period)
     begin, end = begin[covered], (begin + period)[covered]
     work = np.interp(end, times, steps["work"]) - np.interp(begin, times, steps["work"])

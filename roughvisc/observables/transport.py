@@ -93,8 +93,7 @@ def leakage(
                 f"leakage: the gap is missing in {missing} of {field.size} cells, where the surface is absent: the "
                 "flow through these cells is unknown: expected a surface that is cropped, or filled"
             )
-        found = flow_through(field, sides_of_cell, wrap=wrap)
-        return (found.conductance, found.error, found.along, found.across)[: len(outputs)]
+        return flow_through(field, sides_of_cell, wrap=wrap)[: len(outputs)]
 
     outputs = [[], []] + [[along, across]] * (2 * flow)
     conductance, error, *fields = frame_by_frame(measure, gap, outputs=outputs, over=(along, across))
@@ -168,6 +167,5 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
     stiffness, error = frame_by_frame(measure, touching, present, outputs=[(), ()])
     name, factor = f"{kind}_conductance", 2 / sum(both)
     described = label(xr.Dataset({name: factor * stiffness, f"{name}_error": factor * error}))
-    for variable in described.data_vars.values():
-        variable.attrs["resistivity"] = both
+    described[name].attrs["resistivity"] = both
     return described

@@ -384,7 +384,7 @@ def _with_elastic_bulk(
 
 
 def relaxation_series(
-    equilibrium: float, moduli: Sequence[float], times: Sequence[float], poisson: float = 0.5, **about: Any
+    equilibrium: float, moduli: ArrayLike, times: ArrayLike, poisson: float = 0.5, **about: Any
 ) -> Prony:
     """Return the creep compliance of the relaxation modulus ``G_e + sum G_i exp(-t / theta_i)``, [Pa], [s]; exact.
 

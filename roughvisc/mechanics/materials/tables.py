@@ -17,7 +17,7 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.prony import Kind, Prony, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
-from roughvisc.units import Quantity, format_quantity, number, quantities
+from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ _ONE_TEMPERATURE, _SAME_FREQUENCY = 2.0, 1e-6
 _DECADE = 10.0 * (1 + 1e-9)
 
 
-@quantities(times="s", compliances="1/Pa")
+@quantities(times="s", compliances="1/Pa", noise="1 >= 0")
 def creep_table(
     times: Sequence[Quantity],
     compliances: Sequence[Quantity],
@@ -86,7 +86,6 @@ def creep_table(
     """
     factor = tensile_to_shear(kind, poisson)
     t, values = _checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
-    number(noise, "1", "noise", least=0)
     for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
         raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
     highest = np.maximum.accumulate(values)
@@ -154,7 +153,7 @@ def relaxation_table(
 
     weights, theta, _, about = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
     about["note"] += f", times {t[0]:g} to {t[-1]:g} s"
-    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
+    return relaxation_series(float(weights[0]), weights[1:], theta, poisson, **about)
 
 
 @quantities(storage="Pa", loss="Pa")
@@ -227,7 +226,7 @@ def dynamic_table(
 
     weights, theta, _, about = _fitted(columns, at[order], size[order], target, scale, _MODULI)
     about["note"] += f", frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return relaxation_series(float(weights[0]), list(weights[1:]), list(theta), poisson, **about)
+    return relaxation_series(float(weights[0]), weights[1:], theta, poisson, **about)
 
 
 def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
