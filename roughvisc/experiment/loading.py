@@ -182,10 +182,11 @@ class LoadingRows(Rows):
         for step in march(scene, start.march):
             point = step.point
             if is_free and point.force > 0:
-                if BEYOND * point.approach >= domain.outside:
-                    raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
                 touches = point.pressure > 0
-                if domain.is_whole and (touches[[0, -1]].any() or touches[:, [0, -1]].any()):
+                at_border = bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
+                if (at_border and not domain.is_whole) or BEYOND * point.approach >= domain.outside:
+                    raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
+                if at_border:
                     self._reach_border(point.time)
 
             so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))

@@ -1,9 +1,10 @@
 """The surface of a run as plain arrays, and its domain: the part on which the contact is solved.
 
 In free space the surface outside the contact has no influence. An elastic estimate with the final compliance and the
-largest load gives the largest approach. Only cells whose undeformed gap is smaller can touch. A run uses the rectangle
-around these cells. The surface of an indenter is enlarged if the estimated contact reaches its border. A run whose
-contact outgrows its domain restarts on a larger domain.
+largest load gives the largest contact and approach. A run uses the rectangle around the contact of a sphere or cone. On
+other surfaces it uses the rectangle around all cells whose undeformed gap is smaller than the approach: no other cell
+can touch. The surface of an indenter is enlarged if the estimated contact reaches its border. A run whose contact
+outgrows its domain restarts on a larger domain.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.body import HALF_SPACE, Kernel
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
@@ -34,7 +35,7 @@ MARGIN, BEYOND = 1.2, 1.05
 #: Cells around the domain.
 RIM = 2
 #: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
-WORTH_CROPPING, LARGEST_PART = 96, 0.8
+WORTH_CROPPING, LARGEST_PART = 48, 0.8
 #: Factor by which the surface of an indenter grows, and the approach for which a new domain is chosen after contact has
 #: outgrown the last one.
 GROWTH = 1.5
@@ -98,6 +99,25 @@ class Profile:
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """Estimated largest contact of a program.
+
+    Attributes
+    ----------
+    approach : float
+        Largest approach; infinite if the program holds a load that it does not state. [m]
+    cells : ndarray of int, shape (2, 2), or None
+        First and last cell of the contact along x and y; None without contact.
+    at_border : bool
+        Whether contact reaches the border of the surface.
+    """
+
+    approach: float = math.inf
+    cells: NDArray[np.int_] | None = None
+    at_border: bool = False
+
+
+@dataclass(frozen=True)
 class Domain:
     """Rectangle of a surface on which the contact is solved.
 
@@ -110,7 +130,8 @@ class Domain:
     spacing : tuple of float
         Cell sides. [m]
     outside : float
-        Least undeformed gap outside the rectangle; infinite if the rectangle is the whole surface. [m]
+        Least undeformed gap outside the rectangle; infinite if contact would first reach the border of the rectangle.
+        [m]
     kernel : Kernel
         Kernel of the body.
     is_whole : bool
@@ -144,6 +165,43 @@ class Domain:
         return self._whole.displacement(np.full(self.shape, 1 / math.prod(self.shape)))[self.cells]
 
 
+def choose_domain(profile: Profile, body: Body, estimate: Estimate, growth: float = 1.0) -> Domain:
+    """Return the part of a surface that may touch during a run.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    body : Body
+        Body under it. The domain is the whole surface unless space and time separate in the body and a load never
+        raises the surface next to it.
+    estimate : Estimate
+        Estimated contact.
+    growth : float
+        Factor of its approach and size.
+    """
+    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
+    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    if body.kernel.raises_surface or not profile.all_present or min(shape) < WORTH_CROPPING:
+        return whole
+    is_connected = estimate.cells is not None and is_indenter(profile.height)
+    corners = estimate.cells if is_connected else np.argwhere(gap <= MARGIN * growth * estimate.approach)
+    if corners is None or not corners.size:
+        return whole
+    first, last = corners.min(axis=0), corners.max(axis=0)
+    if is_connected:
+        wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int)
+        first, last = first - wider, last + wider
+    first, last = np.maximum(first - RIM, 0), np.minimum(last + RIM + 1, shape)
+    cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
+    inside = np.zeros(shape, bool)
+    inside[cells] = True
+    if inside.mean() > LARGEST_PART:
+        return whole
+    outside = math.inf if is_connected else float(gap[~inside].min())
+    return replace(whole, cells=cells, outside=outside, is_whole=False)
+
+
 def choose_surface(
     profile: Profile, problem: Problem, program: Program, enlarged: int | None = None, outgrown: int = 0
 ) -> tuple[Profile, Domain, int, bool]:
@@ -174,30 +232,18 @@ def choose_surface(
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
     """
-    body, settings, approach, at_border = problem.body, problem.settings, math.inf, False
+    body, settings, estimate = problem.body, problem.settings, Estimate()
     times = enlarged or 0
     can_adapt = not body.kernel.raises_surface or is_indenter(profile.height)
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
             profile = Profile(enlarged_indenter(profile.height), settings.missing, body.kernel)
-        approach, at_border = estimated(profile, compliance, program)
-        while enlarged is None and at_border and (larger := enlarged_indenter(profile.height)) is not None:
+        estimate = estimated(profile, compliance, program)
+        while enlarged is None and estimate.at_border and (larger := enlarged_indenter(profile.height)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
-            approach, at_border = estimated(profile, compliance, program)
-    approach *= GROWTH**outgrown
-    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
-    domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    can_crop = not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
-    near = np.argwhere(gap <= MARGIN * approach) if can_crop and math.isfinite(approach) else np.empty((0, 2))
-    if near.size:
-        first, last = np.maximum(near.min(axis=0) - RIM, 0), np.minimum(near.max(axis=0) + RIM + 1, shape)
-        cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
-        inside = np.zeros(shape, bool)
-        inside[cells] = True
-        if inside.mean() <= LARGEST_PART:
-            domain = replace(domain, cells=cells, outside=float(gap[~inside].min()), is_whole=False)
-    return profile, domain, times, at_border
+            estimate = estimated(profile, compliance, program)
+    return profile, choose_domain(profile, body, estimate, GROWTH**outgrown), times, estimate.at_border
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
@@ -206,8 +252,8 @@ def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
     return None if larger is None or larger.size > MOST_CELLS else larger
 
 
-def estimated(profile: Profile, compliance: float, program: Program) -> tuple[float, bool]:
-    """Return the estimated largest approach of a program [m], and whether contact then reaches the border.
+def estimated(profile: Profile, compliance: float, program: Program) -> Estimate:
+    """Return the estimated largest contact of a program.
 
     Parameters
     ----------
@@ -217,23 +263,19 @@ def estimated(profile: Profile, compliance: float, program: Program) -> tuple[fl
         Contact compliance at the end of the program. [1/Pa]
     program : Program
         Loads and approaches.
-
-    Notes
-    -----
-    The approach is infinite if the program holds a load that it does not state.
     """
     stride = math.ceil(max(profile.gap.shape) / ESTIMATED_ON)
     gap, present = profile.gap[::stride, ::stride], profile.present[::stride, ::stride]
     if not present.any():
-        return math.inf, False
+        return Estimate()
     least, (dx, dy) = float(gap[present].min()), profile.spacing
     grid = Grid((gap.shape[0], gap.shape[1]), (stride * dx, stride * dy), "free", kernel=profile.kernel)
-    approach, at_border = 0.0, False
+    approach, touches = 0.0, np.zeros(gap.shape, bool)
     for number, segment in enumerate(program.segments):
         if segment.control == "approach":
             approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
         elif not program.gives(number):
-            return math.inf, False
+            return Estimate()
     pushes = [{"approach": approach}] if approach > least else []
     if program.largest_load * compliance > 0:
         pushes.append({"load": program.largest_load * compliance / grid.cell_area})
@@ -243,8 +285,12 @@ def estimated(profile: Profile, compliance: float, program: Program) -> tuple[fl
                 grid, np.ascontiguousarray(gap), tolerance=ESTIMATE_TOLERANCE, present=present, **push
             )
         except ConvergenceError:
-            return math.inf, False
+            return Estimate()
         approach = max(approach, found.approach)
-        touches = found.pressure > 0
-        at_border = at_border or bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
-    return approach, at_border
+        touches |= found.pressure > 0
+    if not touches.any():
+        return Estimate(approach)
+    places = np.argwhere(touches)
+    first, last = places.min(axis=0), places.max(axis=0)
+    at_border = bool((first == 0).any() or (last == np.array(gap.shape) - 1).any())
+    return Estimate(approach, stride * np.array([first - 1, last + 1]), at_border)

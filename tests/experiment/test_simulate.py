@@ -1,5 +1,7 @@
 """The labelled result: what is in it, what is refused, and the part of a free surface that is solved on."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from support import at_rows
@@ -147,6 +149,36 @@ def test_part_of_the_surface__changes_nothing_but_cost(name, margin, solved_on, 
     right = followed.x > 1.7e-4
     assert (followed.pressure.where(right).max() > 0) == (whole.pressure.where(right).max() > 0)
     assert (np.abs(followed.contact_area - whole.contact_area) <= 0.02 * whole.contact_area.max()).all()
+
+
+@pytest.mark.parametrize("indenter", ["sphere", "cone"])
+@pytest.mark.parametrize("lost", [0, 6], ids=["", "outgrown"])
+def test_part_under_an_indenter__changes_nothing_but_cost(indenter, lost, solved_on, monkeypatch):
+    """The part follows the estimated contact. If the estimate is too small by some cells, the run begins anew."""
+    size, shape = (3e-4, 2.7e-4), (91, 83)
+    height = rv.sphere(1e-3, size=size, shape=shape) if indenter == "sphere" else rv.cone(0.1, size=size, shape=shape)
+    program = rv.Program().load(1e-3, over=0.3).hold(0.5).load(0, over=0.3).load(6e-4, over=0.2)
+    settings = {"boundary": "free", "tolerance": 3e-3, "times": 6, "fields": FIELDS}
+    estimated, lost_cells = domain.estimated, np.array([[lost], [-lost]])
+
+    def too_small(*given):
+        found = estimated(*given)
+        return dataclasses.replace(found, cells=found.cells + lost_cells)
+
+    monkeypatch.setattr(domain, "estimated", too_small)
+    followed = simulate(height, ZENER, program, **settings)
+    widths = {where[0] for where in solved_on} - {91, 46}  # without estimates and the coarser grid
+    assert min(widths) < 72
+    assert (len(widths) > 1) == (lost > 0)
+    monkeypatch.setattr(domain, "WORTH_CROPPING", 10**9)
+    whole = simulate(height, ZENER, program, **settings)
+    force, depth = float(whole.force.max()), float(whole.approach.max())
+    cell = float(whole.x[1] - whole.x[0]) * float(whole.y[1] - whole.y[0])
+    assert np.abs(followed.approach - whole.approach).max() < 3e-3 * depth
+    assert (np.abs(followed.pressure - whole.pressure).sum(("x", "y")) * cell).max() < 2 * 3e-3 * force
+    for field in ("gap", "displacement"):
+        assert np.abs(followed[field] - whole[field]).max() < 1e-2 * depth
+    assert followed.mean_gap.values == pytest.approx(followed.gap.mean(("x", "y")).values, rel=1e-3)
 
 
 def test_contact_at_the_border_of_a_scan__is_refused():
