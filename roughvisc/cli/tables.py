@@ -148,5 +148,5 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
 
 def findings_table(found: Inspection) -> Group:
     """Return the findings in a scan, each with its recommendation."""
-    rows = [(one.name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for one in found.findings.values()]
+    rows = [(name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for name, one in found.findings.items()]
     return two_columns(rows, "Findings and recommendations")

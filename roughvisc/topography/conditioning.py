@@ -7,11 +7,12 @@ until :func:`fill`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any, Literal, NamedTuple
 
 import xarray as xr
 
-from roughvisc.arguments import DataNeeded, a_table, call, dotted, located, refuse_unknown
+from roughvisc.arguments import DataNeeded, a_table, call, dotted, refuse_unknown
 from roughvisc.errors import InputError
 from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.framing import crop, invert, rotate90
@@ -27,7 +28,7 @@ class Step(NamedTuple):
     function : callable
         Takes heights and arguments, and returns heights.
     argument : str
-        Name of the argument set by a plain value (neither a truth value nor a table); empty if there is none.
+        Name of the argument after the heights if a plain value (no truth value, no table) sets it, else empty.
     """
 
     function: Callable[..., xr.DataArray]
@@ -81,18 +82,12 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.
         value, key = steps.get(name, False), dotted(where, name)
         if value is False:
             continue
-        is_plain = not isinstance(value, Mapping | bool)
-        if is_plain and not step.argument:
+        table = value if isinstance(value, Mapping) else {}
+        plain = [] if isinstance(value, Mapping | bool) else [value]
+        if plain and not step.argument:
             raise InputError(key=key, found=value, expected="true, false or a table")
-        arguments = {step.argument: value} if is_plain else {} if value is True else dict(value)
-        try:
-            h = call(step.function, "", arguments, h)
-        except DataNeeded:
-            continue
-        except InputError as error:
-            if is_plain and error.key == step.argument:  # the value of the key is itself the argument
-                raise InputError(key=key, found=error.found, expected=error.expected) from error
-            raise located(error, key) from error
+        with suppress(DataNeeded):
+            h = call(step.function, key, table, h, *plain)
     return h
 
 

@@ -12,12 +12,10 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
-from roughvisc.units import Quantity, format_quantity, number, quantities
+from roughvisc.units import Quantity, number, quantities
 
 #: 1.4826 median absolute deviations are the standard deviation of normal noise.
 _MAD = 1.4826
-#: Side of the window that distinguishes large holes from small ones, in points.
-_HOLE = 9
 #: Memory of the windows that are sorted together. [byte]
 _MEMORY = 1 << 24
 
@@ -198,10 +196,7 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
     h = checked(h, "gaussian_filter")
     sides = spacing(h)
     longest = max(side * count for side, count in zip(sides, h.shape, strict=True))
-    if not 3 * max(sides) <= cutoff <= longest:
-        least, most = (format_quantity(one, "m") for one in (3 * max(sides), longest))
-        expected = f"a length [m], or text with a unit, from three cells ({least}) to the longest side ({most})"
-        raise InputError(key="cutoff", found=cutoff, expected=expected)
+    cutoff = number(cutoff, "m", "cutoff", least=3 * max(sides), most=longest)
     require_heights(h, "gaussian_filter")
     mean, present = np.nanmean(h.values), np.isfinite(h.values)
     long, share = np.where(present, h.values - mean, 0.0), present.astype(float)
@@ -211,17 +206,6 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
         heights = np.where(present, long / share + mean, np.nan)
     line = f"Gaussian filter (ISO 16610-61), {keep} waves kept, cut-off {cutoff:.6g} m"
     return noted(like(h, heights if keep == "long" else h.values - heights), line, period=None)
-
-
-def in_large_holes(missing: np.ndarray) -> np.ndarray:
-    """Return the mask of points in large holes, missing or not: most of the points around them are missing.
-
-    Parameters
-    ----------
-    missing : ndarray of bool, shape (nx, ny)
-        Mask of the missing points.
-    """
-    return scipy.ndimage.uniform_filter(missing.astype(float), _HOLE, mode="nearest") > 0.5
 
 
 def membrane(heights: np.ndarray) -> np.ndarray:

@@ -14,11 +14,19 @@ import xarray as xr
 from scipy import sparse
 
 from roughvisc.arguments import one_of
-from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.filters import membrane
-from roughvisc.topography.grid import checked, counts, like, noted, require_complete, spacing, with_coordinates
-from roughvisc.units import Quantity, quantities
+from roughvisc.topography.grid import (
+    checked,
+    counts,
+    like,
+    nominal_area,
+    noted,
+    require_complete,
+    spacing,
+    with_coordinates,
+)
+from roughvisc.units import Quantity, number, quantities
 
 #: Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
@@ -119,14 +127,12 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     )
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
-    density_attrs["comment"] = "mean square height = integral of psd over d2q / (2 pi)^2 = sum of psd * modes / area"
     variables = {
         "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
         "modes": ("wavevector", counted[ring].astype(int), {"units": "1", "long_name": "waves in the ring"}),
         "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
     }
-    about = {"area": float(np.prod(shape) * cells[0] * cells[1]), "window": window or "none"}
-    return xr.Dataset(variables, attrs=about)
+    return xr.Dataset(variables, attrs={"area": nominal_area(h)})
 
 
 def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:
@@ -213,9 +219,7 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     """
     h = checked(h, "without_short_waves")
     sides, lengths, period = spacing(h), period_of(h), _period(h, periodic)
-    if not 2 * max(sides) * (1 - _ROUNDING) <= shortest < min(lengths):
-        expected = f"at least two cells, {2 * max(sides):.6g} [m], and less than the sides, {min(lengths):.6g} [m]"
-        raise InputError(key="shortest", found=shortest, expected=expected)
+    shortest = number(shortest, "m", "shortest", least=2 * max(sides) * (1 - _ROUNDING), below=min(lengths))
     require_complete(h, "without_short_waves")
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
     if period:

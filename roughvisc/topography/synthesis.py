@@ -152,11 +152,9 @@ def self_affine(
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
     sides = size[0] / shape[0], size[1] / shape[1]
     finest = 2 * max(sides[0] / stretch[0], sides[1] / stretch[1])
-    shortcut = finest if shortcut is None else shortcut
-    if shortcut < finest * (1 - 1e-12):
-        raise InputError(f"shortcut is {shortcut!r}: expected at least two cells, {finest:.6g} [m]")
-    if rolloff is not None and rolloff < shortcut:
-        raise InputError(f"rolloff is {rolloff!r}: expected at least the short cut-off, {shortcut:.6g} [m]")
+    shortcut = number(finest if shortcut is None else shortcut, "m", "shortcut", least=finest * (1 - 1e-12))
+    if rolloff is not None:
+        rolloff = number(rolloff, "m", "rolloff", least=shortcut)
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
     entropy = np.random.default_rng(seed).integers(1 << 32, size=4).tolist()
     q_x, q_y, weight = wavevectors(shape, sides)

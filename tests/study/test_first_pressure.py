@@ -8,6 +8,7 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.study import first_study as first_module
 from roughvisc.study.first_study import first_pressure
+from roughvisc.topography.conditioning import condition
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.inspection import inspect
 
@@ -30,7 +31,7 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     assert found.boundary == "periodic"
     first = first_pressure(scan, found)
     assert max(first.shape) == min(most, 128)
-    surface = rv.level(scan, found.steps["level"])
+    surface = condition(scan, found.steps)
     near = 0.02 if most > 128 else 0.1
     assert first.late == pytest.approx(0.05, rel=0.05), "the pressure has two digits"
     assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(first.late, rel=near)
