@@ -21,8 +21,7 @@ from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.half_space import love_kernel
-from roughvisc.mechanics.materials.creep import Material, check_material
-from roughvisc.mechanics.materials.series import complex_compliance, over_frequencies
+from roughvisc.mechanics.materials.creep import Material, check_material, complex_compliance, over_frequencies
 
 Array = NDArray[np.float64]
 

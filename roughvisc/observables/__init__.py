@@ -12,10 +12,9 @@ from collections.abc import Callable
 
 import xarray as xr
 
-from roughvisc.observables.contact import clusters, contact, distribution
+from roughvisc.observables.contact import clusters, conductance, contact, distribution, leakage
 from roughvisc.observables.frames import cycle_work, history
 from roughvisc.observables.theory import area_by_theory, persson
-from roughvisc.observables.transport import conductance, leakage
 
 __all__ = [
     "area_by_theory",

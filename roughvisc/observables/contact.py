@@ -1,10 +1,10 @@
-"""Cells in contact, contact clusters, and distributions of pressure and gap."""
+"""Contact spots of each frame: cells, clusters, distributions, conductance; and leakage through the gap."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -12,11 +12,15 @@ import xarray as xr
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.mechanics.transport import label_clusters
+from roughvisc.mechanics.transport import flow as flow_through
+from roughvisc.mechanics.transport import frozen_contact, label_clusters
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
 from roughvisc.topography.grid import spacing
-from roughvisc.units import in_si
+from roughvisc.units import Quantity, in_si, is_quantity, number, quantities
 from roughvisc.variables import VARIABLES
+
+#: Unit of each kind of resistivity.
+_UNITS: dict[str, str] = {"thermal": "K m/W", "electrical": "ohm m"}
 
 
 def contact(dataset: xr.Dataset) -> xr.DataArray:
@@ -123,3 +127,150 @@ def distribution(
 
     density = frame_by_frame(measure, field, outputs=[(dim,)], sizes={dim: len(edges) - 1})
     return label(xr.Dataset({f"{name}_density": density}, {dim: (edges[1:] + edges[:-1]) / 2}))
+
+
+@quantities(viscosity="Pa s > 0", pressure_drop="Pa > 0")
+def leakage(
+    dataset: xr.Dataset,
+    *,
+    viscosity: Quantity = 1e-3,
+    pressure_drop: Quantity = 1e5,
+    along: Literal["x", "y"] = "x",
+    flow: bool = False,
+) -> xr.Dataset:
+    r"""Compute the leak rate of a fluid through the gap, from one side of the map to the opposite one.
+
+    The fluid pressure does not deform the surfaces.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``gap``, present everywhere.
+    viscosity : float or str
+        Viscosity of the fluid, constant: a number [Pa s], or a text such as ``"1 mPa s"``.
+    pressure_drop : float or str
+        Pressure difference between the two sides, over the whole length of the map (one period if it is periodic): a
+        number [Pa], or a text such as ``"1 bar"``.
+    along : {"x", "y"}
+        Direction of the flow. The other two sides are joined if the attribute ``boundary`` of the result is
+        ``"periodic"``; otherwise they are walls.
+    flow : bool
+        Whether to return the flow field, too.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over time ``leak_rate``, zero if no path connects the sides, and ``leak_rate_error`` [m3/s]; ``transmissivity``
+        [m3] and ``hydraulic_aperture`` [m], which are independent of the fluid; with `flow` also ``flux_x`` and
+        ``flux_y`` over (time, x, y) [m2/s]. The attributes of ``leak_rate`` state the arguments.
+
+    Raises
+    ------
+    InputError
+        If the result contains no ``gap``, or the surface is absent in some cells, where the gap is unknown; if a
+        quantity has a wrong unit, or a word is unknown.
+
+    Notes
+    -----
+    Reynolds' equation, :math:`\nabla \cdot (g^3 / 12 \eta \, \nabla P) = 0`; cells in contact are closed, and cells
+    that share only a corner are not connected. See :func:`roughvisc.mechanics.transport.flow`. For the volume flow
+    :math:`Q` through a map of length :math:`L` along the flow and width :math:`W`,
+
+    .. math:: T = \frac{Q \eta L}{\Delta P \, W}, \qquad h = (12 T)^{1/3}.
+
+    The error is the error of the solution of the equations on this grid, without the errors of the grid and of the gap.
+
+    Examples
+    --------
+    >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
+    """
+    one_of("along", along, ("x", "y"))
+    need(dataset, "gap")
+    wrap = dataset.attrs.get("boundary") == "periodic"
+    gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
+    across = "y" if along == "x" else "x"
+    sides_of_cell = cells[along], cells[across]
+
+    def measure(field: np.ndarray) -> tuple[Any, ...]:
+        missing = int(np.count_nonzero(np.isnan(field)))
+        if missing == field.size:  # after the last row of a case of a sweep
+            return (np.nan, np.nan, field, field)[: len(outputs)]
+        if missing:
+            found = f"the gap is missing in {missing} of {field.size} cells, where the surface is absent"
+            raise InputError(f"leakage: {found}: expected a surface that is cropped, or filled")
+        return flow_through(field, sides_of_cell, wrap=wrap)[: len(outputs)]
+
+    outputs = [[], []] + [[along, across]] * (2 * flow)
+    conductance, error, *fields = frame_by_frame(measure, gap, outputs=outputs, over=(along, across))
+    transmissivity = conductance * (cells[along] * gap.sizes[along] / (cells[across] * gap.sizes[across]))
+    drop = pressure_drop / viscosity
+    variables = {
+        "leak_rate": conductance * drop,
+        "leak_rate_error": error * drop,
+        "transmissivity": transmissivity,
+        "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
+    }
+    for axis, one in zip((along, across), fields, strict=False):
+        variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
+    described = label(xr.Dataset(variables))
+    described["leak_rate"].attrs |= {"along": along, "viscosity": viscosity, "pressure_drop": pressure_drop}
+    return described
+
+
+def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.Dataset:
+    r"""Compute the conductance of the contact spots at every kept time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result with ``pressure`` or ``gap``.
+    resistivity : pair of float or str
+        Resistivities of the two bodies; zero for a perfect conductor. Numbers are thermal. The unit of a string
+        determines whether they are thermal, such as ``"0.2 K m/W"``, or electrical, such as ``"1.7e-8 ohm m"``.
+        [K m/W] or [ohm m]
+
+    Returns
+    -------
+    xarray.Dataset
+        Over time ``thermal_conductance`` [W/K] or ``electrical_conductance`` [S], and its error. Zero without contact;
+        infinite in full contact unless space is free. The attribute ``resistivity`` states both resistivities.
+
+    Raises
+    ------
+    InputError
+        If the result contains neither ``pressure`` nor ``gap``. If there are not two resistivities of one kind, one is
+        negative, or both are zero.
+
+    Notes
+    -----
+    All spots have one potential, and each body is at a constant potential far from the spots. The conductance is
+    :math:`G = 2k / (\rho_1 + \rho_2)`, where :math:`k` is the stiffness of a flat punch with the shape of the spots,
+    over the contact modulus [1]_; for a single disc :math:`G = 4a / (\rho_1 + \rho_2)`. Each body conducts like a
+    half-space, even if it is a sheet. With periodic or mirror boundaries only the constriction resistance of the cells
+    of the grid counts, without the resistance of the bulk. Nothing flows through the gap, and films on the spots have
+    no resistance.
+
+    References
+    ----------
+    .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
+    """
+    if isinstance(resistivity, str) or not isinstance(resistivity, Sequence) or len(resistivity) != 2:
+        wanted = 'a list of two, one of each body, in K m/W or, as strings such as "2e-8 ohm m", in ohm m'
+        raise InputError(key="resistivity", found=resistivity, expected=wanted)
+    texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
+    kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
+    both = [number(one, _UNITS[kind], "resistivity") for one in resistivity]
+    if min(both) < 0 or sum(both) == 0:
+        raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
+    touching = contact(dataset)
+    present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
+    cells, boundary = spacing(dataset, "spots"), dataset.attrs.get("boundary", "free")
+
+    def measure(touching: np.ndarray, present: np.ndarray) -> tuple[float, float]:
+        return frozen_contact(touching, cells, boundary, present=present)
+
+    stiffness, error = frame_by_frame(measure, touching, present, outputs=[(), ()])
+    name, factor = f"{kind}_conductance", 2 / sum(both)
+    described = label(xr.Dataset({name: factor * stiffness, f"{name}_error": factor * error}))
+    described[name].attrs["resistivity"] = both
+    return described
