@@ -26,7 +26,13 @@ from roughvisc.progress import Bars, clock
 from roughvisc.solve import cores
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.case_text import value_text
-from roughvisc.study.execution.cluster import default_client, local_client, require_same_version, threads_each
+from roughvisc.study.execution.cluster import (
+    default_client,
+    distribute,
+    local_client,
+    require_same_version,
+    threads_each,
+)
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
 from roughvisc.study.storage.folder import case_path, lock_case, log_file, record_failure, require_writable, write_json
 from roughvisc.study.storage.index import clean_folder, index_of
@@ -203,8 +209,6 @@ def _computed(
             display.reached(key, 0.0, 0.0)
             yield attempt(case, folder, progress=partial(display.reached, key), threads=threads or cores())
         return
-    from roughvisc.study.execution.dispatch import distribute  # slow to import
-
     texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:
         require_same_version(client)

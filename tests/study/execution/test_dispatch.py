@@ -19,7 +19,7 @@ from support import BALL, LOADS, LONG, assert_same, numbers, refused
 import roughvisc as rv
 from roughvisc.cli.studies import connect
 from roughvisc.errors import RoughviscError
-from roughvisc.study.execution import dispatch
+from roughvisc.study.execution import cluster as cluster_module
 from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.cluster import default_client
 from roughvisc.study.execution.sweep import Display, run_cases, sweep
@@ -233,7 +233,7 @@ def kill_working(client, times):
 @pytest.mark.timeout(60)  # Ctrl-C waits for nobody where there is nobody
 @pytest.mark.parametrize("where", ["cluster", "this machine"])
 def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatch, where):
-    monkeypatch.setattr(dispatch, "_ALONE_AFTER", 0.3)
+    monkeypatch.setattr(cluster_module, "_ALONE_AFTER", 0.3)
     monkeypatch.setattr(sweep_module, "local_client", lambda processes: bare_cluster())
 
     ear, messages = Ear(), []
@@ -242,7 +242,7 @@ def test_no_workers__is_told_and_interrupted_at_once(study, tmp_path, monkeypatc
         messages.append(text)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(dispatch, "warnings", SimpleNamespace(warn=ctrl_c))
+    monkeypatch.setattr(cluster_module, "warnings", SimpleNamespace(warn=ctrl_c))
     with bare_cluster() as cluster:
         how = {"client": cluster} if where == "cluster" else {"workers": 2}
         with pytest.raises(KeyboardInterrupt):
@@ -291,7 +291,7 @@ def test_results_folder_that_a_worker_does_not_see__fails_no_case(study, tmp_pat
     with thread_workers(1) as client:
         settings = {"stop_file": str(tmp_path / "stop"), "name": "test", "threads": 1, "own": False}
         outcome = client.submit(
-            dispatch.on_worker, case.to_json(), case.key, folder=str(tmp_path / "elsewhere"), **settings
+            cluster_module.on_worker, case.to_json(), case.key, folder=str(tmp_path / "elsewhere"), **settings
         ).result()
     assert outcome.kind == "hindered"
     assert str(tmp_path / "elsewhere") in outcome.message
