@@ -148,7 +148,7 @@ def clean(results: Path, everything: bool) -> None:
     Example:
       roughvisc clean results/focus_variation-study
     """
-    from roughvisc.study.storage.index import clean_folder
+    from roughvisc.study.storage.folder import clean_folder
 
     for path in (removed := clean_folder(results, everything=everything)):
         click.echo(printable(f"removed {path.name}"))

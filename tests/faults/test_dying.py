@@ -9,7 +9,7 @@ from support import SMALL, with_steps
 
 from roughvisc.study.case import read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.index import clean_folder
+from roughvisc.study.storage.folder import clean_folder
 from roughvisc.study.storage.netcdf import open_result
 
 WAYS = ("kill", "ENOSPC", "EROFS", "EIO", "MemoryError")

@@ -32,8 +32,8 @@ from roughvisc.study.storage.folder import (
     require_writable,
     unusable,
 )
-from roughvisc.study.storage.index import Entry, read_entry
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
+from roughvisc.study.storage.sweep_data import Entry, read_entry
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -34,10 +34,17 @@ from roughvisc.study.execution.cluster import (
     threads_each,
 )
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
-from roughvisc.study.storage.folder import case_path, lock_case, log_file, record_failure, require_writable, write_json
-from roughvisc.study.storage.index import clean_folder, index_of
+from roughvisc.study.storage.folder import (
+    case_path,
+    clean_folder,
+    lock_case,
+    log_file,
+    record_failure,
+    require_writable,
+    write_json,
+)
 from roughvisc.study.storage.netcdf import open_result, write_result
-from roughvisc.study.storage.sweep_data import SWEEP, numbers_of, open_results, sweep_cases, write_table
+from roughvisc.study.storage.sweep_data import SWEEP, index_of, numbers_of, open_results, sweep_cases, write_table
 
 if TYPE_CHECKING:
     from distributed import Client

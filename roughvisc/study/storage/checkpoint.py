@@ -24,13 +24,12 @@ from numpy.typing import NDArray
 from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
-from roughvisc.study.storage.folder import DAMAGED, atomic_write
+from roughvisc.study.storage.folder import DAMAGED, STATE, atomic_write
 from roughvisc.study.storage.netcdf import lazy
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
 
-STATE = "state.npz"
 #: Size of the rows in memory above which they are written to the disk; a short run never writes rows. [byte]
 _WAITING = 8 << 20
 #: Largest part of the time for writing checkpoints.

@@ -1,4 +1,4 @@
-"""Folder of results: names, locks, atomic writing of files, records of failures, and the log of sweeps.
+"""Folder of results: names, locks, atomic writing, records of failures, the log of sweeps, leftovers of killed runs.
 
 A case with the key ``K`` has the result ``K.nc``. During its run ``.K.lock`` is locked and ``.K.unfinished`` contains
 its checkpoint. The record of a failed case is ``K.failed.json``. During writing, a file has a hidden name that ends in
@@ -12,7 +12,10 @@ import gzip
 import json
 import logging
 import os
+import re
 import secrets
+import shutil
+import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -30,6 +33,13 @@ log = logging.getLogger("roughvisc")
 LOG = "sweep.log"
 #: Names of the files of a case.
 _NAMES = {"result": "{}.nc", "lock": ".{}.lock", "checkpoint": ".{}.unfinished", "failure": "{}.failed.json"}
+#: Pattern of a key, and of the hidden files of a case: its lock, its checkpoint, and incomplete files.
+KEY = "[0-9a-f]" * 16
+_OF_A_CASE = re.compile(rf"\.({KEY})\.")
+#: State of an unfinished case, in the folder of its checkpoint.
+STATE = "state.npz"
+#: Age of an incomplete file that belongs to no case, above which the file counts as a leftover. [s]
+_ABANDONED = 3600.0
 #: Errors of :func:`read_json`, and errors due to unexpected values in the file.
 DAMAGED = (OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error)
 #: Time to wait for a lock: the lock of a killed process is free when the system has removed the process. [s]
@@ -234,3 +244,54 @@ def log_file(folder: Path) -> Iterator[None]:
         log.removeHandler(handler)
         with suppress(OSError):
             handler.close()
+
+
+def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
+    """Remove incomplete files, locks of dead runs, and checkpoints of finished cases.
+
+    Parameters
+    ----------
+    folder : path
+        Results folder. Files of running cases are kept.
+    everything : bool
+        Also remove renamed damaged results, records of failures, and the checkpoints of unfinished cases, which then
+        start again.
+
+    Returns
+    -------
+    list of Path
+        Removed files and folders.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise no_results(folder)
+    removed: list[Path] = []
+
+    def remove(path: Path) -> None:
+        with suppress(OSError):  # removed in the meantime, or the folder is not writable
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+            removed.append(path)
+
+    keys: dict[str, None] = {}
+    for path in sorted(folder.iterdir()):
+        if found := _OF_A_CASE.match(path.name):
+            keys[found[1]] = None
+        elif path.match(".*.part*"):
+            with suppress(OSError):
+                if time.time() - path.stat().st_mtime > _ABANDONED:
+                    remove(path)
+        elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
+            remove(path)
+    for key in keys:
+        lock, checkpoint = case_path(folder, key, "lock"), case_path(folder, key, "checkpoint")
+        with suppress(OSError), lock_case(lock, patience=0.0):  # which also removes the lock
+            resumes = (checkpoint / STATE).exists() and not case_path(folder, key, "result").exists()
+            for path in sorted(folder.glob(f".{key}.*")):
+                if path != lock and (everything or path != checkpoint or not resumes):
+                    remove(path)
+    return removed

@@ -1,11 +1,18 @@
-"""A sweep: its cases with their varied parameters, and their results as one lazy Dataset and as a table."""
+"""Results of a folder: their index, and the last sweep as one lazy Dataset and as a table.
+
+The index, a cache of all histories, is one small file, so that results need not be opened. It is made again from the
+results if it is absent, damaged or older than the results.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping, Sequence
-from functools import partial
+from base64 import b64decode, b64encode
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
@@ -18,23 +25,143 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.labels import heading, label
 from roughvisc.observables.frames import expect_result
-from roughvisc.study.case import Case, identifier, labels_of, parameters_of
-from roughvisc.study.storage.folder import DAMAGED, atomic_write, no_results, read_json, recorded_failure
-from roughvisc.study.storage.index import Entry, index_of
-from roughvisc.study.storage.netcdf import lazy, read_variable
+from roughvisc.study.case import Case, identifier, labels_of, parameters_of, program_version
+from roughvisc.study.storage.folder import (
+    DAMAGED,
+    KEY,
+    atomic_write,
+    no_results,
+    read_json,
+    recorded_failure,
+    write_json,
+)
+from roughvisc.study.storage.netcdf import lazy, open_result, read_variable
 from roughvisc.study.study_file import unit_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ERRORS, GRID_ERROR, IN_TABLE, LARGEST_IN_TABLE, ROW, ROWS, VARIABLES, axis_of
 
 log = logging.getLogger("roughvisc")
 
+#: File with the index.
+INDEX = ".index.json.gz"
 #: Files with the cases of the last sweep, and with their table.
 SWEEP, CASES = ".cases.json.gz", "cases.csv"
 #: Coordinate with the key of the case.
 CASE_KEY = "case_key"
-
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Content of one result without its fields.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file in the folder.
+    stamp : list of int
+        Size of the file [bytes] and time of its last change [ns].
+    attributes : dict
+        Attributes of the file that are text or numbers.
+    fields : dict
+        dtype of each variable over x and y.
+    arrays : dict
+        Each variable over the rows, with ``time`` or ``speed``; and the positions ``x`` and ``y`` of the cells.
+    """
+
+    file: str
+    stamp: list[int]
+    attributes: dict[str, Any]
+    fields: dict[str, str]
+    arrays: dict[str, NDArray[Any]] = field(repr=False)
+
+    @property
+    def key(self) -> str:
+        """Key of the case."""
+        return str(self.attributes.get("case_key", ""))
+
+    @property
+    def along(self) -> str:
+        """Axis of the rows."""
+        return axis_of(self.arrays)
+
+    @cached_property
+    def case(self) -> dict[str, Any]:
+        """The case as a dictionary, from its JSON."""
+        return json.loads(self.attributes["case"])
+
+
+def read_entry(path: Path) -> Entry:
+    """Read the entry of one result.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not a result, or is damaged.
+    """
+    stamp, arrays, fields = _stamp(path), {}, {}
+    with open_result(path) as result:
+        lines = (axis_of(result.variables),), ("x",), ("y",)
+        for name, variable in result.variables.items():
+            if variable.dims in lines:
+                arrays[str(name)] = variable.values
+            elif variable.dims[-2:] == ("x", "y"):
+                fields[str(name)] = variable.dtype.str
+    plain = {str(name): one for name, one in result.attrs.items() if isinstance(one, str | int | float)}
+    return Entry(path.name, stamp, plain, fields, arrays)
+
+
+def _stamp(path: Path) -> list[int]:
+    found = path.stat()
+    return [found.st_size, found.st_mtime_ns]
+
+
+def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
+    """Return the entry of every result in a folder by its key, and update the cache.
+
+    The log names files that are not results.
+
+    Parameters
+    ----------
+    folder : Path
+        Results folder.
+    known : iterable of Entry
+        Entries of results that need not be opened.
+
+    """
+    cached = _read_cache(folder)
+    before = cached | {entry.file: entry for entry in known}
+    entries = {}
+    for path in sorted(folder.glob(f"{KEY}.nc")):
+        try:
+            entry = before.get(path.name)
+            if entry is None or entry.stamp != _stamp(path):
+                entry = read_entry(path)
+            if entry.key != path.stem:
+                raise InputError(f"{path}: holds the result of case {entry.key}: expected the case of its name")
+            entries[entry.key] = entry
+        except (InputError, FileNotFoundError) as error:  # damaged, or removed in the meantime
+            log.warning("%s", error)
+    if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
+        results = [[one.file, one.stamp, one.attributes, one.fields, one.arrays] for one in entries.values()]
+        write_json(folder / INDEX, {"version": program_version(), "results": results}, _packed)
+    return entries
+
+
+def _packed(array: NDArray[Any]) -> tuple[str, str]:
+    return array.dtype.str, b64encode(array).decode()
+
+
+def _read_cache(folder: Path) -> dict[str, Entry]:
+    """Return the entries of the cache by file name; none if it is absent, damaged or of another version."""
+    entries = {}
+    with suppress(*DAMAGED):
+        stated = read_json(folder / INDEX)
+        for *plain, arrays in stated["results"] if stated["version"] == program_version() else ():
+            unpacked = {name: np.frombuffer(b64decode(text), dtype) for name, (dtype, text) in arrays.items()}
+            entries[plain[0]] = Entry(*plain, unpacked)
+    return entries
 
 
 def sweep_cases(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:

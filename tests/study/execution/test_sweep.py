@@ -20,8 +20,7 @@ from roughvisc.study.execution import run as run_module
 from roughvisc.study.execution import sweep as sweep_module
 from roughvisc.study.execution.sweep import Display, run_cases, sweep
 from roughvisc.study.storage.folder import case_path
-from roughvisc.study.storage.index import INDEX
-from roughvisc.study.storage.sweep_data import CASES, SWEEP
+from roughvisc.study.storage.sweep_data import CASES, INDEX, SWEEP
 
 RUN = [sys.executable, "-m", "roughvisc", "run"]
 

@@ -13,9 +13,8 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import vary
 from roughvisc.study.execution.sweep import sweep
-from roughvisc.study.storage.index import INDEX
 from roughvisc.study.storage.netcdf import open_result, write_result
-from roughvisc.study.storage.sweep_data import SWEEP
+from roughvisc.study.storage.sweep_data import INDEX, SWEEP
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
 OWN_TIMES = (

@@ -6,8 +6,7 @@ import time
 import pytest
 from sample_results import hertz_creep
 
-from roughvisc.study.storage.folder import lock_case
-from roughvisc.study.storage.index import clean_folder
+from roughvisc.study.storage.folder import clean_folder, lock_case
 from roughvisc.study.storage.netcdf import write_result
 
 KEYS = [f"{i:016x}" for i in range(4)]
