@@ -19,7 +19,7 @@ from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
 from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
-from roughvisc.topography.synthesis import RECIPES, surrogate
+from roughvisc.topography.recipes import RECIPES, surrogate
 
 HEAD = ("key", "unit", "default", "meaning")
 #: Functions whose docstrings describe the arguments of others.

@@ -63,16 +63,16 @@ from roughvisc.topography.inspection import inspect as inspect
 from roughvisc.topography.parameters import parameters as parameters
 from roughvisc.topography.readers import from_array as from_array
 from roughvisc.topography.readers import list_channels as list_channels
+from roughvisc.topography.recipes import cone as cone
+from roughvisc.topography.recipes import flat_punch as flat_punch
+from roughvisc.topography.recipes import self_affine as self_affine
+from roughvisc.topography.recipes import sphere as sphere
+from roughvisc.topography.recipes import surrogates as surrogates
+from roughvisc.topography.recipes import wavy as wavy
 from roughvisc.topography.scans import open_scan as open_scan
 from roughvisc.topography.spectrum import psd as psd
 from roughvisc.topography.spectrum import resample as resample
 from roughvisc.topography.spectrum import without_short_waves as without_short_waves
-from roughvisc.topography.synthesis import cone as cone
-from roughvisc.topography.synthesis import flat_punch as flat_punch
-from roughvisc.topography.synthesis import self_affine as self_affine
-from roughvisc.topography.synthesis import sphere as sphere
-from roughvisc.topography.synthesis import surrogates as surrogates
-from roughvisc.topography.synthesis import wavy as wavy
 from roughvisc.topography.writers import save_scan as save_scan
 
 __version__: str

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.program import Program, instant
-from roughvisc.topography.borders import is_mirrored, is_periodic, recipe_name
+from roughvisc.topography.borders import is_mirrored, is_periodic
 from roughvisc.topography.grid import checked
-from roughvisc.topography.indenters import is_indenter
-from roughvisc.topography.synthesis import BOUNDARIES
+from roughvisc.topography.recipes import BOUNDARIES, is_indenter, recipe_name
 from roughvisc.units import in_si, number
 from roughvisc.variables import FIELDS
 
@@ -197,8 +196,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
 
     Examples
     --------
-    >>> from roughvisc.topography.indenters import sphere
-    >>> from roughvisc.topography.synthesis import wavy
+    >>> from roughvisc.topography.recipes import sphere, wavy
     >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
     >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
     ('free', 'periodic', None)

@@ -24,7 +24,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.labels import TITLE, label, with_steps
 from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
-from roughvisc.topography.indenters import highest
+from roughvisc.topography.recipes import highest
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 
 log = logging.getLogger("roughvisc")

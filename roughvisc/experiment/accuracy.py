@@ -17,9 +17,9 @@ from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings, kept_times
-from roughvisc.topography.borders import JUMP, border_mismatch, is_analytic
-from roughvisc.topography.indenters import is_indenter
+from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.recipes import is_analytic, is_indenter
 from roughvisc.units import format_quantity
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
-from roughvisc.topography.indenters import is_indenter, remade
+from roughvisc.topography.recipes import is_indenter, remade
 from roughvisc.topography.spectrum import resample, shares
 from roughvisc.variables import GRID_ERROR, axis_of
 

@@ -24,7 +24,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Problem, Settings
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.indenters import grown, highest, is_indenter
+from roughvisc.topography.recipes import grown, highest, is_indenter
 
 Array = NDArray[np.float64]
 #: Number of cells along the longer side of the grid of the estimate, and tolerance of the estimate.

@@ -22,10 +22,11 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, complement
 from roughvisc.observables.frames import expect_result, history
-from roughvisc.topography.borders import border_mismatch, is_analytic, recipe_name
+from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.recipes import is_analytic, recipe_name
 from roughvisc.topography.spectrum import hann, last_octave
 from roughvisc.units import Quantity, format_quantity, quantities
 from roughvisc.variables import axis_of

@@ -36,8 +36,8 @@ from roughvisc.study.sweep_table import value_at
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
+from roughvisc.topography.recipes import RECIPES
 from roughvisc.topography.scans import check_surface, open_scan, surface_boundary
-from roughvisc.topography.synthesis import RECIPES
 from roughvisc.units import number
 
 #: Tables of a study, without its sweep.

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.indenters import is_indenter
 
 #: Opposite borders form a step if their difference exceeds this multiple of the difference of neighbouring rows.
 JUMP = 2.0
@@ -62,30 +60,6 @@ def is_periodic(h: xr.DataArray) -> bool:
     if period.shape != (2,) or not np.allclose(period, period_of(h), rtol=1e-6, atol=0):
         return False
     return max(border_mismatch(h)) <= 2 * JUMP
-
-
-def is_analytic(h: xr.DataArray) -> bool:
-    """Return whether a surface is an indenter or a regular wave.
-
-    Examples
-    --------
-    >>> from roughvisc.topography.indenters import sphere
-    >>> from roughvisc.topography.synthesis import wavy
-    >>> ball = sphere(1e-2, 1e-3, 8)
-    >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
-    (True, False, True)
-    """
-    return is_indenter(h) or recipe_name(h) == "wavy"
-
-
-def recipe_name(h: xr.DataArray) -> str:
-    """Return the name of the recipe of a surface; empty if its grid differs from the recipe."""
-    try:
-        recipe = json.loads(h.attrs["recipe"])
-        fits = list(h.shape) == recipe["shape"] and np.allclose(period_of(h), recipe["size"], rtol=1e-6, atol=0)
-        return str(recipe["name"]) if fits else ""
-    except (KeyError, TypeError, ValueError):
-        return ""
 
 
 def is_mirrored(h: xr.DataArray) -> bool:

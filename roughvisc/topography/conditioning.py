@@ -16,8 +16,8 @@ from roughvisc.arguments import DataNeeded, a_table, call, dotted, refuse_unknow
 from roughvisc.errors import InputError
 from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.framing import crop, invert, rotate90
+from roughvisc.topography.recipes import surrogate
 from roughvisc.topography.spectrum import resample, without_short_waves
-from roughvisc.topography.synthesis import surrogate
 
 
 class Step(NamedTuple):

@@ -20,7 +20,7 @@ from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
 from roughvisc.topography.framing import combine
 from roughvisc.topography.readers import Reading, existing, read_file, sha256
-from roughvisc.topography.synthesis import BOUNDARIES, RECIPES, check_recipe
+from roughvisc.topography.recipes import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, quantities
 
 #: Keys of a card that do not affect the heights.

@@ -16,16 +16,7 @@ from scipy import sparse
 from roughvisc.arguments import one_of
 from roughvisc.topography.borders import is_periodic, period_of
 from roughvisc.topography.filters import membrane
-from roughvisc.topography.grid import (
-    checked,
-    counts,
-    like,
-    nominal_area,
-    noted,
-    require_complete,
-    spacing,
-    with_coordinates,
-)
+from roughvisc.topography.grid import checked, counts, like, noted, require_complete, spacing, with_coordinates
 from roughvisc.units import Quantity, number, quantities
 
 #: Share of the mean square slope in the waves down to the shortest wave of a surface.
@@ -132,7 +123,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         "modes": ("wavevector", counted[ring].astype(int), {"units": "1", "long_name": "waves in the ring"}),
         "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
     }
-    return xr.Dataset(variables, attrs={"area": nominal_area(h)})
+    return xr.Dataset(variables, attrs={"area": h.size * cells[0] * cells[1]})
 
 
 def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:

@@ -12,8 +12,8 @@ from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outl
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.readers import from_array
+from roughvisc.topography.recipes import flat_punch, self_affine, sphere
 from roughvisc.topography.spectrum import resample
-from roughvisc.topography.synthesis import flat_punch, self_affine, sphere
 
 CELL = (2e-6, 3e-6)
 

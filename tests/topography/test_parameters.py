@@ -8,8 +8,8 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import labelled, spacing
 from roughvisc.topography.parameters import PARAMETERS, levelled_parameters, parameters, rms_slope
 from roughvisc.topography.readers import from_array
+from roughvisc.topography.recipes import self_affine, wavy
 from roughvisc.topography.spectrum import psd
-from roughvisc.topography.synthesis import self_affine, wavy
 
 SIZE, SHAPE = (3e-4, 2e-4), (61, 48)
 ROUGH = self_affine(SIZE, SHAPE, hurst=0.8, rms_slope=0.2, rolloff=1e-4, shortcut=2e-5, seed=4)

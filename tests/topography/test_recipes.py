@@ -12,8 +12,7 @@ from strategies import examples, shapes
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.topography.indenters import grown
-from roughvisc.topography.synthesis import cone, flat_punch, self_affine, sphere, wavy
+from roughvisc.topography.recipes import cone, flat_punch, grown, self_affine, sphere, wavy
 
 SIZE, SHAPE = (3e-3, 2e-3), (31, 24)
 
