@@ -53,7 +53,7 @@ from roughvisc.topography.filters import fill as fill
 from roughvisc.topography.filters import gaussian_filter as gaussian_filter
 from roughvisc.topography.filters import level as level
 from roughvisc.topography.filters import mask_outliers as mask_outliers
-from roughvisc.topography.formats.registry import supported_formats as supported_formats
+from roughvisc.topography.formats import supported_formats as supported_formats
 from roughvisc.topography.framing import combine as combine
 from roughvisc.topography.framing import crop as crop
 from roughvisc.topography.framing import invert as invert
@@ -62,7 +62,6 @@ from roughvisc.topography.framing import rotate90 as rotate90
 from roughvisc.topography.inspection import inspect as inspect
 from roughvisc.topography.parameters import parameters as parameters
 from roughvisc.topography.readers import from_array as from_array
-from roughvisc.topography.readers import list_channels as list_channels
 from roughvisc.topography.recipes import cone as cone
 from roughvisc.topography.recipes import flat_punch as flat_punch
 from roughvisc.topography.recipes import self_affine as self_affine
@@ -70,9 +69,9 @@ from roughvisc.topography.recipes import sphere as sphere
 from roughvisc.topography.recipes import surrogates as surrogates
 from roughvisc.topography.recipes import wavy as wavy
 from roughvisc.topography.scans import open_scan as open_scan
+from roughvisc.topography.scans import save_scan as save_scan
 from roughvisc.topography.spectrum import psd as psd
 from roughvisc.topography.spectrum import resample as resample
 from roughvisc.topography.spectrum import without_short_waves as without_short_waves
-from roughvisc.topography.writers import save_scan as save_scan
 
 __version__: str

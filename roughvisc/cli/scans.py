@@ -33,7 +33,6 @@ def _reading(command: Any) -> Any:
         click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
         quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
         click.option("--spacing", type=_sides, metavar="LENGTH", help="Distance between points: 1um, or 1um,2um."),
-        click.option("--height-unit", help="Unit of the heights, if it differs."),
         click.option("--unit", help="Unit of length, if the file states none: um."),
     ):
         command = option(command)
@@ -90,10 +89,9 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     from roughvisc.cli.tables import findings_table, scan_table
     from roughvisc.plot.save import write_figure
     from roughvisc.study.storage.folder import atomic_write, write_text
-    from roughvisc.topography.writers import card_text, known_suffix, surface_table
+    from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
-    channels = () if "card" in height.attrs else rv.list_channels(file, format=options["format"])
     if to:
         known_suffix(to)
     for out in filter(None, (plot, to, card)):
@@ -102,9 +100,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     levelled, found = rv.level(height), rv.inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
-    console.print(
-        scan_table(height, rv.parameters(levelled), file.name, channels), "", findings_table(found), "", sep="\n"
-    )
+    console.print(scan_table(height, rv.parameters(levelled), file.name), "", findings_table(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
     picture = plot or Path(f"{file.stem}.png")
     if not picture.exists():

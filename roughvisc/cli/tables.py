@@ -113,8 +113,8 @@ def sweep_table(outcomes: Sequence[Outcome], total: int, title: str) -> Group:
     return two_columns(rows, title)
 
 
-def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: Sequence[Any] = ()) -> Group:
-    """Return channels, size, missing points and areal parameters of a scan.
+def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
+    """Return format, channels, size, missing points and areal parameters of a scan.
 
     Parameters
     ----------
@@ -124,14 +124,10 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str, channels: 
         Result of :func:`roughvisc.parameters`.
     name : str
         Name of the file.
-    channels : sequence, optional
-        Result of :func:`roughvisc.list_channels`, listed if there are several.
     """
     counts, sides, missing = height.shape, spacing(height), int(height.isnull().sum())
-    rows = [(key.capitalize(), height.attrs.get(key, "")) for key in ("format", "instrument", "channel", "orientation")]
-    for number, one in enumerate(channels if len(channels) > 1 else ()):
-        kind = f"height in {one.unit or 'no unit'}" if one.is_height else one.kind
-        rows.append((f"Channel {number}", f"{one.name}: {kind}, {' x '.join(map(str, one.shape))} points"))
+    stated = ("format", "instrument", "channel", "other_channels", "orientation")
+    rows = [(key.capitalize().replace("_", " "), height.attrs.get(key, "")) for key in stated]
     rows += [
         ("Size", " x ".join(readable(n * d, "m") for n, d in zip(counts, sides, strict=True))),
         ("Shape", f"{counts[0]} x {counts[1]} points"),

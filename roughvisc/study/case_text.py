@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import Any
 
 from roughvisc.study.study_file import unit_of
-from roughvisc.topography.writers import toml_text
+from roughvisc.topography.scans import toml_text
 from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.

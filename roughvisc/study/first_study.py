@@ -19,7 +19,7 @@ from roughvisc.mechanics.materials.prony import zener
 from roughvisc.topography.conditioning import condition
 from roughvisc.topography.inspection import Inspection
 from roughvisc.topography.parameters import rms_slope
-from roughvisc.topography.writers import surface_table, written_quantity
+from roughvisc.topography.scans import surface_table, written_quantity
 
 #: Text of a first study, with comments.
 TEMPLATE = Path(__file__).with_name("first_study.toml")

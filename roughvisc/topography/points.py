@@ -42,8 +42,8 @@ def laid_out(
     if not spread.all():
         raise InputError("its points lie on one line, a profile: expected an areal scan")
     if side is not None:
-        heights, empty = gridded(points, side)
-        if empty:
+        heights = gridded(points, side)
+        if empty := int(np.isnan(heights).sum()):
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
     if (found := lattice(points)) is None:
@@ -96,11 +96,8 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     return heights, (float(f"{steps[0]:.12g}"), float(f"{steps[1]:.12g}"))
 
 
-def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
-    """Return the mean height of the points in each square cell, and the number of cells without a point.
-
-    Cells without a point are missing. If there are fewer points than cells, all heights are instead interpolated
-    linearly over triangles of points. Cells outside the triangles are then missing.
+def gridded(points: np.ndarray, side: float) -> np.ndarray:
+    """Return the mean height of the points in each square cell; cells without a point are missing.
 
     Parameters
     ----------
@@ -108,25 +105,13 @@ def gridded(points: np.ndarray, side: float) -> tuple[np.ndarray, int]:
         x, y and height.
     side : float
         Side of the cells, in the unit of the points.
-
-    Returns
-    -------
-    heights : ndarray, shape (nx, ny)
-    empty : int
     """
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     shape = np.maximum(np.ceil((high - low) / side - 1e-9), 1)
     if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
         raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")
-    nx, ny = (int(n) for n in shape)
+    nx, ny = shape.astype(int)
     i, j = np.minimum((points[:, :2] - low) / side, shape - 1).astype(int).T
-    count = np.bincount(i * ny + j, minlength=nx * ny).reshape(nx, ny)
-    empty = int((count == 0).sum())
-    if len(points) >= nx * ny:
-        total = np.bincount(i * ny + j, points[:, 2], nx * ny).reshape(nx, ny)
-        return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0), empty
-    from scipy.interpolate import griddata  # slow to import
-
-    x, y = (start + (np.arange(n) + 0.5) * side for start, n in zip(low, (nx, ny), strict=True))
-    return griddata(points[:, :2], points[:, 2], (x[:, None], y[None]), "linear"), empty
+    count, total = (np.bincount(i * ny + j, weights, nx * ny) for weights in (None, points[:, 2]))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(nx, ny)

@@ -7,25 +7,23 @@ from __future__ import annotations
 
 import hashlib
 import math
-import os
 import textwrap
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.formats.registry import open_file
+from roughvisc.topography.formats import open_file, orientation, top_line_first
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.topography.orientation import orientation, top_line_first
 from roughvisc.topography.points import laid_out
 from roughvisc.units import Quantity, number, quantities
 
@@ -43,52 +41,51 @@ _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
 _READER = threading.RLock()
 
 
-class Reading(NamedTuple):
-    """Options with which a user reads a file, see :func:`roughvisc.open_scan`."""
+def read_file(path: Path, format: str | None, given: Mapping[str, Any]) -> xr.DataArray:
+    """Read one channel of an instrument or grid file.
 
-    unit: str | None = None
-    height_unit: str | None = None
-    spacing: Any = None
-    grid: Any = None
-    no_data: float | None = None
-    height_scale: float | None = None
-
-
-def read_file(path: Path, format: str | None, channel: int | str | None, how: Reading) -> xr.DataArray:
-    """Read one channel of an instrument or grid file, see :func:`roughvisc.open_scan`."""
-    if how.spacing is not None:
-        how = how._replace(spacing=pair("spacing", how.spacing))
+    Parameters
+    ----------
+    path : Path
+        The file.
+    format : str or None
+        As for :func:`roughvisc.open_scan`.
+    given : mapping
+        Further options of :func:`roughvisc.open_scan` that the user gives.
+    """
+    if "spacing" in given:
+        given = {**given, "spacing": pair("spacing", given["spacing"])}
     with _reading(path), closing(open_file(path, format)) as file:
-        chosen = _chosen(file, channel)
-        h = _labelled(file, chosen, how)
+        channel = _chosen(file, given.get("channel"))
+        h = _labelled(file, channel, given)
     for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
-    given = how._asdict() | {"spacing": how.spacing and "{:.6g} x {:.6g} m".format(*how.spacing)}
-    stated = "".join(f", {key} {value} as given" for key, value in given.items() if value is not None)
-    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": chosen.name}
-    attrs |= {"orientation": orientation(file.format), "instrument": file.instrument or None}
-    attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not chosen) or None
-    return noted(h, f"read {path.name} ({file.format}), channel {chosen.name!r}{stated}", **attrs)
+    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": channel.name}
+    attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not channel) or None
+    stated = "".join(f", {key} {value} as given" for key, value in given.items() if key != "channel")
+    line = f"read {path.name} ({file.format}), channel {channel.name!r}{stated}"
+    return noted(h, line, orientation=orientation(file.format), **attrs)
 
 
-def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
+def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.DataArray:
     """Return the heights of a channel over x and y; refuse implausible ones. [m]"""
-    xy, z = _metres(channel, how)
-    if how.grid is not None and (channel.kind != "points" or how.spacing is not None):
-        raise InputError(key="grid", found=how.grid, expected="none for a map, or with a spacing")
+    xy, z = _metres(channel, given)
+    spacing, grid, no_data = (given.get(key) for key in ("spacing", "grid", "no_data"))
+    if grid is not None and (channel.kind != "points" or spacing is not None):
+        raise InputError(key="grid", found=grid, expected="none for a map, or with a spacing")
     raw, sides = channel.load(), channel.spacing
+    values = np.asarray(raw, dtype=float)
     if channel.kind == "points":
-        points = raw[np.isfinite(raw[:, :2]).all(axis=1)]
-        points[:, 2] = _without_no_data(points[:, 2], how.no_data, file.complaints)
-        values, sides = laid_out(points, None if how.grid is None else how.grid / xy, xy, file.complaints)
+        points = values[np.isfinite(values[:, :2]).all(axis=1)]
+        points[:, 2] = _without_no_data(points[:, 2], no_data, file.complaints)
+        values, sides = laid_out(points, None if grid is None else grid / xy, xy, file.complaints)
     else:
-        values = _without_no_data(np.asarray(raw, dtype=float), how.no_data, file.complaints)
-    values = values * z * (how.height_scale or 1.0)
+        values = _without_no_data(values, no_data, file.complaints)
+    values = values * z * given.get("height_scale", 1.0)
     if top_line_first(file.format):
         values = values[:, ::-1]
-    if channel.positions is None or how.spacing is not None:
-        spacing = how.spacing or tuple(float(f"{d * xy:.15g}") for d in sides)
-        h = labelled(values, spacing)
+    if channel.positions is None or spacing is not None:
+        h = labelled(values, spacing or tuple(float(f"{d * xy:.15g}") for d in sides))
     else:
         h = with_coordinates(values, *(at * xy for at in channel.positions))
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
@@ -107,44 +104,38 @@ def _labelled(file: ScanFile, channel: Channel, how: Reading) -> xr.DataArray:
     return h
 
 
-def _metres(channel: Channel, how: Reading) -> tuple[float, float]:
+def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
-    has_sides = all(side > 0 for side in channel.spacing or [0.0])
-    is_sized = channel.kind == "points" or has_sides or any((channel.positions, how.spacing))
-    needs_xy = is_sized and channel.lateral_unit is None and how.spacing is None
-    needs_z = channel.unit is None
-    is_used = {"unit": needs_xy or (needs_z and how.height_unit is None), "height_unit": needs_z}
-    for key, given in (("unit", how.unit), ("height_unit", how.height_unit)):
-        for stated in filter(None, (channel.unit, channel.lateral_unit)) if given and not is_used[key] else ():
-            factor = number(f"1 {given}", "m", key) / number(f"1 {stated}", "m")
-            if not math.isclose(factor, 1.0):
-                expected = f"no {key} = {given!r}, or height_scale = {factor:.6g} if its heights are in {given}"
-                text = f"it states its unit as {stated!r}: expected {expected}"
-                raise InputError(text, key=key, found=given, expected=expected)
-    expected = {}
-    if (needs_xy and how.unit is None) or (needs_z and how.unit is how.height_unit is None):
-        expected["unit"] = 'unit = "um", and height_unit if heights have another unit'
-    if not is_sized:
-        expected["spacing"] = 'spacing = "1 um", or another length'
-    for key in expected:
-        text = f"it states no {' and no '.join(expected)}: expected {'; and '.join(expected.values())}"
-        raise InputError(text, key=key, expected=expected[key])
-    xy, z = channel.lateral_unit or how.unit or "m", channel.unit or how.height_unit or how.unit
-    return number(f"1 {xy}", "m", "unit"), number(f"1 {z}", "m", "height_unit" if how.height_unit else "unit")
+    unit, stated = given.get("unit"), channel.unit
+    is_sized = channel.kind == "points" or bool(channel.positions) or all(side > 0 for side in channel.spacing or [0.0])
+    needs = {
+        "unit": stated is None or (is_sized and channel.lateral_unit is None and "spacing" not in given),
+        "spacing": not is_sized,
+    }
+    examples = {"unit": 'unit = "um"', "spacing": 'spacing = "1 um"'}
+    if lacking := [key for key, is_needed in needs.items() if is_needed and key not in given]:
+        expected = f"{' and '.join(examples[key] for key in lacking)}, or another"
+        raise InputError(
+            f"it states no {' and no '.join(lacking)}: expected {expected}", key=lacking[0], expected=expected
+        )
+    if unit is not None and not needs["unit"]:
+        factor = number(f"1 {unit}", "m", "unit") / number(f"1 {stated}", "m")
+        if not math.isclose(factor, 1.0):
+            expected = f"the unit of the file, {stated!r}, or height_scale = {factor:.6g} if its heights are in {unit}"
+            raise InputError(key="unit", found=unit, expected=expected)
+    return number(f"1 {channel.lateral_unit or unit or 'm'}", "m", "unit"), number(f"1 {stated or unit}", "m", "unit")
 
 
 def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
     """Return heights with NaN at missing points, which a given number or an outlying number marks."""
     if no_data is not None:
         return np.where(np.isclose(values, number(no_data, "1", "no_data"), rtol=1e-6, atol=0.0), np.nan, values)
-    if values.size < _FEWEST:
-        return values
-    extremes = sorted({float(np.nanmin(values)), float(np.nanmax(values))})
-    extremes = [one for one in extremes if abs(one) >= _NO_DATA and np.count_nonzero(values == one) >= _REPEATED]
-    rest = values[np.isfinite(values) & ~np.isin(values, extremes)] if extremes else values[:0]
+    extremes = [one for one in {float(np.nanmin(values)), float(np.nanmax(values))} if abs(one) >= _NO_DATA]
+    extremes = sorted(one for one in extremes if np.count_nonzero(values == one) >= _REPEATED)
+    rest = values[np.isfinite(values) & ~np.isin(values, extremes)]
     spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-    for one in extremes:
-        if spread > 0 and np.abs(rest - one).min() > _FAR * spread:
+    for one in extremes if spread > 0 else ():
+        if np.abs(rest - one).min() > _FAR * spread:
             here = values == one
             values = np.where(here, np.nan, values)
             others = f"all others lie within {rest.min():g} to {rest.max():g}"
@@ -156,14 +147,14 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
 def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
     """Return the channel of a name or a number; the default height if None."""
     named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
-    heights = [i for i, c in enumerate(file.channels) if c.is_height]
+    heights = {i: one for i, one in enumerate(file.channels) if one.is_height}
     if not heights:
         raise InputError(f"it holds no heights over x and y (channels {named or 'none'}): expected an areal scan")
     if channel is None:
-        return file.channels[file.default if file.default in heights else heights[0]]
-    for i in heights:
-        if channel in (i, file.channels[i].name):
-            return file.channels[i]
+        channel = file.default if file.default in heights else min(heights)
+    for i, one in heights.items():
+        if channel in (i, one.name):
+            return one
     raise InputError(key="channel", found=channel, expected=f"a height of {named}")
 
 
@@ -196,31 +187,6 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     h = labelled(values, pair("spacing", spacing))
     finite(h)
     return noted(h, "from an array")
-
-
-def list_channels(path: str | os.PathLike[str], *, format: str | None = None) -> tuple[Channel, ...]:
-    """List the channels of a scan file, without loading it.
-
-    Parameters
-    ----------
-    path : path
-        Instrument or grid file.
-    format : str, optional
-        As for :func:`roughvisc.open_scan`.
-
-    Returns
-    -------
-    tuple of Channel
-        Name, whether it is a height, shape (nx, ny) and unit of each channel.
-
-    Raises
-    ------
-    InputError
-        If the file is absent, damaged or of an unknown format.
-    """
-    path = existing(path)
-    with _reading(path), closing(open_file(path, format)) as file:
-        return tuple(file.channels)
 
 
 def sha256(path: Path) -> str:

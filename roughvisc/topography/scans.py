@@ -6,9 +6,11 @@ steps. A surface card is this table in a separate TOML file, with the origin of 
 
 from __future__ import annotations
 
+import json
 import os
 import tomllib
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +21,24 @@ from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
 from roughvisc.topography.framing import combine
-from roughvisc.topography.readers import Reading, existing, read_file, sha256
+from roughvisc.topography.grid import checked
+from roughvisc.topography.grid import spacing as cell_sides
+from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.recipes import BOUNDARIES, RECIPES, check_recipe
-from roughvisc.units import Quantity, quantities
+from roughvisc.units import Quantity, quantities, unit_for
 
 #: Keys of a card that do not affect the heights.
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
+#: Beginning of a new card, for the user to complete.
+_BLANK_CARD = """\
+# source = "..."      # where it comes from
+# licence = "..."     # who may use it
+# instrument = "..."
+"""
+#: Suffixes that :func:`save_scan` writes.
+WRITABLE = (".nc", ".x3p", ".sdf")
+#: Keys of a table ``[surface]`` with lengths, and the digits of these.
+_LENGTHS = {"spacing": 15, "grid": 15, "filter": 6, "crop": 6}
 
 
 @quantities(spacing="m", grid="m > 0", height_scale="1 > 0")
@@ -34,7 +48,6 @@ def open_scan(
     format: str | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
-    height_unit: str | None = None,
     spacing: Quantity | tuple[Quantity, Quantity] | None = None,
     grid: Quantity | None = None,
     no_data: float | None = None,
@@ -50,31 +63,29 @@ def open_scan(
         A key of :func:`~roughvisc.supported_formats`. Default: by the suffix; texts of some makers are recognised by
         their content.
     channel : int or str, optional
-        Number or name of the channel, see :func:`~roughvisc.list_channels`. Default: the height channel, or the default
-        of the library if there are several; the attribute ``other_channels`` then lists the others.
+        Number or name of the channel. Default: the height channel, or the default of the library if there are several;
+        the attribute ``other_channels`` then lists the others.
     unit : str, optional
         Unit of length in a file that states none, such as ``"um"``.
-    height_unit : str, optional
-        Unit of the heights in a file that states none, if x and y have another unit: for points in mm, mm, um use
-        ``unit="mm", height_unit="um"``.
     spacing : float or str, or a pair, optional
         Cell sides (dx, dy), instead of those in the file. [m]
     grid : float or str, optional
-        Side of the square cells into which points x, y, z are sorted: each has the mean height of its points. Default:
-        the lattice on which the points lie, to a hundredth of its steps. [m]
+        Side of the square cells into which points x, y, z are sorted: each has the mean height of its points, and is
+        missing without a point. Default: the lattice on which the points lie, to a hundredth of its steps. [m]
     no_data : float, optional
         Number that marks a missing point, in the unit of the file. Default: the lowest or highest number, if it is at
         least 999 in size, occurs at four points or more, and is further from all others than ten times their range; a
         warning reports it.
     height_scale : float, optional
-        Factor of the heights, for a file that states a wrong unit: 1e-6 if micrometres are labelled as metres. [-]
+        Factor of the heights, for a file that states a wrong unit (1e-6 if micrometres are labelled as metres), or if
+        x and y have another unit: for points in mm, mm, um use ``unit="mm", height_scale=1e-3``. [-]
 
     Returns
     -------
     xarray.DataArray
         Height over (x, y), peaks up, NaN where missing. [m] Coordinates are the cell centres; the spacing is the size
         over the number of points. The attributes contain the name and checksum of the file, format,
-        instrument, channel, orientation (whether y is known to point up, or the map may be a mirror image) and
+        channel, orientation (whether y is known to point up, or the map may be a mirror image) and
         ``history``. Rows of a matrix in text, CSV or NumPy run along x: row j of the file is ``y[j]``.
 
     Raises
@@ -90,11 +101,13 @@ def open_scan(
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
     """
-    how, path = Reading(unit, height_unit, spacing, grid, no_data, height_scale), existing(path)
+    options = {"channel": channel, "unit": unit, "spacing": spacing, "grid": grid}
+    options |= {"no_data": no_data, "height_scale": height_scale}
+    path, given = existing(path), {key: value for key, value in options.items() if value is not None}
     if not is_card(path, format):
-        return read_file(path, format, channel, how)
-    given = {"channel": channel} | how._asdict()
-    if named := ", ".join(f"{key}=" for key, value in given.items() if value is not None):
+        return read_file(path, format, given)
+    if given:
+        named = ", ".join(f"{key}=" for key in given)
         raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
     about, table = read_card(path)
     try:
@@ -109,6 +122,39 @@ def open_scan(
     except InputError as error:
         raise error.prefixed(str(path)) from error
     return h.assign_attrs(card=path.name, **about)
+
+
+def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
+    """Write heights to a file that :func:`roughvisc.open_scan` can open.
+
+    Parameters
+    ----------
+    h : xarray.DataArray
+        Height over (x, y), NaN where missing. [m]
+    path : path
+        ``.nc`` stores everything: coordinates, attributes and the mask of filled points.
+        ``.x3p`` and ``.sdf`` store heights in full precision and the spacing; their grids begin at zero.
+
+    Raises
+    ------
+    InputError
+        If the suffix is unknown, or `h` is not a height grid.
+    """
+    h, path = checked(h, "save_scan"), Path(path)
+    known_suffix(path)
+    if path.suffix.lower() == ".nc":
+        compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+        h.rename("height").to_netcdf(path, engine="netcdf4", encoding={"height": compressed})
+        return
+    library = import_module(f"{path.suffix[1:].lower()}io")
+    x_scale, y_scale = cell_sides(h)
+    library.write(path, h.values.T, x_scale=x_scale, y_scale=y_scale)
+
+
+def known_suffix(path: Path) -> None:
+    """Refuse a file name that :func:`save_scan` cannot write to."""
+    if path.suffix.lower() not in WRITABLE:
+        raise InputError(f"{path}: found the suffix {path.suffix!r}: expected one of {', '.join(WRITABLE)}")
 
 
 def read_card(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
@@ -227,3 +273,73 @@ def surface_boundary(table: Mapping[str, Any]) -> Any:
     of_face, rest = split(table, *FACE_STEPS)
     made = boundary_after(of_face, made)
     return boundary_after(split(rest, *STEPS)[0], None if "second" in table else made)
+
+
+def card_text(
+    file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
+) -> str:
+    """Return the surface card of a scan file as TOML: checksum, reading options and conditioning steps.
+
+    Parameters
+    ----------
+    file, folder, options, steps
+        As in :func:`surface_table`.
+
+    Raises
+    ------
+    InputError
+        If the file is a surface card itself.
+    """
+    file = Path(file)
+    if is_card(file, None):
+        raise InputError(f"{file}: is a surface card already: expected a scan file")
+    stated = {"title": file.stem, "sha256": sha256(file)}
+    return _BLANK_CARD + _entries(stated) + surface_table(file, folder, options, steps).partition("\n")[2]
+
+
+def surface_table(
+    file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
+) -> str:
+    """Return the ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
+
+    Parameters
+    ----------
+    file : path
+        The scan, or a surface card.
+    folder : path
+        Folder of the study or the card: the file is named relative to it.
+    options : mapping
+        Options of :func:`roughvisc.open_scan` that the file needs; None for unused options.
+    steps : mapping
+        Conditioning steps, as for :func:`~roughvisc.topography.conditioning.condition`. [m]
+    """
+    given = {key: value for key, value in options.items() if value is not None}
+    return "[surface]\n" + _entries({"file": Path(os.path.relpath(file, folder)).as_posix(), **given, **steps})
+
+
+def _entries(table: Mapping[str, Any]) -> str:
+    """Return the entries of a table of a surface as TOML, one a line."""
+    return "".join(f"{key} = {toml_text(value, _LENGTHS.get(key))}\n" for key, value in table.items())
+
+
+def written_quantity(value: float, unit: str, digits: int = 6) -> str:
+    """Return a quantity with a prefix, in the notation of study files.
+
+    Examples
+    --------
+    >>> written_quantity(1.9e-5, "m"), written_quantity(7500.0, "Pa"), written_quantity(0.03, "N")
+    ('19 um', '7.5 kPa', '30 mN')
+    """
+    return unit_for([value], unit).text(value, digits).replace("µ", "u")
+
+
+def toml_text(value: Any, digits: int | None = None) -> str:
+    """Return a value as TOML; if `digits` is given, numbers are written as lengths with this many digits."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {toml_text(one, digits)}" for key, one in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_text(one, digits) for one in value)}]"
+    text = value if digits is None else written_quantity(float(value), "m", digits)
+    if isinstance(text, float):
+        return str(text)  # inf and nan are Infinity and NaN in JSON
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML escapes it, JSON does not

@@ -10,9 +10,8 @@ import xarray as xr
 from scan_files import CELL, refusal, survive, tilted, write_sdf, write_text, write_x3p
 from support import refused
 
-from roughvisc.errors import InputError
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.readers import from_array, list_channels
+from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
 
 
@@ -73,11 +72,6 @@ def test_several_heights__the_chosen_one_is_named_and_the_others_listed(tmp_path
     found = open_scan(tmp_path / "scan.nc")
     assert (found.attrs["channel"], found.attrs["other_channels"]) == ("z", "forward, phase")
     assert "channel 'z'" in found.attrs["history"]
-    assert [(c.name, c.is_height) for c in list_channels(tmp_path / "scan.nc")] == [
-        ("z", True),
-        ("forward", True),
-        ("phase", False),
-    ]
     np.testing.assert_array_equal(open_scan(tmp_path / "scan.nc", channel="forward"), tilted())
     for wrong in ("phase", "backward"):
         assert wrong in refusal(tmp_path / "scan.nc", channel=wrong)
@@ -85,36 +79,35 @@ def test_several_heights__the_chosen_one_is_named_and_the_others_listed(tmp_path
 
 def test_points__that_state_no_unit_need_one(tmp_path):
     path = write_xyz(tmp_path / "scan.xyz")
-    assert "expected unit" in refusal(path, height_unit="um")
-    np.testing.assert_allclose(spacing(open_scan(path, height_unit="um", spacing=CELL)), CELL)
-    with pytest.raises(InputError, match="height_unit: found '1 s'"):
-        open_scan(path, unit="mm", height_unit="s")
+    assert "expected unit" in refusal(path)
+    h = open_scan(path, unit="mm", height_scale=1e-3)  # x and y in mm, z in um
+    np.testing.assert_allclose(h, 1e-6 * tilted(missing=False), rtol=1e-9)
+    np.testing.assert_allclose(spacing(h), np.multiply(CELL, 1e-3))
+    with refused("unit", "1 s"):
+        open_scan(path, unit="s")
 
 
-def test_height_unit__in_a_grid_file_counts_where_it_states_none(tmp_path):
+def test_unit__in_a_grid_file_counts_where_it_states_none(tmp_path):
     h = from_array(tilted(), CELL)
     path = tmp_path / "scan.nc"
     bare = xr.DataArray(h.values, dims=("x", "y"), coords={axis: 1e3 * h[axis].values for axis in "xy"}, name="height")
     bare.to_netcdf(path)
-    found = open_scan(path, unit="mm", height_unit="um")
+    found = open_scan(path, unit="mm", height_scale=1e-3)
     np.testing.assert_allclose(found, 1e-6 * tilted())
     np.testing.assert_allclose(spacing(found), CELL)
     bare.assign_attrs(units="um").to_netcdf(path)
     np.testing.assert_allclose(open_scan(path, unit="mm"), 1e-6 * tilted())
-    assert "height_unit" in refusal(path, unit="mm", height_unit="nm")
     h.to_netcdf(path)
-    assert "height_unit" in refusal(path, height_unit="um")
+    assert "height_scale = 1e-06" in refusal(path, unit="um")
+    np.testing.assert_array_equal(open_scan(path, unit="m"), h)
 
 
 def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):
     """26 um and 27 um stay what they are, whatever unit the heights have."""
     path = write_text(tmp_path / "scan.txt", header="# Width: 26 µm\n# Height: 27.0 µm\n")
-    for options in ({"unit": "nm"}, {"height_unit": "nm"}):
-        h = open_scan(path, **options)
-        np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
-        np.testing.assert_allclose(h, 1e-9 * tilted(missing=False), rtol=1e-9)
-    with refused("unit", "mm"):
-        open_scan(path, unit="mm", height_unit="nm")
+    h = open_scan(path, unit="nm")
+    np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
+    np.testing.assert_allclose(h, 1e-9 * tilted(missing=False), rtol=1e-9)
     path.write_text(path.read_text().replace(".", ",").replace("26 ", "26,0 "))
     np.testing.assert_array_equal(open_scan(path, unit="nm"), h)
     path.write_text("# Width: 2,5 µm\n# Height: 7,5 µm\n" + "1 2 3 4 5\n" * 5)  # the header alone has decimals

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scan_files import SCANS, real
 
-from roughvisc.topography.formats.registry import supported_formats
-from roughvisc.topography.orientation import orientation, top_line_first
+from roughvisc.topography.formats import orientation, supported_formats, top_line_first
 from roughvisc.topography.scans import open_scan
 
 

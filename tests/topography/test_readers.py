@@ -23,8 +23,8 @@ from scan_files import (
 from support import refused
 
 from roughvisc.errors import InputError
-from roughvisc.topography.formats import Channel, ScanFile, add_format, registry
-from roughvisc.topography.formats.registry import supported_formats
+from roughvisc.topography import formats
+from roughvisc.topography.formats import Channel, ScanFile, add_format, supported_formats
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.scans import open_scan
@@ -71,8 +71,8 @@ def test_real_scan__libraries_agree_on_orientation_and_scale(name):
 
 def test_netcdf__units_are_converted_and_descending_axes_turned(tmp_path):
     h = from_array(tilted(), CELL)
-    micro = (h * 1e9).assign_coords(x=h.x * 1e6, y=h.y * 1e3)[::-1].assign_attrs(units="nm")
-    micro.x.attrs["units"], micro.y.attrs["units"] = "um", "mm"
+    micro = (h * 1e9).assign_coords(x=h.x * 1e6, y=h.y * 1e6)[::-1].assign_attrs(units="nm")
+    micro.x.attrs["units"] = micro.y.attrs["units"] = "um"
     for name in ("scan.nc", "scan.h5"):
         micro.to_netcdf(tmp_path / name, engine="netcdf4")
         xr.testing.assert_allclose(open_scan(tmp_path / name), h, atol=1e-20)
@@ -89,6 +89,7 @@ def test_netcdf__refuses_what_is_no_grid(tmp_path):
     np.testing.assert_allclose(open_scan(saved(h.drop_attrs()), unit="mm"), tilted() * 1e-3)
     refusal(saved(h.assign_coords(x=("x", np.geomspace(1e-6, 1e-5, 13), {"units": "m"}))))
     refusal(saved(h.rename(x="lon")))
+    assert "expected one unit" in refusal(saved(h.assign_coords(x=h.x.assign_attrs(units="um"))))
     refusal(saved(h.assign_attrs(units="V")))
     assert "spacing" in refusal(saved(h.drop_vars("x")))
     assert open_scan(saved(h.drop_vars("x")), spacing=CELL).shape == SHAPE
@@ -130,10 +131,10 @@ def test_refusal__all_points_are_missing(tmp_path):
 
 
 def test_supported_formats__names_those_of_all_libraries():
-    formats = supported_formats()
-    assert {"x3p", "sdf", "nc", "card", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(formats)
-    assert formats["wsxm"] == ("cur", "stp", "tom", "top")
-    assert len(formats) >= 40
+    known = supported_formats()
+    assert {"x3p", "sdf", "nc", "card", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(known)
+    assert known["wsxm"] == ("cur", "stp", "tom", "top")
+    assert len(known) >= 40
 
 
 def test_from_array__labels_and_refuses():
@@ -204,11 +205,11 @@ def test_shipped_card__opens_with_title_and_licence(path):
 
 
 def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "_FORMATS", dict(registry._FORMATS))
+    monkeypatch.setattr(formats, "_FORMATS", dict(formats._FORMATS))
     heights = np.arange(12.0).reshape(4, 3) * 1e-6
 
     def read(path):
-        channel = Channel("height", heights.shape, lambda: heights, "m", "m", (1e-6, 2e-6))
+        channel = Channel("height", lambda: heights, "m", "m", (1e-6, 2e-6))
         return ScanFile("ours", [channel])
 
     add_format("ours", [".TXT", "our"], read)

@@ -8,7 +8,7 @@ from scan_files import CELL, tilted, write_sdf, write_x3p
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.writers import card_text, save_scan
+from roughvisc.topography.scans import card_text, save_scan
 
 
 @pytest.mark.parametrize("suffix", ["nc", "x3p", "sdf", "X3P"])
@@ -53,7 +53,7 @@ def test_card_text__makes_a_card_that_opens_as_the_file(tmp_path):
 
 def test_card_text__states_the_options_that_the_file_needs(tmp_path):
     np.save(tmp_path / "scan.npy", tilted())
-    options = {"unit": "mm", "height_unit": "um", "spacing": CELL, "format": "npy", "channel": 0}
+    options = {"unit": "mm", "height_scale": 1e-3, "spacing": CELL, "format": "npy", "channel": 0}
     (tmp_path / "card.toml").write_text(card_text(tmp_path / "scan.npy", tmp_path, options, {}))
     xr.testing.assert_equal(rv.open_scan(tmp_path / "card.toml"), rv.open_scan(tmp_path / "scan.npy", **options))
 

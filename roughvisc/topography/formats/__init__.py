@@ -1,10 +1,140 @@
-"""Readers of scan files.
+"""Formats of scan files: their readers by name and suffix, and the orientation of the map in each.
 
 A reader takes a path and returns a :class:`ScanFile`: the channels of the file, in the units of the file.
-:mod:`roughvisc.topography.readers` decides units, missing values and orientation, and refuses implausible files.
+:mod:`roughvisc.topography.readers` decides units and missing values, and refuses implausible files.
 """
 
-from roughvisc.topography.formats.registry import add_format
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from roughvisc.errors import InputError
+from roughvisc.topography.formats import binary, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 
-__all__ = ["Channel", "ScanFile", "add_format"]
+__all__ = ["Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats", "top_line_first"]
+
+#: Format -> suffixes without the dot, and its reader, for formats with a reader in this package. A text format without
+#: a suffix is recognised by its content.
+_FORMATS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
+    "x3p": (("x3p",), binary.read_x3p),
+    "sdf": (("sdf",), binary.read_sdf),
+    "npy": (("npy",), binary.read_npy),
+    "nc": (("nc", "nc4", "cdf", "hdf5"), binary.read_netcdf),
+    "tmd": (("tmd",), binary.read_truemap),
+    "sur": (("sur",), binary.read_digital_surf),
+    "txt": (("txt", "csv", "asc", "xyz"), text.read_text_file),
+    **dict.fromkeys(("csv", "xyz", "asc", "zygo", "wyko", "esri", "keyence"), ((), text.read_text_file)),
+}
+#: Formats to try, in this order, for suffixes that are also used for other content.
+_SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
+#: Formats whose reader returns the top line of the map first, and the evidence. For the first two, it is a feature in a
+#: real file; for the others, mostly the agreement of two programs.
+_GWYDDION = "not verified: the reader matches the map of Gwyddion, whose first line is the top one"
+_TOP_FIRST = {
+    "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
+    "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
+    "esri": "verified: the definition of the format, whose first row is the top one",
+    "gwy": "not verified: Gwyddion's own format, whose first line is the top one",
+    "opd": "not verified: two programs draw the same line at the top",
+    **dict.fromkeys(("di", "ezd", "frt", "ibw", "jpk", "mdt", "mi", "ps", "wsxm"), _GWYDDION),
+}
+#: Evidence for formats that define the direction of y, and for all others.
+_STATED = {
+    "wyko": "not verified: each line is a column of the map from the bottom up, as Gwyddion reads it",
+    "nc": "verified: the coordinates in the file",
+    "xyz": "verified: the coordinates in the file",
+}
+_TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; it may be a mirror image"
+
+
+def open_file(path: Path, format: str | None) -> ScanFile:
+    """Read the header of a scan file; find its format by name, or else by suffix."""
+    names, failures = _formats_of(path) if format is None else (format,), []
+    for name in names:
+        default = partial(binary.read_with_surface_topography, format=name)
+        try:
+            file = _FORMATS.get(name, ((), default))[1](path)
+            if name == names[-1] or any(channel.is_height for channel in file.channels):
+                return file
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - readers raise many types, such as struct.error and KeyError
+            failures.append(f"as {name}: {str(error) or type(error).__name__}")
+    raise ValueError("; ".join(failures))
+
+
+def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
+    """Add a format to :func:`roughvisc.open_scan` in this process, or replace a format of the same name.
+
+    Parameters
+    ----------
+    format : str
+        Name, as ``format=`` takes it.
+    suffixes : sequence of str
+        Suffixes of its files, without the dot. May be empty.
+    read : callable
+        ``read(path)`` returns a :class:`ScanFile`. Any exception is reported as an
+        :class:`~roughvisc.errors.InputError` that names the file.
+    """
+    _FORMATS[format] = tuple(suffix.lower().removeprefix(".") for suffix in suffixes), read
+
+
+def supported_formats() -> dict[str, Sequence[str]]:
+    """Return the names of all formats, for ``format=``, with their usual suffixes.
+
+    Returns
+    -------
+    dict
+        Name -> suffixes without the dot, in alphabetical order.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from SurfaceTopography.IO import readers  # slow to import
+    known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
+    known["di"] += ("di", "000 to 999")
+    known |= {name: theirs for name, (theirs, _) in _FORMATS.items()} | {"card": ("toml",)}
+    return dict(sorted(known.items()))
+
+
+def _formats_of(path: Path) -> Sequence[str]:
+    """Return the formats to try for the suffix of a file, in order."""
+    suffix = path.suffix.lower().removeprefix(".")
+    if quick := [name for name, (theirs, _) in _FORMATS.items() if suffix in theirs][-1:] or _SHARED.get(suffix):
+        return quick
+    known = supported_formats()
+    wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
+    if found := [name for name, theirs in known.items() if wanted in theirs]:
+        return found
+    listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))
+    raise InputError(f"the suffix {path.suffix!r} is not known: expected format, or a suffix of {listed}", key="format")
+
+
+def top_line_first(format: str) -> bool:
+    """Return whether the reader of a format returns the line of the largest y first."""
+    return format in _TOP_FIRST
+
+
+def orientation(format: str) -> str:
+    """Return the evidence for the orientation of a format: a scan with a wrong orientation is a mirror image.
+
+    Parameters
+    ----------
+    format : str
+        Its name, as ``format=`` of :func:`roughvisc.open_scan` takes it.
+
+    Returns
+    -------
+    str
+        Begins with ``verified`` if the evidence is a feature in a real file, or the file itself states the orientation;
+        otherwise with ``not verified``.
+
+    Examples
+    --------
+    >>> orientation("tmd").partition(":")[0], orientation("plu").partition(":")[0]
+    ('verified', 'not verified')
+    """
+    return _TOP_FIRST.get(format) or _STATED.get(format, _TAKEN)

@@ -17,8 +17,6 @@ class Channel:
     ----------
     name : str
         Name, as ``channel=`` of :func:`roughvisc.open_scan` takes it.
-    shape : tuple of int
-        Points along x and y; one number for a profile or for points.
     load : callable
         Returns the heights over (x, y), peaks up, NaN where missing, in `unit`: an array, or a DataArray whose
         attributes and coordinates are kept; for points an array of shape (n, 3).
@@ -35,7 +33,6 @@ class Channel:
     """
 
     name: str
-    shape: tuple[int, ...]
     load: Callable[[], Any]
     unit: str | None = None
     lateral_unit: str | None = None
@@ -61,10 +58,8 @@ class ScanFile:
         All channels of the file.
     default : int or None
         Index of the channel to read if the user names none. None: the first height.
-    instrument : str
-        Maker and model if known.
     complaints : list of str
-        Faults of the file that do not prevent reading; ``load`` of a channel may add some.
+        Faults of the file that do not prevent reading.
     close : callable
         Closes the file.
     """
@@ -72,6 +67,10 @@ class ScanFile:
     format: str
     channels: Sequence[Channel]
     default: int | None = None
-    instrument: str = ""
     complaints: list[str] = field(default_factory=list)
     close: Callable[[], None] = lambda: None
+
+
+def single_map(format: str, heights: np.ndarray, *about: Any) -> ScanFile:
+    """Return the content of a file with one map, with unit, lateral unit and spacing as in :class:`Channel`."""
+    return ScanFile(format, [Channel("height", lambda: heights, *about)])

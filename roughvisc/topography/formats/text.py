@@ -1,6 +1,7 @@
-"""Points x, y, z and matrices of heights in text.
+"""Formats of text: exports of instrument makers, points x, y, z, and matrices of heights.
 
-A matrix has its rows along x. An index row or column next to the heights, as pandas writes it, is removed.
+A text of a maker is recognised by its content. Rows run along x and the first row is y = 0, unless the format states
+otherwise. An index row or column next to the heights, as pandas writes it, is removed from a matrix.
 """
 
 from __future__ import annotations
@@ -8,18 +9,21 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from statistics import mode
-from typing import NamedTuple
 
 import numpy as np
 
 from roughvisc.errors import InputError
-from roughvisc.tables import decimal_mark, name_and_unit
-from roughvisc.topography.formats.libraries import read_with_surface_topography
-from roughvisc.topography.formats.scan_file import Channel, ScanFile
+from roughvisc.tables import decimal_mark, read_text
+from roughvisc.topography.formats.binary import read_with_surface_topography
+from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
 from roughvisc.units import is_quantity
 
+#: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
+_COUNTS, _MISSING_COUNT = {0: 4096, 1: 32768, 2: 131072}, 2147483640
 #: A text without a header is a table, not a map, if it has fewer columns than the first number, and more lines than the
 #: second number times the columns.
 _COLUMNS, _TALL = 8, 20
@@ -30,29 +34,19 @@ _MATRIX_SIZE = re.compile(r"^#[^:=：\n]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[m
 _UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
 #: Length with a decimal comma in a header, such as ``# Width: 12,5 um``.
 _LENGTH = re.compile(r"(?<=[:=])\s*\d[\d.]*,\d+(?=\s*\w{0,2}m\b)")
-#: Cells of a heading, such as ``x [mm]; y [mm]; z [um]``.
-_HEADING = re.compile(r"[^\s;,\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))")
+#: Cell of a heading, such as ``x [mm]; y [mm]; z [um]``: its name and its unit, in square or round brackets.
+_HEADING = re.compile(r"""([^\s;,"\[(]+)\s*[\[(]\s*([^\])]*?)\s*[\])][\s;,"]*""")
 #: Marks of a missing height, and a number with either decimal mark or one of these.
 _MISSING = dict.fromkeys(("", "nan", "bad", "-", "#n/a", "n/a"), "nan")
 _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:e[+-]?\d++)?|nan|bad|-|(?:#?n/a)?", re.IGNORECASE)
 
 
-class Table(NamedTuple):
-    """Lines of a text with decimal points and blanks between the numbers, and the places of the rows of numbers."""
+def read_table(text: str) -> tuple[list[str], list[int]]:
+    """Return the lines of a text, and the places of the rows of numbers.
 
-    lines: list[str]
-    rows: list[int]
-
-    def numbers(self) -> np.ndarray:
-        """Return the rows as a matrix."""
-        return np.loadtxt([self.lines[at] for at in self.rows], ndmin=2)
-
-
-def read_table(text: str) -> Table:
-    """Return the table in a text.
-
-    Values are separated by blanks, commas, semicolons or tabs. Empty values are missing heights. Lines of other text,
-    such as ``# Width: 26 um``, stay unchanged, except that a decimal comma becomes a point.
+    Values may be separated by blanks, commas, semicolons or tabs, and empty values are missing heights. The returned
+    rows have decimal points, and blanks between the numbers. Lines of other text above them, such as ``# Width: 26
+    um``, stay unchanged, except that a decimal comma becomes a point.
 
     Raises
     ------
@@ -66,35 +60,39 @@ def read_table(text: str) -> Table:
     if body and (comments := _units_in_comments(lines[body[0]], body[0])):
         lines[body.pop(0)] = comments
     cells = {at: _cells(lines[at], separator) for at in body}
+    if separator != " " and not any(row[-1] for row in cells.values() if _NUMBER.fullmatch(row[0])):
+        # a separator ends each line
+        cells = {at: row[:-1] for at, row in cells.items()}
     known = {at: sum(map(bool, map(_NUMBER.fullmatch, row))) for at, row in cells.items()}
-    rows = [at for at, row in cells.items() if 1 < len(row) == known[at]]
-    if rows and separator != " " and not any(cells[at][-1] for at in rows):  # a separator ends each line
-        cells, known = {at: row[:-1] for at, row in cells.items()}, {at: count - 1 for at, count in known.items()}
-    width = mode(len(cells[at]) for at in rows) if rows else 0
-    rows = [at for at in rows if len(cells[at]) == width]
-    lengths = [found[0].strip() for line in lines for found in _LENGTH.finditer(line)]
-    mark = decimal_mark([*lengths, *(cell for at in rows for cell in cells[at])], separator)
-    for at in sorted(set(cells) - set(rows)) if rows else ():
+    widths = [len(row) for at, row in cells.items() if 1 < len(row) == known[at]]
+    width = mode(widths) if widths else 0
+    rows = [at for at, row in cells.items() if len(row) == known[at] == width]
+    for at in sorted(set(body) - set(rows)) if rows else ():
         row = cells[at]
-        is_wide = len(row) == width and known[at] and (separator != " " or at > rows[0])
-        if rows[0] < at < rows[-1] or is_wide or known[at] >= max(3, width / 2):
-            wrong = [repr(cell) for cell in row if not _NUMBER.fullmatch(cell)] or [f"{len(row)} of {width} values"]
-            expected = f"expected numbers with a decimal {'point' if mark == '.' else 'comma'}"
-            raise InputError(f"line {at + 1}: found {wrong[0]} among numbers ({lines[at][:60]!r}): {expected}")
-    for at, line in enumerate(lines):
-        lines[at] = _LENGTH.sub(lambda found: found[0].replace(mark, "."), line)
+        is_row = known[at] >= max(3, width / 2) or (separator != " " and known[at] and len(row) == width)
+        is_row = is_row or rows[0] < at < rows[-1] or (known[at] and at > rows[-1])
+        if is_row:
+            wrong = next((repr(cell) for cell in row if not _NUMBER.fullmatch(cell)), f"{len(row)} of {width} values")
+            raise InputError(f"line {at + 1}: found {wrong} among numbers ({lines[at][:60]!r}): expected numbers only")
+    lengths = [found.strip() for line in lines for found in _LENGTH.findall(line)]
+    mark = decimal_mark([*lengths, *(cell for at in rows for cell in cells[at])], separator)
+    lines = [_LENGTH.sub(lambda found: found[0].replace(mark, "."), line) for line in lines]
     for at in rows:
         lines[at] = " ".join([_MISSING.get(cell.lower(), cell) for cell in cells[at]]).replace(mark, ".")
-    return Table(lines, rows)
+    return lines, rows
+
+
+def numbers(lines: Sequence[str], rows: Sequence[int]) -> np.ndarray:
+    """Return the rows of numbers as a matrix."""
+    return np.loadtxt([lines[at] for at in rows], ndmin=2)
 
 
 def _units_in_comments(line: str, at: int) -> str | None:
     """Return comments that state the units of a heading, as Gwyddion writes them; None for any other line."""
     bare = line.replace('"', "")
-    cells = [name_and_unit(cell) for cell in _HEADING.findall(bare)]
-    if _HEADING.sub("", bare).strip(" ;,\t") or not all(is_quantity(f"1 {unit}", "m") for _, unit in cells):
+    names, units = [name.lower() for name, _ in _HEADING.findall(bare)], [unit for _, unit in _HEADING.findall(bare)]
+    if _HEADING.sub("", bare).strip() or not all(is_quantity(f"1 {unit}", "m") for unit in units):
         return None
-    names, units = [name.lower() for name, _ in cells], [unit for _, unit in cells]
     if len(names) == 1:
         return f"# Value units: {units[0]}"
     if len(names) == 3 and names[:2] == ["x", "y"] and units[0] == units[1]:
@@ -116,66 +114,139 @@ def _cells(line: str, separator: str) -> list[str]:
     return list(map(str.strip, cells))
 
 
-def read_numbers(text: str, format: str) -> ScanFile:
+def read_numbers(text: str) -> ScanFile:
     """Read points x, y, z, one on each line, in any order; or a matrix.
 
-    Parameters
-    ----------
-    text : str
-        Content of the file.
-    format : str
-        ``"xyz"`` for points; ``"asc"`` for a matrix; any other for either. Three numbers on each line are points if the
-        header does not state the size of a matrix.
+    Three numbers on each line are points if the header does not state the size of a matrix.
     """
-    table = read_table(text)
-    text, stated = "\n".join(table.lines) + "\n", dict(_UNITS.findall("\n".join(table.lines)))
-    columns = len(table.lines[table.rows[0]].split()) if table.rows else 0
-    if format != "asc" and columns == 3 and not _MATRIX_SIZE.search(text):
-        points = table.numbers()
-        channel = Channel("points", (len(points),), lambda: points, stated.get("Value"), stated.get("Lateral"))
-        return ScanFile("xyz", [replace(channel, kind="points")])
-    if format == "xyz":
-        raise ValueError("expected three numbers on each line")
+    lines, rows = read_table(text)
+    text = "\n".join(lines) + "\n"
+    if rows and len(lines[rows[0]].split()) == 3 and not _MATRIX_SIZE.search(text):
+        points, stated = numbers(lines, rows), dict(_UNITS.findall(text))
+        units = stated.get("Value"), stated.get("Lateral")
+        return ScanFile("xyz", [Channel("points", lambda: points, *units, kind="points")])
     found = read_with_surface_topography(io.StringIO(text), "asc")
     complaints: list[str] = []
-    channels = [_matrix(channel, complaints) for channel in found.channels]
-    return replace(found, format="csv" if format == "csv" else "asc", channels=channels, complaints=complaints)
+    return replace(found, channels=[_matrix(channel, complaints) for channel in found.channels], complaints=complaints)
 
 
 def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     """Return a matrix without index numbers; a channel with few columns is marked as a table."""
     if not channel.is_height:
         return channel
-    columns, rows = channel.shape
-    if channel.spacing is None and columns < _COLUMNS and rows > _TALL * columns:
-        return replace(channel, kind=f"a table of {columns} columns")
     z = channel.load().T  # as in the file
+    if channel.spacing is None and z.shape[1] < _COLUMNS and len(z) > _TALL * z.shape[1]:
+        return replace(channel, kind=f"a table of {z.shape[1]} columns")
     row, column = _step(z[0, 1:], z[1:, 1:]), _step(z[1:, 0], z[1:, 1:].T)
-    if abs(z[0, 0]) > 0 and not (row and column):  # the corner belongs to the index that it continues
-        row, column = row and _step(z[0], z[1:]), column and _step(z[:, 0], z[:, 1:].T)
-    if row is None and column is None:
+    if not (row and column):  # the corner belongs to the index that it continues
+        row, column = _step(z[0], z[1:]), _step(z[:, 0], z[:, 1:].T)
+    if not (row or column):
         return replace(channel, load=lambda: z.T)
     z = z[int(row is not None) :, int(column is not None) :]
     z = z[:: -1 if (column or 0) < 0 else 1, :: -1 if (row or 0) < 0 else 1]
-    removed = " and ".join(name for name, step in (("row", row), ("column", column)) if step is not None)
+    removed = " and ".join(name for name, step in (("row", row), ("column", column)) if step)
     spacing, taken = channel.spacing, "an index"
     if row and column and not row == column == 1.0:
         spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
     complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
-    return replace(channel, shape=z.T.shape, load=lambda: z.T, spacing=spacing)
+    return replace(channel, load=lambda: z.T, spacing=spacing)
 
 
 def _step(line: np.ndarray, others: np.ndarray) -> float | None:
     """Return the step of a line in equal steps if most of its neighbours are not in equal steps; None otherwise."""
-
-    def uneven(lines: np.ndarray) -> np.ndarray:
-        steps = np.diff(lines)
-        mean = np.nanmean(steps, axis=1)
-        return (mean == 0) | (np.nanmax(np.abs(steps - mean[:, None]), axis=1) > _EQUAL * np.abs(mean))
-
-    counted = others[np.isfinite(np.diff(others)).sum(axis=1) >= _FEWEST - 1]
-    if line.size < _FEWEST or not np.isfinite(line).all() or not len(counted):
+    if line.size < _FEWEST or not np.isfinite(line).all():
         return None
-    if uneven(line[None])[0] or uneven(counted).mean() < 0.5:
+    steps = np.diff(np.vstack([line, others]))
+    mean = np.nanmean(steps, axis=1)
+    is_even = (mean != 0) & (np.nanmax(np.abs(steps - mean[:, None]), axis=1) <= _EQUAL * np.abs(mean))
+    is_long = np.isfinite(steps).sum(axis=1) >= _FEWEST - 1
+    counted = is_even[1:][is_long[1:]]
+    if not (is_even[0] and counted.size) or counted.mean() > 0.5:
         return None
     return float(f"{(line[-1] - line[0]) / (line.size - 1):.12g}")
+
+
+def read_zygo(text: str) -> ScanFile:
+    """Read Zygo XYZ or Zygo ASCII.
+
+    Zygo XYZ states column, row and height in micrometres of each point, or "No Data". Zygo ASCII states intensities,
+    then the phases of each row, in counts of a wave.
+    """
+    header, *sections = re.split(r"^#\s*$", text, flags=re.MULTILINE)
+    lines = header.splitlines()
+    x0, y0, columns, rows = (int(word) for word in lines[3].split()[:4])
+    _, scale, wavelength, _, obliquity, _, side, *_ = (float(word) for word in lines[7].split())
+    if "XYZ" in lines[0].upper():
+        cells = [line.split() for line in sections[0].splitlines() if line.strip()]
+        known = np.array([cell for cell in cells if "No" not in cell], dtype=float)
+        unit, heights = "um", np.full((columns, rows), np.nan)
+        heights[known[:, 0].astype(int) - x0, known[:, 1].astype(int) - y0] = known[:, 2]
+    else:
+        wave = scale * wavelength * obliquity
+        phases = [np.array(section.split(), dtype=float) for section in sections]
+        (counts,) = [phase for phase in phases if phase.size == columns * rows][-1:]
+        heights = np.where(counts < _MISSING_COUNT, counts * (wave / _COUNTS[int(lines[10].split()[0])]), np.nan)
+        unit, heights = "m", heights.reshape(rows, columns).T
+    return single_map("zygo", heights, unit, "m", (side, side) if side > 0 else None)
+
+
+def read_wyko(text: str) -> ScanFile:
+    """Read Wyko ASCII: each line of the file is one column of the map, from the bottom up.
+
+    Heights are in nanometres, or in waves if the second flag of the first line is 0. ``Pixel_size`` is the spacing
+    along x in millimetres, and ``Aspect`` the spacing along y over it.
+    """
+    header, _, data = text.partition("RAW_DATA")
+    lines = header.splitlines()
+    stated = {line.split()[0]: line.split()[-1] for line in reversed(lines[1:]) if line.strip()}
+    columns, rows = int(stated["X"]), int(stated["Y"])  # X Size and Y Size
+    words = data.split("\n", 1)[1].split()[: columns * rows]
+    heights = np.array(["nan" if word.lower() == "bad" else word for word in words], dtype=float)
+    heights = heights.reshape(columns, rows)
+    if lines[0].split()[-2] == "0":
+        heights = heights * (float(stated["Wavelength"]) / float(stated["Mult"]))
+    side = float(stated["Pixel_size"])
+    return single_map("wyko", heights, "nm", "mm", (side, float(stated.get("Aspect", 1)) * side))
+
+
+def read_esri(text: str) -> ScanFile:
+    """Read an ESRI ASCII grid: size of the cells and number of missing points in the header, first row on top."""
+    found = re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
+    header = {key.lower(): float(value) for key, value in found}
+    data = np.array(text.split()[2 * len(header) :], dtype=float).reshape(int(header["nrows"]), int(header["ncols"]))
+    heights = np.where(data == header.get("nodata_value", np.nan), np.nan, data).T
+    side = header.get("cellsize", np.nan)
+    return single_map("esri", heights, None, None, (header.get("dx", side), header.get("dy", side)))
+
+
+def read_keyence(text: str) -> ScanFile:
+    """Read the CSV of a Keyence microscope: unit and spacing from its heading, blank cells are missing points."""
+    lines, rows = read_table(text)
+    heights = numbers(lines, rows).T
+    heading = text.splitlines()[: rows[0]]
+    stated = {row[0]: row[1:] for row in csv.reader(heading, delimiter=max(";,", key="".join(heading).count)) if row}
+    columns, count = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
+    if heights.shape != (columns, count):
+        raise InputError(f"found {heights.shape[0]} x {heights.shape[1]} numbers: expected {columns} x {count}")
+    shown, (side, lateral, *_) = stated.get("Output image data", ["Height"])[0], stated["XY Calibration"]
+    kind = "height" if shown == "Height" else "no areal height"
+    sides = (float(side.replace(",", ".")),) * 2
+    return ScanFile("keyence", [Channel(shown, lambda: heights, stated["Unit"][0], lateral, sides, kind=kind)])
+
+
+#: Pattern of the beginning of a text -> its reader.
+_TEXTS = {
+    r"\W*Zygo (XYZ|ASCII) Data File": read_zygo,
+    r"\W*Wyko ASCII Data File": read_wyko,
+    r"\W*ncols": read_esri,
+    r"(?s:.{,4000})XY Calibration": read_keyence,
+}
+
+
+def read_text_file(path: Path) -> ScanFile:
+    """Read a text file: in the format of an instrument maker, points, or a matrix."""
+    text = read_text(path)
+    for pattern, read in _TEXTS.items():
+        if re.match(pattern, text, re.IGNORECASE):
+            return read(text)
+    return read_numbers(text)

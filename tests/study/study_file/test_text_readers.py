@@ -29,7 +29,7 @@ POINTS = [(f"{0.5 * i:.2f}", f"{1.5 * j:.2f}", z) for j, line in enumerate(HEIGH
 SCAN = 1e-6 * np.array(HEIGHTS, float).T  # [m]
 #: suffix, rows, and what the file does not state
 READERS = [(suffix, HEIGHTS, {"unit": "um", "spacing": 1e-6}) for suffix in ("csv", "txt", "asc", "dat")]
-READERS += [(suffix, POINTS, {"unit": "mm", "height_unit": "um"}) for suffix in ("csv", "txt", "xyz")]
+READERS += [(suffix, POINTS, {"unit": "mm", "height_scale": 1e-3}) for suffix in ("csv", "txt", "xyz")]
 
 
 @pytest.mark.parametrize(("suffix", "rows", "options"), READERS)

@@ -1,4 +1,4 @@
-"""Formats that libraries parse: x3pio, sdfio, NumPy, netCDF and SurfaceTopography.
+"""Binary formats, and all formats that SurfaceTopography reads.
 
 x3pio and sdfio return rows along y, ascending, so ``height(x, y)`` is the transpose. SurfaceTopography returns
 ``(x, y)``.
@@ -6,6 +6,8 @@ x3pio and sdfio return rows along y, ascending, so ``height(x, y)`` is the trans
 
 from __future__ import annotations
 
+import struct
+import zlib
 from functools import partial
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -16,12 +18,16 @@ import xarray as xr
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from roughvisc.errors import InputError
-from roughvisc.topography.formats.scan_file import Channel, ScanFile
-from roughvisc.topography.grid import in_metres
+from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
 from roughvisc.units import is_quantity, number
 
 #: Names of heights in netCDF, in order of preference.
 _NAMES = ("height", "heights", "z", "h")
+#: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
+_TRUEMAP = b"Binary TrueMap Data File v2.0"
+_DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
+#: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
+_HEADER, _SIZES = 512, 334
 
 
 def read_x3p(path: Path) -> ScanFile:
@@ -34,18 +40,15 @@ def read_x3p(path: Path) -> ScanFile:
     except x3pio.X3pChecksumError as error:
         complaints.append(f"its checksum is wrong ({error}): it was changed or damaged after it was written")
         content = x3pio.read(path, verify=False)
-    channels = []
+    channels, sides = [], (content.header.x.increment, content.header.y.increment)
     for i, layer in enumerate(content.layers):
-        heights, kind, sides = layer.z.T, "height", (content.header.x.increment, content.header.y.increment)
+        heights, kind = layer.z.T, "height"
         if content.feature_type == x3pio.FeatureType.POINT_CLOUD:
-            heights, kind, sides = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3), "points", None
+            heights, kind = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3), "points"
         elif heights.ndim < 2 or not layer.is_regular_grid:
             kind = "a profile, or a map on absolute axes"
-        load = partial(np.array, heights, float)
-        channels.append(Channel(f"layer {i}", layer.z.shape[::-1], load, "m", "m", sides, kind=kind))
-    maker = content.metadata.instrument if content.metadata else None
-    instrument = " ".join(filter(None, (maker.manufacturer, maker.model))) if maker else ""
-    return ScanFile("x3p", channels, 0, instrument, complaints)
+        channels.append(Channel(f"layer {i}", partial(np.array, heights, float), "m", "m", sides, kind=kind))
+    return ScanFile("x3p", channels, complaints=complaints)
 
 
 def read_sdf(path: Path) -> ScanFile:
@@ -53,17 +56,14 @@ def read_sdf(path: Path) -> ScanFile:
     import sdfio
 
     content = sdfio.read(path)
-    heights, sides = content.data.T, (content.header.x_scale, content.header.y_scale)
-    channel = Channel("height", heights.shape, lambda: heights, "m", "m", sides)
-    return ScanFile("sdf", [channel], instrument=content.header.manufacturer_id.strip())
+    return single_map("sdf", content.data.T, "m", "m", (content.header.x_scale, content.header.y_scale))
 
 
 def read_npy(path: Path) -> ScanFile:
     """Read a NumPy array with rows along x."""
     heights = np.load(path, mmap_mode="r", allow_pickle=False)  # mapped: a forged shape fails before it is allocated
     kind = "height" if heights.ndim == 2 and heights.dtype.kind in "fiu" else "no areal height"
-    load = partial(np.array, heights.T, float, order="C")
-    return ScanFile("npy", [Channel("array", heights.shape[::-1], load, kind=kind)])
+    return ScanFile("npy", [Channel("array", partial(np.array, heights.T, float, order="C"), kind=kind)])
 
 
 def read_netcdf(path: Path) -> ScanFile:
@@ -72,24 +72,52 @@ def read_netcdf(path: Path) -> ScanFile:
         options: dict[str, Any] = {"engine": "scipy" if stream.read(3) == b"CDF" else "netcdf4", "decode_times": False}
     # netCDF-4 is not thread-safe, and xarray would lock only the reading
     with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
-        found = [_variable(name, one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
-    return ScanFile("nc", sorted(found, key=lambda one: _NAMES.index(one.name) if one.name in _NAMES else len(_NAMES)))
+        found = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
+    return ScanFile("nc", sorted(found, key=lambda one: (*_NAMES, one.name).index(one.name)))
 
 
-def _variable(name: Any, variable: xr.DataArray) -> Channel:
+def _variable(name: str, variable: xr.DataArray) -> Channel:
     """Return a variable as a channel, with its heights loaded."""
     unit = variable.attrs.get("units")
     is_grid = set(variable.dims) == {"x", "y"} and variable.dtype.kind in "fiu"
     if not is_grid or (unit is not None and not is_quantity(f"1 {unit}", "m")):
-        return Channel(str(name), variable.shape, lambda: None, unit, kind="no areal height")
-    heights, positions, lateral = variable.transpose("x", "y").astype(float).load(), None, None
-    if {"x", "y"} <= set(heights.coords):
-        units = [heights[axis].attrs.get("units") for axis in "xy"]
-        if (units[0] is None) != (units[1] is None):
-            raise InputError(f"its coordinates x and y have the units {units[0]!r} and {units[1]!r}: expected both")
-        lateral = None if units[0] is None else "m"
-        positions = (in_metres(heights["x"], "x"), in_metres(heights["y"], "y"))
-    return Channel(str(name), heights.shape, lambda: heights, unit, lateral, positions=positions)
+        return Channel(name, lambda: None, unit, kind="no areal height")
+    heights = variable.transpose("x", "y").astype(float).load()
+    if not {"x", "y"} <= set(heights.coords):
+        return Channel(name, lambda: heights, unit)
+    lateral, other = (heights[axis].attrs.get("units") for axis in ("x", "y"))
+    if lateral != other:
+        raise InputError(f"its coordinates x and y have the units {lateral!r} and {other!r}: expected one unit")
+    return Channel(name, lambda: heights, unit, lateral, positions=(heights["x"].values, heights["y"].values))
+
+
+def read_truemap(path: Path) -> ScanFile:
+    """Read a TrueMap or GelSight file of version 2: a comment, then the grid in millimetres, top line first."""
+    content = path.read_bytes()
+    if not content.startswith(_TRUEMAP):
+        raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
+    at = content.index(b"\0", content.index(b"\0") + 1) + 1
+    columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
+    heights = np.frombuffer(content, "<f4", columns * rows, at + 24).reshape(rows, columns).T.astype(float)
+    return single_map("tmd", heights, "mm", "mm", (width / columns, height / rows))
+
+
+def read_digital_surf(path: Path) -> ScanFile:
+    """Read a Digital Surf file, compressed or not; SurfaceTopography reads the expanded heights.
+
+    A compressed file holds, after the comment and the private zone: the number of streams, the raw and the compressed
+    size of each stream, and the zlib streams.
+    """
+    content = path.read_bytes()
+    if not content.startswith(_COMPRESSED):
+        return read_with_surface_topography(path, "sur")
+    begin = _HEADER + sum(struct.unpack_from("<2H", content, _SIZES))
+    (count,) = struct.unpack_from("<I", content, begin)
+    expanded, at = _DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin], begin + 4 + 8 * count
+    for raw, packed in struct.iter_unpack("<2I", content[begin + 4 : at]):
+        expanded += zlib.decompressobj().decompress(content[at : at + packed], raw)
+        at += packed
+    return read_with_surface_topography(BytesIO(expanded), "sur")
 
 
 def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str) -> ScanFile:
@@ -99,11 +127,8 @@ def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str)
     if format not in lookup_reader_by_format:
         raise InputError(key="format", found=format, expected="a key of supported_formats")
     reader = lookup_reader_by_format[format](str(source) if isinstance(source, Path) else source)
-    channels = [_channel(found) for found in reader.channels]
-    described = reader.channels[0].info.get("instrument") if channels else None
-    instrument = described.get("name") if isinstance(described, dict) else None
     default = getattr(reader, "_default_channel_index", None)
-    return ScanFile(format, channels, default, str(instrument or ""), close=reader.close)
+    return ScanFile(format, [_channel(found) for found in reader.channels], default, close=reader.close)
 
 
 def _channel(found: Any) -> Channel:
@@ -119,7 +144,7 @@ def _channel(found: Any) -> Channel:
     units = [unit for unit in (found.unit, found.data_unit) if unit is not None]
     is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
     if not (found.is_height_channel and found.dim == 2 and is_length and found.is_uniform is not False):
-        return Channel(str(found.channel_id), shape, load, kind="no areal height on a uniform grid")
+        return Channel(str(found.channel_id), load, kind="no areal height on a uniform grid")
     lateral, sides = found.unit, None
     if sizes is not None:
         sides = (float(sizes[0]) / shape[0], float(sizes[1]) / shape[1])
@@ -128,4 +153,4 @@ def _channel(found: Any) -> Channel:
             lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
             if lateral is not None and other != lateral:
                 sides = (sides[0], sides[1] * number(f"1 {other}", lateral))
-    return Channel(str(found.channel_id), shape, load, found.unit, lateral, sides)
+    return Channel(str(found.channel_id), load, found.unit, lateral, sides)
