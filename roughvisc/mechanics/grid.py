@@ -11,6 +11,7 @@ Displacements are per unit contact compliance ``C = 1/E*``. Fields are arrays of
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -112,7 +113,7 @@ class Grid:
     cell_area : float
         Area of a cell. [m2]
     symbol : array
-        Transform of the kernel at non-negative wave numbers. [m]
+        Transform of the kernel, in the order of the transforms. [m]
     definite : bool
         Whether a uniform pressure displaces the surface.
     stiffest : float
@@ -150,25 +151,21 @@ class Grid:
             fast = scipy.fft.next_fast_len
             self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
         if symbol is None and boundary == "free":
-            symbol = free_space_symbol(kernel, self.points, spacing)
-        elif symbol is None:  # without the shortest waves of a mirrored surface, which are zero at the cells
-            symbol = np.ascontiguousarray(periodic_symbol(kernel, self.period, spacing)[: shape[0], : shape[1]])
+            symbol = self._of_all_waves(free_space_symbol(kernel, self.points, spacing), self.points[0])
+        elif symbol is None:
+            symbol = self._of_all_waves(periodic_symbol(kernel, self.period, spacing), shape[0])
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.stiffest = float(self.symbol.max()) or spacing[0]
-        if boundary == "mirror":
-            self.self_influence = float(self.symbol.mean())
-        else:
-            shares = []  # number of waves of each non-negative wave number, over the number of points
-            for points in self.points:
-                number = np.arange(points // 2 + 1)
-                shares.append(xp.asarray(np.where((number == 0) | (2 * number == points), 1.0, 2.0)) / points)
-            self.self_influence = float((shares[0][:, None] * self.symbol * shares[1]).sum())
+        number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
+        twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
+        self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
         self.convolutions, self.threads = 0, threads_of(self.size) if xp is np else 1
         self._transforms = transforms(self.threads, xp)
         #: Whether a convolution is one call of :meth:`CupyTransforms.convolved`.
         self._on_device = boundary == "periodic" and xp is not np
-        self._acting = self._of_all_waves(self.symbol) if self._on_device else self.symbol
+        self._divisor = self.size if self._on_device and not self._transforms.normalise else 1
+        self._acting = self.symbol if self._divisor == 1 else self.symbol / self._divisor
         self._memories: dict[Any, Array] = {}
 
     # ----------------------------------------------------------------------------------------- other grids and kernels
@@ -191,12 +188,17 @@ class Grid:
         return (rows[:, None] * self.coarse.shape[1] + columns).astype(np.int32).reshape(-1)
 
     def symbol_of(self, kernel: Kernel) -> np.ndarray:
-        """Return the transform of a kernel of either sign at non-negative wave numbers. [m]"""
+        """Return the transform of a kernel of either sign. [m]"""
         if self.boundary == "free":
-            return free_space_symbol(kernel, self.points, self.spacing)
-        waves = periodic_waves(self.period, self.spacing)
-        symbol = np.asarray(kernel.transfer(*waves), dtype=float)
-        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
+            return self._of_all_waves(free_space_symbol(kernel, self.points, self.spacing), self.points[0])
+        symbol = np.asarray(kernel.transfer(*periodic_waves(self.period, self.spacing)), dtype=float)
+        return self._of_all_waves(symbol, self.shape[0])
+
+    def _of_all_waves(self, symbol: np.ndarray, count: int) -> np.ndarray:
+        """Return a symbol at all `count` wave numbers along x, from the non-negative ones."""
+        if self.boundary == "mirror":  # without the shortest waves, which are zero at the cells
+            return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
+        return np.concatenate([symbol, symbol[count - len(symbol) : 0 : -1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
 
@@ -227,15 +229,10 @@ class Grid:
     def _inverse_symbol(self) -> Array:
         symbol = self.symbol.copy()
         if self.boundary == "free":
-            symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
+            periodic = periodic_symbol(self.kernel, self.shape, self.spacing)
+            symbol = self.xp.asarray(self._of_all_waves(periodic, self.shape[0]))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-        return (self._of_all_waves(1 / symbol) if self._on_device else 1 / symbol).astype(np.float32)
-
-    def _of_all_waves(self, symbol: Array) -> Array:
-        """Return a symbol for :meth:`Transforms.convolved`."""
-        count, first = self.shape[0], len(symbol)
-        symbol = self.xp.concatenate([symbol, symbol[count - first : 0 : -1]])
-        return symbol if self._transforms.normalise else symbol / self.size
+        return (1 / symbol / self._divisor).astype(np.float32)
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
         """Return the convolution of a field with a symbol on a number of points."""
@@ -246,7 +243,7 @@ class Grid:
             return fft.convolved(field, symbol)
         if points == self.shape and self.size < THREADED_FROM:
             spectrum = fft.waves(field)
-            self.multiply(spectrum, symbol)
+            spectrum *= symbol
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
         (nx, ny), count, fft = self.shape, points[1] // 2 + 1, transforms(1, self.xp)
@@ -263,7 +260,7 @@ class Grid:
             waves = self._memory((points[0], columns), spectrum.dtype)[:, : part.stop - part.start]
             waves[:nx], waves[nx:] = spectrum[:, part], 0
             waves = fft.columns(waves)
-            self.multiply(waves, symbol[:, part])
+            waves *= symbol[:, part]
             spectrum[:, part] = fft.columns(waves, back=True)[:nx]
 
         def rows_back(part: slice) -> None:
@@ -301,13 +298,6 @@ class Grid:
             return self._transforms.cosines_back(spectrum)
         found = self._transforms.waves_back(spectrum, self.points)
         return self.xp.ascontiguousarray(found[: self.shape[0], : self.shape[1]])
-
-    def multiply(self, spectrum: Array, symbol: Array) -> None:
-        """Multiply a transform in place by a symbol, which is the same for negative wave numbers along x."""
-        count, first = spectrum.shape[-2], len(symbol)
-        spectrum[..., :first, :] *= symbol
-        if count > first:
-            spectrum[..., first:, :] *= symbol[count - first : 0 : -1]
 
     def turn(self, cells: int, axis: int) -> Array:
         """Return the factors of the transform of a periodic field for a shift of the field back by `cells`."""

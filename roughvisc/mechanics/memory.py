@@ -321,8 +321,7 @@ class LayerMemory(Memory):
 
     def response(self, field: Array, number: int, part: float = 1.0) -> Array:
         """Return the product of a transform and a symbol, times a part."""
-        product = field.copy()
-        self.grid.multiply(product, self.weights[number])
+        product = field * self.weights[number]
         return product if part == 1 else part * product
 
     def on_cells(self, total: Array) -> Array:
