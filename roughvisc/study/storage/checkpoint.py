@@ -95,23 +95,23 @@ class CheckpointWriter(Recorder):
     def resume(self) -> None:
         """Continue from the checkpoint if it is undamaged, otherwise from the start."""
         path = self._folder / STATE
-        if path.exists():
-            try:
-                plain = _read(path)
-                ends = plain["ends"]
-                rows = []
-                for number, end in enumerate(ends[1:]):
-                    rows += _read(self._rows_path(number))[: end - len(rows)]
-                if len(rows) != ends[-1]:
-                    raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
-                self.latest = self._saved = plain["reached"]
-                count = self.latest.rows  # rows after the state are computed again
-                self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
-                log.info("%s: goes on from here", path)
-                return
-            except _DAMAGED as error:
-                log.warning("%s: is damaged and not used: %s", path, error)
-        self.restart()
+        if not path.exists():
+            return  # rows without a state are overwritten
+        try:
+            plain = _read(path)
+            ends = plain["ends"]
+            rows = []
+            for number, end in enumerate(ends[1:]):
+                rows += _read(self._rows_path(number))[: end - len(rows)]
+            if len(rows) != ends[-1]:
+                raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
+            self.latest = self._saved = plain["reached"]
+            count = self.latest.rows  # rows after the state are computed again
+            self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
+            log.info("%s: goes on from here", path)
+        except _DAMAGED as error:
+            log.warning("%s: is damaged and not used: %s", path, error)
+            self.restart()
 
     def update(self, reached: Checkpoint) -> None:
         """Record an accepted step, and write a checkpoint if one is due.

@@ -221,12 +221,17 @@ def test_damage__costs_work_and_no_bit_of_the_result(whole, tmp_path, caplog, da
     assert stop.asked == steps, "from the start"
 
 
-def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path):
+@pytest.mark.parametrize("state", ["kept", "lost"])
+def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path, state):
     case, expected, steps = whole(MODES)
     unfinished = stopped(case, tmp_path, steps // 2, checkpoint_seconds=0)
     number = len(list(unfinished.glob("rows-*")))
     shutil.copy(unfinished / "rows-0000.npz", unfinished / f"rows-{number:04d}.npz")
     (unfinished / ".rows-0009.0f0f0f0f.part.npz").write_bytes(b"torn off while it was written")
+    if state == "lost":  # the run begins anew, is stopped, and finds rows of both runs
+        (unfinished / "state.npz").unlink()
+        (unfinished / "rows-0000.npz").write_bytes((unfinished / "rows-0001.npz").read_bytes())
+        stopped(case, tmp_path, 3, checkpoint_seconds=0)
     assert values(run_case(case, tmp_path)) == expected
 
 
