@@ -349,8 +349,8 @@ def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
             found.append((_digest(split(face, "second", "missing", "flip", "offset", *STEPS)[1]), ""))
             continue
         path = Path(face["file"])
-        card = split(read_card(path)[1], "file")[1] if is_card(path, face.get("format")) else {}
-        scan = measured_file(path, face.get("format"))
+        card = split(read_card(path)[1], "file")[1] if is_card(path) else {}
+        scan = measured_file(path)
         try:
             found.append((_digest(card) if scan is None else sha256(scan), _digest(card) if card else ""))
         except OSError as error:

@@ -171,15 +171,14 @@ def cell_side(centres: Any, name: str = "the coordinate") -> float:
     (2.0, 2.0)
     """
     at = np.asarray(centres)
-    if at.dtype.kind not in "fiu" or at.ndim != 1 or not at.size or not np.isfinite(at).all():
-        raise InputError(f"{name} has {at.size} point(s) of {at.dtype}: expected finite numbers")
-    if at.size == 1 and at[0] > 0:
-        return 2 * float(at[0])
-    d = float(at[-1] - at[0]) / max(at.size - 1, 1)
-    if not d > 0 or (np.abs(np.diff(at) - d) > 1e-4 * d).any():
-        found = f"{at.size} centres from {at[0]:.6g} to {at[-1]:.6g} m, not in equal, ascending steps"
-        raise InputError(f"{name} has {found}: expected a uniform, ascending grid, or half the side of a single cell")
-    return float(f"{d:.15g}")
+    if at.dtype.kind in "fiu" and at.ndim == 1 and at.size and np.isfinite(at).all():
+        if at.size == 1 and at[0] > 0:
+            return 2 * float(at[0])
+        d = float(at[-1] - at[0]) / max(at.size - 1, 1)
+        if d > 0 and (np.abs(np.diff(at) - d) <= 1e-4 * d).all():
+            return float(f"{d:.15g}")
+    found = f"{at.size} centres of {at.dtype}, like {at[:3]}, not finite and in equal, ascending steps"
+    raise InputError(f"{name} has {found}: expected a uniform, ascending grid, or half the side of a single cell")
 
 
 def cell_edges(centres: Any) -> np.ndarray:
@@ -199,11 +198,11 @@ def cell_edges(centres: Any) -> np.ndarray:
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
     """Return the grid with one more line in its history and with further attributes; None removes an attribute."""
-    history = h.attrs.get("history")
+    history = "\n".join(filter(None, (h.attrs.get("history"), line)))
     h = h.copy(deep=False)
     if "filled" in h.coords:
         attrs["filled_points"] = int(h["filled"].sum())
-    stated = {**h.attrs, **attrs, "history": f"{history}\n{line}" if history else line}
+    stated = {**h.attrs, **attrs, "history": history}
     h.attrs = {name: value for name, value in stated.items() if value is not None}
     return h
 
@@ -238,9 +237,7 @@ def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     both = _both(value)
     whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
     if not whole or both[0] * both[1] > MOST_CELLS:
-        expected = (
-            f"a whole number of cells of at least {low}, or a pair of them, at most {MOST_CELLS:.3g} cells in all"
-        )
+        expected = f"one or two whole numbers of cells of at least {low}, at most {MOST_CELLS:.3g} cells in all"
         raise InputError(key=name, found=value, expected=expected)
     return int(both[0]), int(both[1])
 

@@ -20,11 +20,10 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
-from roughvisc.topography.formats import open_file, orientation, top_line_first
+from roughvisc.topography.formats import TOP_FIRST, open_file, orientation
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
-from roughvisc.topography.grid import checked, in_metres, labelled, noted, pair, with_coordinates
+from roughvisc.topography.grid import MOST_CELLS, checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.topography.points import laid_out
 from roughvisc.units import Quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
@@ -39,30 +38,30 @@ FARTHEST = 1e3
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
 _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
 _READER = threading.RLock()
+#: Largest distance of a point from its lattice, in steps, and deviation of the axes of the lattice from x and y [rad].
+_OFF = 0.01
+#: Largest gap within a lattice line, in gaps between lines; and largest number of lattice nodes per point.
+_WITHIN, _SPARSE = 0.1, 64
 
 
-def read_file(path: Path, format: str | None, given: Mapping[str, Any]) -> xr.DataArray:
+def read_file(path: Path, given: Mapping[str, Any]) -> xr.DataArray:
     """Read one channel of an instrument or grid file.
 
     Parameters
     ----------
     path : Path
         The file.
-    format : str or None
-        As for :func:`roughvisc.open_scan`.
     given : mapping
-        Further options of :func:`roughvisc.open_scan` that the user gives.
+        Options of :func:`roughvisc.open_scan` that the user gives.
     """
-    if "spacing" in given:
-        given = {**given, "spacing": pair("spacing", given["spacing"])}
-    with _reading(path), closing(open_file(path, format)) as file:
+    with _reading(path), closing(open_file(path, given.get("format"))) as file:
         channel = _chosen(file, given.get("channel"))
         h = _labelled(file, channel, given)
     for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
     attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": channel.name}
     attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not channel) or None
-    stated = "".join(f", {key} {value} as given" for key, value in given.items() if key != "channel")
+    stated = "".join(f", {key} {value} as given" for key, value in given.items() if key not in attrs)
     line = f"read {path.name} ({file.format}), channel {channel.name!r}{stated}"
     return noted(h, line, orientation=orientation(file.format), **attrs)
 
@@ -70,7 +69,8 @@ def read_file(path: Path, format: str | None, given: Mapping[str, Any]) -> xr.Da
 def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.DataArray:
     """Return the heights of a channel over x and y; refuse implausible ones. [m]"""
     xy, z = _metres(channel, given)
-    spacing, grid, no_data = (given.get(key) for key in ("spacing", "grid", "no_data"))
+    grid, no_data = given.get("grid"), given.get("no_data")
+    spacing = pair("spacing", given["spacing"]) if "spacing" in given else None
     if grid is not None and (channel.kind != "points" or spacing is not None):
         raise InputError(key="grid", found=grid, expected="none for a map, or with a spacing")
     raw, sides = channel.load(), channel.spacing
@@ -82,7 +82,7 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     else:
         values = _without_no_data(values, no_data, file.complaints)
     values = values * z * given.get("height_scale", 1.0)
-    if top_line_first(file.format):
+    if file.format in TOP_FIRST:
         values = values[:, ::-1]
     if channel.positions is None or spacing is not None:
         h = labelled(values, spacing or tuple(float(f"{d * xy:.15g}") for d in sides))
@@ -91,15 +91,13 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
         h = h.assign_coords({name: (("x", "y"), one.values) for name, one in raw.coords.items() if one.ndim == 2})
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
-    h = checked(h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]}), "grid", 1)
-    if min(h.shape) < 2:
-        raise InputError(f"it holds {h.shape[0]} x {h.shape[1]} points, a profile: expected an areal scan")
+    h = h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]})
+    h = checked(h, "an areal scan")
     for axis, d, n in zip(("x", "y"), cell_sides(h), h.shape, strict=True):
         if n * d > WIDEST or d < FINEST:
-            limits = f"which is not plausible (at most {WIDEST:g} m, at least {FINEST:g} m)"
+            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible"
             expected = "another unit or spacing, and height_scale if its heights are in another unit too"
-            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m"
-            raise InputError(f"{found}, {limits}: expected {expected}")
+            raise InputError(f"{found} (at most {WIDEST:g} m, at least {FINEST:g} m): expected {expected}")
     finite(h, HIGHEST)
     return h
 
@@ -108,17 +106,16 @@ def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
     unit, stated = given.get("unit"), channel.unit
     is_sized = channel.kind == "points" or bool(channel.positions) or all(side > 0 for side in channel.spacing or [0.0])
-    needs = {
-        "unit": stated is None or (is_sized and channel.lateral_unit is None and "spacing" not in given),
-        "spacing": not is_sized,
-    }
-    examples = {"unit": 'unit = "um"', "spacing": 'spacing = "1 um"'}
-    if lacking := [key for key, is_needed in needs.items() if is_needed and key not in given]:
-        expected = f"{' and '.join(examples[key] for key in lacking)}, or another"
-        raise InputError(
-            f"it states no {' and no '.join(lacking)}: expected {expected}", key=lacking[0], expected=expected
-        )
-    if unit is not None and not needs["unit"]:
+    needs_unit = stated is None or (is_sized and channel.lateral_unit is None and "spacing" not in given)
+    lacking = {}
+    if needs_unit and unit is None:
+        lacking["unit"] = 'unit = "um"'
+    if not is_sized and "spacing" not in given:
+        lacking["spacing"] = 'spacing = "1 um"'
+    for key in lacking:
+        expected = f"{' and '.join(lacking.values())}, or another"
+        raise InputError(f"it states no {' and no '.join(lacking)}: expected {expected}", key=key, expected=expected)
+    if unit is not None and not needs_unit:
         factor = number(f"1 {unit}", "m", "unit") / number(f"1 {stated}", "m")
         if not math.isclose(factor, 1.0):
             expected = f"the unit of the file, {stated!r}, or height_scale = {factor:.6g} if its heights are in {unit}"
@@ -201,8 +198,8 @@ def existing(path: Any) -> Path:
     path = Path(path)
     regular(path)
     if not path.is_file():
-        found = "this is a folder" if path.is_dir() else "the file does not exist"
-        raise InputError(f"{path}: {found}: expected a scan file or a surface card")
+        found = "a folder" if path.is_dir() else "no file"
+        raise InputError(f"{path}: found {found}: expected a scan file or a surface card")
     return path
 
 
@@ -233,9 +230,103 @@ def finite(h: xr.DataArray, highest: float = FARTHEST) -> None:
         raise InputError(f"all {h.size} points are missing: expected heights")
     beyond = h.values[np.abs(h.values) > (highest if h.size >= _FEWEST else FARTHEST)]
     if beyond.size:
-        limit = f"which is not plausible (at most {highest:g} m from zero)"
+        found = f"{beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} m)"
         expected = "height_scale = 1e-6, or another factor, if they are in another unit than stated; "
         expected += "no_data = the number in the file, or NaN in an array, if it marks missing points"
-        raise InputError(
-            f"{beyond.size} heights are like {beyond[0]:.6g} m, {limit}: expected {expected}", key="heights"
-        )
+        raise InputError(f"{found}: expected {expected}", key="heights")
+
+
+def laid_out(
+    points: np.ndarray, side: float | None, metres: float, complaints: list[str]
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """Return heights over x and y, and the sides of their cells.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height.
+    side : float, optional
+        Side of the cells into which the points are sorted, in the unit of the points; None for their own lattice.
+    metres : float
+        Metres per unit of the points, for messages.
+    complaints : list of str
+        Gains a remark if cells hold no point.
+
+    Raises
+    ------
+    InputError
+        If the points lie on a line, or on no lattice if `side` is None.
+    """
+    spread = np.ptp(points[:, :2], axis=0)
+    if not spread.all():
+        raise InputError("its points lie on one line, a profile: expected an areal scan")
+    if side is not None:
+        heights = gridded(points, side)
+        if empty := int(np.isnan(heights).sum()):
+            complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
+        return heights, (side, side)
+    if (found := lattice(points)) is None:
+        proposed = 2e6 * metres * math.sqrt(spread[0] * spread[1] / len(points))
+        text = f'its {len(points)} points lie on no regular lattice: expected grid = "{proposed:.2g} um", or similar'
+        raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
+    return found
+
+
+def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
+    """Return the heights and steps of the lattice of some points, to a hundredth of a step; None without a lattice.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height, in any order of the points.
+
+    Returns
+    -------
+    heights : ndarray, shape (nx, ny)
+        NaN at nodes without a point.
+    steps : tuple of float
+        Along x and y, in the unit of the points.
+    """
+    at, nodes = points[:, :2], np.empty((len(points), 2))
+    for axis in (0, 1):
+        ordered = np.sort(at[:, axis])
+        gaps = np.diff(ordered)
+        starts = np.append(0, np.flatnonzero(gaps > _WITHIN * gaps.max()) + 1)
+        lines = np.add.reduceat(ordered, starts) / np.diff(np.append(starts, ordered.size))
+        between = np.diff(lines)
+        step = (lines[-1] - lines[0]) / np.round(between / np.median(between)).sum()
+        nodes[:, axis] = np.round((at[:, axis] - lines[0]) / step)
+    centred = np.column_stack([np.ones(len(points)), nodes - nodes.mean(axis=0)])
+    fit = np.linalg.lstsq(centred, at, rcond=None)[0]
+    steps = np.array([fit[1, 0], fit[2, 1]])
+    off = np.vstack([at - centred @ fit, [fit[1, 1], fit[2, 0]]])
+    if (np.abs(off) > _OFF * steps).any():
+        return None
+    i, j = (nodes - nodes.min(axis=0)).astype(int).T
+    shape = (int(i.max()) + 1, int(j.max()) + 1)
+    if shape[0] * shape[1] > _SPARSE * len(points) or np.unique(i * shape[1] + j).size < len(points):
+        return None
+    heights = np.full(shape, np.nan)
+    heights[i, j] = points[:, 2]
+    return heights, (float(f"{steps[0]:.12g}"), float(f"{steps[1]:.12g}"))
+
+
+def gridded(points: np.ndarray, side: float) -> np.ndarray:
+    """Return the mean height of the points in each square cell; cells without a point are missing.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        x, y and height.
+    side : float
+        Side of the cells, in the unit of the points.
+    """
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    shape = np.maximum(np.ceil((high - low) / side - 1e-9), 1)
+    if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
+        raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")
+    nx, ny = shape.astype(int)
+    i, j = np.minimum((points[:, :2] - low) / side, shape - 1).astype(int).T
+    count, total = (np.bincount(i * ny + j, weights, nx * ny) for weights in (None, points[:, 2]))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(nx, ny)

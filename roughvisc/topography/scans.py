@@ -27,14 +27,9 @@ from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.recipes import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, quantities, unit_for
 
+_Path = str | os.PathLike[str]
 #: Keys of a card that do not affect the heights.
 PROVENANCE = ("title", "description", "licence", "source", "instrument")
-#: Beginning of a new card, for the user to complete.
-_BLANK_CARD = """\
-# source = "..."      # where it comes from
-# licence = "..."     # who may use it
-# instrument = "..."
-"""
 #: Suffixes that :func:`save_scan` writes.
 WRITABLE = (".nc", ".x3p", ".sdf")
 #: Keys of a table ``[surface]`` with lengths, and the digits of these.
@@ -43,7 +38,7 @@ _LENGTHS = {"spacing": 15, "grid": 15, "filter": 6, "crop": 6}
 
 @quantities(spacing="m", grid="m > 0", height_scale="1 > 0")
 def open_scan(
-    path: str | os.PathLike[str],
+    path: _Path,
     *,
     format: str | None = None,
     channel: int | str | None = None,
@@ -101,30 +96,27 @@ def open_scan(
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
     """
-    options = {"channel": channel, "unit": unit, "spacing": spacing, "grid": grid}
-    options |= {"no_data": no_data, "height_scale": height_scale}
-    path, given = existing(path), {key: value for key, value in options.items() if value is not None}
-    if not is_card(path, format):
-        return read_file(path, format, given)
+    given = {key: value for key, value in locals().items() if key != "path" and value is not None}
+    path = existing(path)
+    if not is_card(path):
+        return read_file(path, given)
     if given:
         named = ", ".join(f"{key}=" for key in given)
         raise InputError(f"{path}: found {named} together with a surface card: expected it in the card")
     about, table = read_card(path)
     try:
         one_key("the card", table, ("file", "generate"))
-        if "file" in table:
-            found = sha256(existing(table["file"]))
-            stated = about.pop("sha256", found)
-            if stated.lower() != found:
-                expected = f"{found}, that of {Path(table['file']).name}, which was changed or damaged"
-                raise InputError(key="sha256", found=stated, expected=expected)
+        stated, file = about.pop("sha256", None), table.get("file")
+        if stated and file and stated.lower() != (found := sha256(existing(file))):
+            expected = f"{found}, that of {Path(file).name}, which was changed or damaged"
+            raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
         raise error.prefixed(str(path)) from error
     return h.assign_attrs(card=path.name, **about)
 
 
-def save_scan(h: xr.DataArray, path: str | os.PathLike[str]) -> None:
+def save_scan(h: xr.DataArray, path: _Path) -> None:
     """Write heights to a file that :func:`roughvisc.open_scan` can open.
 
     Parameters
@@ -171,17 +163,17 @@ def read_card(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
             raise InputError(f"{path}: {key}: found {value!r}: expected a text", key=key, found=value)
     if "file" in table:
         table["file"] = str(path.parent / table["file"])
-        if is_card(Path(table["file"]), table.get("format")):
+        if is_card(Path(table["file"])):
             raise InputError(f"{path}: file: found a surface card: expected a scan file", key="file")
     return about, table
 
 
-def is_card(path: Path, format: str | None) -> bool:
-    """Return whether a file is a surface card: by its suffix, unless the format is given."""
-    return format == "card" or (format is None and path.suffix.lower() == ".toml")
+def is_card(path: Path) -> bool:
+    """Return whether a file is a surface card, by its suffix."""
+    return path.suffix.lower() == ".toml"
 
 
-def measured_file(path: Path, format: str | None) -> Path | None:
+def measured_file(path: Path) -> Path | None:
     """Return the file with the measured heights: the file named in a surface card, otherwise the file itself.
 
     None for a card with a recipe.
@@ -191,7 +183,7 @@ def measured_file(path: Path, format: str | None) -> Path | None:
     InputError
         If a card cannot be read.
     """
-    if not is_card(path, format):
+    if not is_card(path):
         return path
     named = read_card(path)[1].get("file")
     return None if named is None else Path(named)
@@ -208,9 +200,11 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
     regular(path)
     try:
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:  # no TOML, another encoding, or an integer of thousands of digits
+    except (
+        OSError,
+        ValueError,
+        RecursionError,
+    ) as error:  # for example an integer of thousands of digits
         raise InputError(f"{path}: is not {wanted}: {error}: expected TOML in UTF-8") from error
 
 
@@ -226,7 +220,7 @@ def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
     steps, _ = split(rest, *STEPS)
     if isinstance(steps.get("realisation"), int):
         # with a common seed, the first surrogates of all scans would deviate from their mean in the same direction
-        scan = measured_file(Path(table["file"]), table.get("format")) if "file" in table else None
+        scan = measured_file(Path(table["file"])) if "file" in table else None
         steps["realisation"] = {"number": steps["realisation"], "seed": int(sha256(scan)[:8], 16) if scan else 0}
     return condition(height, steps, "surface")
 
@@ -269,16 +263,14 @@ def surface_boundary(table: Mapping[str, Any]) -> Any:
     made = BOUNDARIES.get(table.get("generate", ""))
     if "file" in table:
         path = Path(table["file"])
-        made = surface_boundary(read_card(path)[1]) if is_card(path, table.get("format")) else None
+        made = surface_boundary(read_card(path)[1]) if is_card(path) else None
     of_face, rest = split(table, *FACE_STEPS)
     made = boundary_after(of_face, made)
     return boundary_after(split(rest, *STEPS)[0], None if "second" in table else made)
 
 
-def card_text(
-    file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
-) -> str:
-    """Return the surface card of a scan file as TOML: checksum, reading options and conditioning steps.
+def card_text(file: _Path, folder: _Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> str:
+    """Return the surface card of a scan file as TOML: title, checksum, reading options and conditioning steps.
 
     Parameters
     ----------
@@ -291,15 +283,13 @@ def card_text(
         If the file is a surface card itself.
     """
     file = Path(file)
-    if is_card(file, None):
+    if is_card(file):
         raise InputError(f"{file}: is a surface card already: expected a scan file")
     stated = {"title": file.stem, "sha256": sha256(file)}
-    return _BLANK_CARD + _entries(stated) + surface_table(file, folder, options, steps).partition("\n")[2]
+    return _entries(stated) + surface_table(file, folder, options, steps).partition("\n")[2]
 
 
-def surface_table(
-    file: str | os.PathLike[str], folder: str | os.PathLike[str], options: Mapping[str, Any], steps: Mapping[str, Any]
-) -> str:
+def surface_table(file: _Path, folder: _Path, options: Mapping[str, Any], steps: Mapping[str, Any]) -> str:
     """Return the ``[surface]`` table of a study, as TOML, for a scan and the steps that condition it.
 
     Parameters

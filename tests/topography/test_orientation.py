@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scan_files import SCANS, real
 
-from roughvisc.topography.formats import orientation, supported_formats, top_line_first
+from roughvisc.topography.formats import TOP_FIRST, orientation, supported_formats
 from roughvisc.topography.scans import open_scan
 
 
@@ -31,4 +31,4 @@ def test_al3d__heights_lie_as_the_camera_image_in_the_file_does():
 def test_every_format__says_how_its_orientation_was_told():
     for format in supported_formats():
         assert orientation(format).startswith(("verified: ", "not verified: "))
-    assert not any(top_line_first(format) for format in ("x3p", "sdf", "nc", "asc", "xyz"))
+    assert not {"x3p", "sdf", "nc", "asc", "xyz"} & set(TOP_FIRST)

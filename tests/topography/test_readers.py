@@ -132,7 +132,7 @@ def test_refusal__all_points_are_missing(tmp_path):
 
 def test_supported_formats__names_those_of_all_libraries():
     known = supported_formats()
-    assert {"x3p", "sdf", "nc", "card", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(known)
+    assert {"x3p", "sdf", "nc", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(known)
     assert known["wsxm"] == ("cur", "stp", "tom", "top")
     assert len(known) >= 40
 

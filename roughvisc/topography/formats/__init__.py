@@ -15,7 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.formats import binary, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 
-__all__ = ["Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats", "top_line_first"]
+__all__ = ["Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats"]
 
 #: Format -> suffixes without the dot, and its reader, for formats with a reader in this package. A text format without
 #: a suffix is recognised by its content.
@@ -34,7 +34,7 @@ _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
 #: Formats whose reader returns the top line of the map first, and the evidence. For the first two, it is a feature in a
 #: real file; for the others, mostly the agreement of two programs.
 _GWYDDION = "not verified: the reader matches the map of Gwyddion, whose first line is the top one"
-_TOP_FIRST = {
+TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
     "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
     "esri": "verified: the definition of the format, whose first row is the top one",
@@ -96,7 +96,7 @@ def supported_formats() -> dict[str, Sequence[str]]:
         from SurfaceTopography.IO import readers  # slow to import
     known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
     known["di"] += ("di", "000 to 999")
-    known |= {name: theirs for name, (theirs, _) in _FORMATS.items()} | {"card": ("toml",)}
+    known |= {name: theirs for name, (theirs, _) in _FORMATS.items()}
     return dict(sorted(known.items()))
 
 
@@ -111,11 +111,6 @@ def _formats_of(path: Path) -> Sequence[str]:
         return found
     listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))
     raise InputError(f"the suffix {path.suffix!r} is not known: expected format, or a suffix of {listed}", key="format")
-
-
-def top_line_first(format: str) -> bool:
-    """Return whether the reader of a format returns the line of the largest y first."""
-    return format in _TOP_FIRST
 
 
 def orientation(format: str) -> str:
@@ -137,4 +132,4 @@ def orientation(format: str) -> str:
     >>> orientation("tmd").partition(":")[0], orientation("plu").partition(":")[0]
     ('verified', 'not verified')
     """
-    return _TOP_FIRST.get(format) or _STATED.get(format, _TAKEN)
+    return TOP_FIRST.get(format) or _STATED.get(format, _TAKEN)

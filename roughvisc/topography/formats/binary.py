@@ -21,8 +21,6 @@ from roughvisc.errors import InputError
 from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
 from roughvisc.units import is_quantity, number
 
-#: Names of heights in netCDF, in order of preference.
-_NAMES = ("height", "heights", "z", "h")
 #: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
 _TRUEMAP = b"Binary TrueMap Data File v2.0"
 _DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
@@ -73,7 +71,7 @@ def read_netcdf(path: Path) -> ScanFile:
     # netCDF-4 is not thread-safe, and xarray would lock only the reading
     with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
         found = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
-    return ScanFile("nc", sorted(found, key=lambda one: (*_NAMES, one.name).index(one.name)))
+    return ScanFile("nc", found)
 
 
 def _variable(name: str, variable: xr.DataArray) -> Channel:

@@ -20,7 +20,6 @@ from roughvisc.errors import InputError
 from roughvisc.tables import decimal_mark, read_text
 from roughvisc.topography.formats.binary import read_with_surface_topography
 from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
-from roughvisc.units import is_quantity
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING_COUNT = {0: 4096, 1: 32768, 2: 131072}, 2147483640
@@ -34,8 +33,8 @@ _MATRIX_SIZE = re.compile(r"^#[^:=：\n]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[m
 _UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
 #: Length with a decimal comma in a header, such as ``# Width: 12,5 um``.
 _LENGTH = re.compile(r"(?<=[:=])\s*\d[\d.]*,\d+(?=\s*\w{0,2}m\b)")
-#: Cell of a heading, such as ``x [mm]; y [mm]; z [um]``: its name and its unit, in square or round brackets.
-_HEADING = re.compile(r"""([^\s;,"\[(]+)\s*[\[(]\s*([^\])]*?)\s*[\])][\s;,"]*""")
+#: Heading of points with their units, such as ``x [mm]; y [mm]; z [um]``.
+_HEADING = re.compile(r"\W*".join(["^", *[r"(\w+)\s*[\[(]\s*(\w+)\s*[\])]"] * 3, "$"]), re.MULTILINE)
 #: Marks of a missing height, and a number with either decimal mark or one of these.
 _MISSING = dict.fromkeys(("", "nan", "bad", "-", "#n/a", "n/a"), "nan")
 _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:e[+-]?\d++)?|nan|bad|-|(?:#?n/a)?", re.IGNORECASE)
@@ -57,8 +56,6 @@ def read_table(text: str) -> tuple[list[str], list[int]]:
     lines = text.splitlines()
     body = [at for at, line in enumerate(lines) if line.strip() and not line.startswith("#")]
     separator = mode(_separator(lines[at]) for at in body) if body else " "
-    if body and (comments := _units_in_comments(lines[body[0]], body[0])):
-        lines[body.pop(0)] = comments
     cells = {at: _cells(lines[at], separator) for at in body}
     if separator != " " and not any(row[-1] for row in cells.values() if _NUMBER.fullmatch(row[0])):
         # a separator ends each line
@@ -69,9 +66,8 @@ def read_table(text: str) -> tuple[list[str], list[int]]:
     rows = [at for at, row in cells.items() if len(row) == known[at] == width]
     for at in sorted(set(body) - set(rows)) if rows else ():
         row = cells[at]
-        is_row = known[at] >= max(3, width / 2) or (separator != " " and known[at] and len(row) == width)
-        is_row = is_row or rows[0] < at < rows[-1] or (known[at] and at > rows[-1])
-        if is_row:
+        is_wide = known[at] >= max(3, width / 2) or (separator != " " and len(row) == width)
+        if rows[0] < at < rows[-1] or (known[at] and (is_wide or at > rows[-1])):
             wrong = next((repr(cell) for cell in row if not _NUMBER.fullmatch(cell)), f"{len(row)} of {width} values")
             raise InputError(f"line {at + 1}: found {wrong} among numbers ({lines[at][:60]!r}): expected numbers only")
     lengths = [found.strip() for line in lines for found in _LENGTH.findall(line)]
@@ -85,20 +81,6 @@ def read_table(text: str) -> tuple[list[str], list[int]]:
 def numbers(lines: Sequence[str], rows: Sequence[int]) -> np.ndarray:
     """Return the rows of numbers as a matrix."""
     return np.loadtxt([lines[at] for at in rows], ndmin=2)
-
-
-def _units_in_comments(line: str, at: int) -> str | None:
-    """Return comments that state the units of a heading, as Gwyddion writes them; None for any other line."""
-    bare = line.replace('"', "")
-    names, units = [name.lower() for name, _ in _HEADING.findall(bare)], [unit for _, unit in _HEADING.findall(bare)]
-    if _HEADING.sub("", bare).strip() or not all(is_quantity(f"1 {unit}", "m") for unit in units):
-        return None
-    if len(names) == 1:
-        return f"# Value units: {units[0]}"
-    if len(names) == 3 and names[:2] == ["x", "y"] and units[0] == units[1]:
-        return f"# Lateral units: {units[0]}\n# Value units: {units[2]}"
-    expected = "expected 'x [mm], y [mm], z [um]' of points, with one unit of x and y, or 'height [um]' of a matrix"
-    raise InputError(f"line {at + 1}: found the heading {line[:60]!r}: {expected}")
 
 
 def _separator(line: str) -> str:
@@ -123,17 +105,21 @@ def read_numbers(text: str) -> ScanFile:
     text = "\n".join(lines) + "\n"
     if rows and len(lines[rows[0]].split()) == 3 and not _MATRIX_SIZE.search(text):
         points, stated = numbers(lines, rows), dict(_UNITS.findall(text))
+        if heading := _HEADING.search(text):
+            x, stated["Lateral"], y, other, _, stated["Value"] = heading.groups()
+            if (x.lower(), y.lower(), other) != ("x", "y", stated["Lateral"]):
+                expected = "expected 'x [mm], y [mm], z [um]', with one unit of x and y"
+                raise InputError(f"found the heading {heading[0].strip()!r}: {expected}")
         units = stated.get("Value"), stated.get("Lateral")
         return ScanFile("xyz", [Channel("points", lambda: points, *units, kind="points")])
     found = read_with_surface_topography(io.StringIO(text), "asc")
     complaints: list[str] = []
-    return replace(found, channels=[_matrix(channel, complaints) for channel in found.channels], complaints=complaints)
+    channels = [_matrix(channel, complaints) if channel.is_height else channel for channel in found.channels]
+    return replace(found, channels=channels, complaints=complaints)
 
 
 def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     """Return a matrix without index numbers; a channel with few columns is marked as a table."""
-    if not channel.is_height:
-        return channel
     z = channel.load().T  # as in the file
     if channel.spacing is None and z.shape[1] < _COLUMNS and len(z) > _TALL * z.shape[1]:
         return replace(channel, kind=f"a table of {z.shape[1]} columns")
@@ -200,9 +186,8 @@ def read_wyko(text: str) -> ScanFile:
     lines = header.splitlines()
     stated = {line.split()[0]: line.split()[-1] for line in reversed(lines[1:]) if line.strip()}
     columns, rows = int(stated["X"]), int(stated["Y"])  # X Size and Y Size
-    words = data.split("\n", 1)[1].split()[: columns * rows]
-    heights = np.array(["nan" if word.lower() == "bad" else word for word in words], dtype=float)
-    heights = heights.reshape(columns, rows)
+    words = data.split("\n", 1)[1].lower().replace("bad", "nan").split()
+    heights = np.array(words[: columns * rows], dtype=float).reshape(columns, rows)
     if lines[0].split()[-2] == "0":
         heights = heights * (float(stated["Wavelength"]) / float(stated["Mult"]))
     side = float(stated["Pixel_size"])
@@ -225,13 +210,11 @@ def read_keyence(text: str) -> ScanFile:
     heights = numbers(lines, rows).T
     heading = text.splitlines()[: rows[0]]
     stated = {row[0]: row[1:] for row in csv.reader(heading, delimiter=max(";,", key="".join(heading).count)) if row}
-    columns, count = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
-    if heights.shape != (columns, count):
-        raise InputError(f"found {heights.shape[0]} x {heights.shape[1]} numbers: expected {columns} x {count}")
-    shown, (side, lateral, *_) = stated.get("Output image data", ["Height"])[0], stated["XY Calibration"]
-    kind = "height" if shown == "Height" else "no areal height"
-    sides = (float(side.replace(",", ".")),) * 2
-    return ScanFile("keyence", [Channel(shown, lambda: heights, stated["Unit"][0], lateral, sides, kind=kind)])
+    shape = int(stated["Horizontal"][0]), int(stated["Vertical"][0])
+    if heights.shape != shape:
+        raise InputError(f"found {heights.shape} numbers along x and y: expected {shape}, as its heading states")
+    side, lateral, *_ = stated["XY Calibration"]
+    return single_map("keyence", heights, stated["Unit"][0], lateral, (float(side.replace(",", ".")),) * 2)
 
 
 #: Pattern of the beginning of a text -> its reader.
