@@ -131,7 +131,7 @@ def simulate(
         "edge": edge,
         "grid_error": grid_error,
     }
-    return _solved(height, material, Loading(program), settings, numerics, progress, threads, level=3)
+    return _solved(height, material, Loading(program), settings, numerics, 3, progress=progress, threads=threads)
 
 
 @quantities(speeds="m/s", load="N", pressure="Pa")
@@ -218,7 +218,7 @@ def friction(
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
     settings = {"boundary": boundary, "tolerance": tolerance, "fields": fields, "grid_error": grid_error}
-    found = _solved(height, material, curve, settings, numerics, progress, threads, level=4)
+    found = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
     return found.assign_attrs(title="Steady sliding")
 
 
@@ -228,18 +228,17 @@ def _solved(
     experiment: Experiment,
     settings: dict[str, Any],
     numerics: Numerics,
-    progress: bool | Progress,
-    threads: int | None,
     level: int,
+    **options: Any,
 ) -> xr.Dataset:
-    """Return the result of an experiment.
+    """Return the result of an experiment, with options of :func:`roughvisc.solve.solve`.
 
     Missed tolerances and sparse tables become Python warnings at a level of the stack; other warnings are logged.
     """
     if not isinstance(numerics, Numerics):
         raise InputError(key="numerics", found=numerics, expected="rv.Numerics(...)")
     problem = Problem(height, as_body(material), Settings(**vars(numerics), **settings))
-    dataset = solve(problem, experiment, progress=progress, threads=threads)
+    dataset = solve(problem, experiment, **options)
     for subject, text in warnings_of(dataset.attrs).items():
         if subject in ("tolerance", "material"):
             warnings.warn(text, UserWarning, level)

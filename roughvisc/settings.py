@@ -8,9 +8,8 @@ experiment follow from the fields.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from roughvisc.experiment.base import Experiment
 
 Array = NDArray[np.float64]
-#: :func:`known_boundary` resolves ``auto`` to one of the other values.
+#: :meth:`Problem.resolved` replaces ``auto`` by one of the other values.
 Boundary = Literal["auto", "free", "periodic", "mirror"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
@@ -129,15 +128,13 @@ class Settings(Numerics):
         super().__post_init__()
         tolerance = number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1)
         times: Any = self.times
-        expected = f"a positive number of times up to {MOST_TIMES}, a list of times [s], or None"
         if isinstance(times, int | np.integer):
-            if not 1 <= times <= MOST_TIMES:
-                raise InputError(key="times", found=int(times), expected=expected)
-            times = int(times)
+            times = int(number(int(times), "1", "times", least=1, most=MOST_TIMES))
         elif times is not None:
             try:
                 times = tuple(np.unique(np.asarray(in_si(times, "s", "times"), dtype=float)).tolist())
             except (TypeError, ValueError) as error:  # an InputError is a ValueError
+                expected = "a number of times, a list of times [s], or None"
                 raise InputError(key="times", found=self.times, expected=expected) from error
         names = tuple(self.fields) if isinstance(self.fields, Iterable) else (self.fields,)
         if not set(names) <= set(FIELDS):
@@ -148,32 +145,12 @@ class Settings(Numerics):
             object.__setattr__(self, name, value)
 
 
-#: Message if ``auto`` cannot be resolved, for a study file; in Python ``=`` has no spaces.
+#: Expected boundary if ``auto`` cannot be resolved.
 OPEN_BOUNDARY = """\
-is 'auto', the default, and the surface does not tell what lies beyond its border: expected one of
-  a nominally flat scan that stands for a larger surface: boundary = "mirror"; boundary = "periodic" if it \
-repeats as it is
+one of these, because the surface does not show what lies beyond its border
+  a nominally flat scan that stands for a larger surface: boundary = "mirror"; "periodic" if it repeats as it is
   an indenter or a single bump whose contact stays inside: boundary = "free"
   a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
-
-
-def known_boundary(
-    stated: Any, only: Literal["free", "periodic"] | None, made_for: Callable[[], Literal["free", "periodic"] | None]
-) -> Literal["free", "periodic", "mirror"] | None:
-    """Return the stated boundary, with ``auto`` resolved; None if the user has to state one.
-
-    Parameters
-    ----------
-    stated : Settings, or an object with ``boundary`` and ``edge``
-        An accepted edge means free space.
-    only : {"free", "periodic"} or None
-        The only boundary of the experiment, if there is one.
-    made_for : callable
-        Returns the boundary that the surface was made for, or None; called last.
-    """
-    if stated.boundary != "auto":
-        return stated.boundary
-    return only or ("free" if stated.edge == "accept" else made_for())
 
 
 def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
@@ -234,11 +211,11 @@ class Problem:
             If the heights are invalid, the boundary must be stated, or a setting has no meaning in the experiment.
         """
         height, settings = checked(self.height, "height", least=1), self.settings
-        boundary = known_boundary(settings, experiment.boundary, partial(boundary_of, height))
+        boundary, grid_error, (fewest, most) = settings.boundary, settings.grid_error, GRID_ERROR_CELLS
+        if boundary == "auto":
+            boundary = experiment.boundary or ("free" if settings.edge == "accept" else boundary_of(height))
         if boundary is None:
-            name = height.attrs.get("source_file", "height")
-            raise InputError(f"{name}: boundary {OPEN_BOUNDARY.replace(' = ', '=')}")
-        grid_error, (fewest, most) = settings.grid_error, GRID_ERROR_CELLS
+            raise InputError(key="boundary", found="auto", expected=OPEN_BOUNDARY)
         if grid_error == "auto":  # only if no further field has to be kept
             needs_pressure = experiment.axis == "time" and "pressure" not in settings.fields
             grid_error = fewest <= height.size <= most and not needs_pressure

@@ -132,9 +132,9 @@ def solve(
     """
     problem = problem.resolved(experiment)
     height, settings = problem.height, problem.settings
-    needed = () if "pressure" in settings.fields or not isinstance(experiment, Loading) else ("pressure",)
-    if settings.grid_error:
-        problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
+    runs_again = settings.grid_error and isinstance(experiment, Loading)  # a curve of steady sliding does so itself
+    needed = ("pressure",) if runs_again and "pressure" not in settings.fields else ()
+    problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
     bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
     if progress is True:
         from roughvisc.progress import reporting  # slow to import
@@ -159,13 +159,6 @@ def solve(
     return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
 
 
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    from dask.system import CPU_COUNT
-
-    return int(CPU_COUNT)
-
-
 def threads_for(requested: int | None) -> int:
     """Return the number of threads of a case that this process computes.
 
@@ -184,9 +177,11 @@ def threads_for(requested: int | None) -> int:
         if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
             raise InputError(key="threads", found=requested, expected="a whole number of at least 1, or None")
         return requested
+    from dask.system import CPU_COUNT  # slow to import
+
     stated = int(fft.get_workers())
     alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
-    return cores() if stated == 1 and alone else stated
+    return CPU_COUNT if stated == 1 and alone else stated
 
 
 def solve_on_grid(

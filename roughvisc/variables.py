@@ -98,9 +98,7 @@ VARIABLES: dict[str, Variable] = {
     # fields
     "pressure": Variable(_FRAME, "Pa", "pressure", "of the contact, mean over the cell"),
     "gap": Variable(_FRAME, "m", "gap", "between the surfaces at the cell centre; missing where the profile is absent"),
-    "displacement": Variable(
-        _FRAME, "m", "displacement", "of the body's surface, into the body; of zero mean unless space is free"
-    ),
+    "displacement": Variable(_FRAME, "m", "displacement", "into the body; of zero mean unless space is free"),
     # histories
     "force": Variable(_STEPS, "N", "force", "normal force"),
     "approach": Variable(
@@ -110,30 +108,17 @@ VARIABLES: dict[str, Variable] = {
         "of the rigid profile since first touch of its highest point; in free space against the undeformed plane, "
         "otherwise against the mean plane of the body; of an open contact the value at which it would just close",
     ),
-    "nominal_pressure": Variable(
-        _STEPS, "Pa", "nominal pressure", "force over the area of the grid, absent cells included"
-    ),
-    "work": Variable(
-        _STEPS,
-        "J",
-        "work",
-        "of the force on the approach, without friction; if periodic without the uniform displacement",
-    ),
+    "nominal_pressure": Variable(_STEPS, "Pa", "nominal pressure", "force over the area of all cells, absent ones too"),
+    "work": Variable(_STEPS, "J", "work", "of the force on the approach; if periodic without the uniform displacement"),
     "contact_area": Variable(_STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge"),
     "contact_area_counted": Variable(_STEPS, "m^2", "contact area, counted", "cells that carry pressure"),
-    "contact_fraction": Variable(
-        _STEPS, "1", "contact fraction", "contact_area over the area of the grid, with absent cells"
-    ),
+    "contact_fraction": Variable(_STEPS, "1", "contact fraction", "over the area of all cells, absent ones too"),
     "mean_gap": Variable(_STEPS, "m", "mean gap", "over the present cells"),
     # sliding
     "sliding_distance": Variable(_STEPS, "m", "sliding distance", "since the start, along the path, in whole cells"),
     "reduced_speed": Variable(_SERIES, "m/s", "reduced speed a_T V", "speed times the shift factor of the material"),
-    "friction_coefficient": Variable(
-        _STEPS, "1", "friction coefficient", "friction over normal force; missing while apart"
-    ),
-    "friction_force": Variable(
-        _STEPS, "N", "friction force", "of pressure on inclined faces, against the motion (in a hold the last one)"
-    ),
+    "friction_coefficient": Variable(_STEPS, "1", "friction coefficient", "over the normal force; missing while apart"),
+    "friction_force": Variable(_STEPS, "N", "friction force", "against the motion, in a hold against the last motion"),
     "friction_force_across": Variable(_STEPS, "N", "force across the motion", "to the left of the motion"),
     "friction_force_error": Variable(_SERIES, "N", "stated error of the friction force", "of steps of one cell"),
     # accuracy and cost
@@ -148,9 +133,7 @@ VARIABLES: dict[str, Variable] = {
     "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error"),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
     "work_error": Variable(_SERIES, "J", "stated error of the work", "adds up over the steps; without the grid"),
-    "contact_area_error": Variable(
-        _SERIES, "m^2", "stated error of the contact area", "of uncertain cells; without the grid"
-    ),
+    "contact_area_error": Variable(_SERIES, "m^2", "stated error of the area", "of uncertain cells; without the grid"),
     "grid_error": Variable(_SERIES, "1", "grid error", f"largest of pressure (L1), force, approach; {_COARSER}"),
     "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER),
     "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}"),
@@ -185,9 +168,7 @@ VARIABLES: dict[str, Variable] = {
     "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
     # theories
     "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES),
-    "asperity_contact_area": Variable(
-        _SERIES, "m^2", "contact area, Bush, Gibson and Thomas", f"at low loads, {_ASPERITIES}"
-    ),
+    "asperity_contact_area": Variable(_SERIES, "m^2", "contact area, Bush et al.", f"at low loads, {_ASPERITIES}"),
     "persson_friction_coefficient": Variable(_SERIES, "1", "friction coefficient, Persson", _PERSSON),
     "persson_contact_fraction": Variable(_SERIES, "1", "contact fraction, Persson", _PERSSON),
 }

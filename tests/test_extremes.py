@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from references.half_space import punch_approach
-from support import at_rows
+from support import at_rows, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms
@@ -107,23 +107,15 @@ def test_holds_of_all_lengths_in_one_program__follow_lee_and_radok():
 
 
 @pytest.mark.parametrize(
-    ("program", "settings", "message"),
+    ("program", "settings", "key", "found"),
     [
-        (
-            rv.Program().load(1e-3, over=1e15).hold(1e-15),
-            {},
-            r"program\.1: a segment lasts 1e-15 s where time has reached",
-        ),
-        (rv.Program().load(1e-3, over=1e200), {}, r"an end by 1e\+100 s"),
-        (
-            rv.Program().load(1e-3, over=100.0),
-            {"numerics": rv.Numerics(time_step=1e-15)},
-            "time_step is 1e-15 s and the program ends at 100 s",
-        ),
+        (rv.Program().load(1e-3, over=1e15).hold(1e-15), {}, "program.1", 1e-15),
+        (rv.Program().load(1e-3, over=1e200), {}, "program.0", 1e200),
+        (rv.Program().load(1e-3, over=100.0), {"numerics": rv.Numerics(time_step=1e-15)}, "time_step", 1e-15),
     ],
 )
-def test_what_cannot_be_represented__is_refused(program, settings, message):
-    with pytest.raises(rv.InputError, match=message):
+def test_what_cannot_be_represented__is_refused(program, settings, key, found):
+    with refused(key, found):
         simulate(ROUGH, ZENER, program, **{"edge": "accept", **settings})
 
 
@@ -222,7 +214,7 @@ def test_solution__is_a_contact_state_on_a_grid_of_any_shape(shape, boundary):
     deep = 0.3 * float(height.max() - height.mean())
     program = rv.Program().approach(deep, over=0.1).hold(1.0)
     if boundary == "periodic" and deep == 0:
-        with pytest.raises(rv.InputError, match="contact is full at 0 m"):
+        with refused("program.0", 0.0):
             simulate(height, ZENER, program, boundary=boundary)
     else:
         ds = simulate(height, ZENER, program, boundary=boundary, edge="accept", fields=fields)

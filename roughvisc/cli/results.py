@@ -29,14 +29,14 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     """
     from roughvisc.plot import save_sweep_figures
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files
-    from roughvisc.solve import cores
+    from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.storage.folder import results_at
 
     paths = results_at(result)
     together = results_of_sweep(result) if len(paths) > 1 else None
     drawn = [] if together is None else save_sweep_figures(together, out or result)
     if together is None or every:
-        drawn += save_figures_of_files(paths, out, every=every, processes=cores())
+        drawn += save_figures_of_files(paths, out, every=every, processes=threads_each(1))
     say_figures(screen(), drawn)
 
 
@@ -53,9 +53,9 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from roughvisc.solve import cores
+    from roughvisc.study.execution.cluster import threads_each
 
-    say_path(screen(), "Report", rv.report(results, out, processes=cores()))
+    say_path(screen(), "Report", rv.report(results, out, processes=threads_each(1)))
 
 
 @click.command()

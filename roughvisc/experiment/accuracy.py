@@ -196,21 +196,16 @@ def loading_warnings(
             f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
             f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
         )
-        if scene.time_step is not None:
-            warnings["tolerance"] += " The time step is fixed, and not chosen by the tolerance."
         if scene.program.slides:
-            warnings["tolerance"] += (
-                " A slide takes one cell a step: what its steps leave falls with the square of the cell alone."
-            )
+            warnings["tolerance"] += " A slide takes one cell a step: its error falls with the square of the cell."
     approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
     warnings["slope"] = slope_warning(loaded, boundary, approach)
     if boundary == "periodic":
         warnings["border"] = border_warning(profile.height)
     if border is not None:
         warnings["edge"] = (
-            f"Contact reached the border of the surface, first in the step to {border:.3g} s: there the surface acts "
-            "as a punch of its outline, whose edge carries pressure that no larger surface would have (edge = "
-            '"accept").'
+            f"Contact reached the border of the surface, first in the step to {border:.3g} s: its outline acts as the "
+            "edge of a punch, with pressure that no larger surface would have."
         )
 
     wakes, pressure = [], dataset["pressure"][-1].values if "pressure" in dataset else None

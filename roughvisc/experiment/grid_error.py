@@ -14,6 +14,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -25,7 +26,7 @@ from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.recipes import is_indenter, remade
 from roughvisc.topography.spectrum import resample, shares
-from roughvisc.variables import GRID_ERROR, axis_of
+from roughvisc.variables import GRID_ERROR
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
@@ -116,7 +117,7 @@ def with_grid_error(
     height : xarray.DataArray
         Surface of the result, before the grid grew. [m]
     press_again : callable
-        Repeats the experiment on another surface, with rows at given positions on the axis and ``pressure``.
+        Repeats the loading on another surface, with rows at given times and ``pressure``.
 
     Notes
     -----
@@ -125,34 +126,30 @@ def with_grid_error(
     tolerance, so the estimates are meaningless far below the tolerance. They are missing if the coarser run fails. The
     coarser grid has all waves that it can resolve, see :func:`coarser`.
     """
-    axis = axis_of(dataset.variables)
-    places = dataset[axis].values.tolist()
     histories = [name for name in GRID_ERROR if name in dataset and name != "pressure"]
-    found = {name: np.full(len(places), math.nan) for name in ("pressure", *histories)}
-    least: dict[str, Array] = {}
+    times = dataset["time"].values.tolist()
     try:
         few = coarser(height, 2.0, dataset.attrs["boundary"])
         if few.size == height.size:
             raise RoughviscError(f"{height.shape[0]} x {height.shape[1]} cells cannot be coarsened")
-        coarse = press_again(few, places)
+        coarse = press_again(few, times)
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)
-    else:
-        known = {"force", "approach", "contact_area", "mean_gap", *histories} & set(map(str, dataset.variables))
-        largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in known}
-        off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
-        apart = {name: off[name] / largest[name] for name in histories}
-        apart["pressure"] = pressure_distance(coarse, dataset) / largest["force"]
-        ratio = math.sqrt(height.size / few.size)
-        for name, difference in apart.items():
-            safety, order = _ONE_COARSER.get(name, _ONE_COARSER_USUAL)
-            found[name] = safety * difference / (ratio**order - 1)
-        is_given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
-        rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(places))]
-        least = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    errors = grid_errors(found, least)
+        missing = "time", np.full(len(times), math.nan)
+        return dataset.assign({GRID_ERROR[name]: missing for name in ("pressure", *histories)})
+    largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in histories}
+    off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
+    apart = {"pressure": pressure_distance(coarse, dataset) / largest["force"]}
+    apart |= {name: off[name] / largest[name] for name in histories}
+    ratio, found = math.sqrt(height.size / few.size), {}
+    for name, difference in apart.items():
+        safety, order = _ONE_COARSER.get(name, _ONE_COARSER_USUAL)
+        found[name] = safety * difference / (ratio**order - 1)
+    is_given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
+    rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(times))]
+    errors = grid_errors(found, {name: np.array([row[name] for row in rows]) for name in rows[0]})
     errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
-    return dataset.assign({name: (axis, values) for name, values in errors.items()})
+    return dataset.assign({name: ("time", values) for name, values in errors.items()})
 
 
 def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
@@ -198,14 +195,14 @@ def _least_errors(
     row : int
         Number of the row.
     largest : mapping
-        Largest values of force [N], approach [m], contact area [m2] and, if known, mean gap. [m]
+        Largest values of force [N], approach [m], contact area [m2] and mean gap. [m]
     given : bool
         Whether the approach is prescribed, not the load.
     peak : float
         Possible height of the peak above the highest cell, see :func:`_peak`. [m]
     """
     here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
-    wide = largest.get("mean_gap", math.inf)
+    wide = largest["mean_gap"]
     force, area = here["force"] / largest["force"], here["contact_area"] / largest["contact_area"]
 
     # The peak: under a given approach the gap is too wide by its height. Force and area grow with the square of the
@@ -266,17 +263,15 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
     present = np.isfinite(height)
     if not (pressure[present] > 0).all():
         return 0.0, 0.0
-    filled = np.where(present, pressure, math.inf)
-    at = np.unravel_index(int(np.argmin(filled)), filled.shape)
-    beside = [(i, at[1]) for i in (at[0] - 1, at[0] + 1)] + [(at[0], j) for j in (at[1] - 1, at[1] + 1)]
-    if periodic:
-        beside = [(i % filled.shape[0], j % filled.shape[1]) for i, j in beside]
-    beside = [(i, j) for i, j in beside if 0 <= i < filled.shape[0] and 0 <= j < filled.shape[1] and present[i, j]]
-    changes = [float(filled[cell] - filled[at]) for cell in beside]
-    if not changes:
+    at = np.unravel_index(int(np.argmin(np.where(present, pressure, math.inf))), pressure.shape)
+    beyond: dict[str, Any] = {"mode": "wrap"} if periodic else {"constant_values": math.nan}
+    beside = at[0] + np.array([0, 2, 1, 1]), at[1] + np.array([1, 1, 0, 2])  # counted from the cells beyond the border
+    changes = np.pad(np.where(present, pressure, math.nan), 1, **beyond)[beside] - pressure[at]
+    steps = np.pad(height, 1, **beyond)[beside] - height[at]
+    if np.isnan(changes).all():
         return 0.0, 0.0
-    part = _HIDDEN * np.count_nonzero(filled <= max(changes)) / np.count_nonzero(present)
-    return part, part * max(abs(float(height[cell] - height[at])) for cell in beside)
+    part = _HIDDEN * np.count_nonzero(pressure[present] <= np.nanmax(changes)) / np.count_nonzero(present)
+    return part, part * float(np.nanmax(np.abs(steps)))
 
 
 def counting_error(contact: Mask, faces: int) -> float:

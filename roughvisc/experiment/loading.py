@@ -346,23 +346,19 @@ def check_program(profile: Profile, program: Program, boundary: str) -> None:
     can_fill = boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel)
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
         where, shortest = f"program.{number}", min(segment.duration, segment.period)
-        what = "the period of a cycle" if segment.period < segment.duration else "a segment"
         least = max(LEAST_ROUNDINGS * math.ulp(end), 1 / LARGEST)
         if segment.duration > 0 and not (least <= shortest and end <= LARGEST):
-            raise InputError(
-                f"{where}: {what} lasts {shortest:g} s where time has reached {end:g} s: expected at least "
-                f"{least:.2g} s, which the resolution of the time allows, and an end by {LARGEST:g} s"
-            )
+            resolved = f"a duration of at least {least:.2g} s, which times near {end:g} s resolve"
+            expected = f"{resolved}, also of a period, and an end by {LARGEST:g} s"
+            raise InputError(key=where, found=shortest, expected=expected)
         if segment.slide is not None:
             if number == 0:
-                raise InputError(f"{where} slides before there is a load: expected load, pressure or approach before")
+                raise InputError(key=where, found="slide", expected="load, pressure or approach before a slide")
             try:
                 segment.slide.cells(profile.spacing)
             except InputError as error:
                 raise error.prefixed(where) from None
         largest = (segment.end or 0.0) + abs(segment.amplitude)
         if can_fill and segment.control == "approach" and segment.end is not None and largest >= profile.mean_gap:
-            raise InputError(
-                f"{where}: approach goes to {largest:.6g} m, and with {boundary} boundaries contact is "
-                f"full at {profile.mean_gap:.6g} m: expected less"
-            )
+            expected = f"an approach below {profile.mean_gap:.6g} m, at which contact is full ({boundary} boundaries)"
+            raise InputError(key=where, found=largest, expected=expected)

@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
@@ -165,43 +165,6 @@ class Domain:
         return self._whole.displacement(np.full(self.shape, 1 / math.prod(self.shape)))[self.cells]
 
 
-def choose_domain(profile: Profile, body: Body, estimate: Estimate, growth: float = 1.0) -> Domain:
-    """Return the part of a surface that may touch during a run.
-
-    Parameters
-    ----------
-    profile : Profile
-        The surface.
-    body : Body
-        Body under it. The domain is the whole surface unless space and time separate in the body and a load never
-        raises the surface next to it.
-    estimate : Estimate
-        Estimated contact.
-    growth : float
-        Factor of its approach and size.
-    """
-    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
-    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    if body.kernel.raises_surface or not profile.all_present or min(shape) < WORTH_CROPPING:
-        return whole
-    is_connected = estimate.cells is not None and is_indenter(profile.height)
-    corners = estimate.cells if is_connected else np.argwhere(gap <= MARGIN * growth * estimate.approach)
-    if corners is None or not corners.size:
-        return whole
-    first, last = corners.min(axis=0), corners.max(axis=0)
-    if is_connected:
-        wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int)
-        first, last = first - wider, last + wider
-    first, last = np.maximum(first - RIM, 0), np.minimum(last + RIM + 1, shape)
-    cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
-    inside = np.zeros(shape, bool)
-    inside[cells] = True
-    if inside.mean() > LARGEST_PART:
-        return whole
-    outside = math.inf if is_connected else float(gap[~inside].min())
-    return replace(whole, cells=cells, outside=outside, is_whole=False)
-
-
 def choose_surface(
     profile: Profile, problem: Problem, program: Program, enlarged: int | None = None, outgrown: int = 0
 ) -> tuple[Profile, Domain, int, bool]:
@@ -243,7 +206,24 @@ def choose_surface(
         while enlarged is None and estimate.at_border and (larger := enlarged_indenter(profile.height)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             estimate = estimated(profile, compliance, program)
-    return profile, choose_domain(profile, body, estimate, GROWTH**outgrown), times, estimate.at_border
+
+    gap, shape, growth = profile.gap, (profile.gap.shape[0], profile.gap.shape[1]), GROWTH**outgrown
+    domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    corners = np.empty((0, 2), int)
+    is_connected = estimate.cells is not None and is_indenter(profile.height)
+    if not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING:
+        corners = estimate.cells if is_connected else np.argwhere(gap <= MARGIN * growth * estimate.approach)
+    if corners is not None and corners.size:
+        first, last = corners.min(axis=0), corners.max(axis=0)
+        wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int) if is_connected else 0
+        first, last = np.maximum(first - wider - RIM, 0), np.minimum(last + wider + RIM + 1, shape)
+        cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
+        inside = np.zeros(shape, bool)
+        inside[cells] = True
+        if inside.mean() <= LARGEST_PART:
+            outside = math.inf if is_connected else float(gap[~inside].min())
+            domain = replace(domain, cells=cells, outside=outside, is_whole=False)
+    return profile, domain, times, estimate.at_border
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:

@@ -20,6 +20,7 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT
 from roughvisc.settings import Settings
 from roughvisc.topography.grid import counts
+from roughvisc.units import format_quantity
 
 #: Part of the available memory that a case may take.
 PART = 0.9
@@ -91,13 +92,7 @@ SPARSE = 0.05
 
 
 def march_bytes(
-    settings: Settings,
-    memory: Memory,
-    cells: float,
-    *,
-    contact: float = SPARSE,
-    rows: float = 0.0,
-    part: float = 1.0,
+    settings: Settings, memory: Memory, cells: float, *, contact: float = SPARSE, rows: float = 0.0, part: float = 1.0
 ) -> float:
     """Return the memory of a loading at its peak, without interpreter and libraries.
 
@@ -201,8 +196,7 @@ def too_large(shape: tuple[int, int], needed: Callable[[float], float], there: A
     for stride in range(2, max(min(shape) // _FEWEST, 1) + 1):
         few = [math.ceil(count / stride) for count in shape]
         if needed(math.prod(few)) <= fits:
-            less = f"{few[0]} x {few[1]} cells, {stride} times as long, need {amount(needed(math.prod(few)))}"
-            fitting = f"what would fit: {less} (resample = {few} under [surface], rv.resample in Python)"
+            fitting = f"{few[0]} x {few[1]} cells would fit (resample = {few} under [surface], rv.resample in Python)"
             break
     lacking = f"{shape[0]} x {shape[1]} cells need about {amount(size)} of memory, and {amount(there.size)}"
     return f"{lacking} are {there.words}: {fitting}"
@@ -214,7 +208,6 @@ def amount(size: float) -> str:
     Examples
     --------
     >>> amount(2.13e9), amount(350e6), amount(-1)
-    ('2.1 GB', '350 MB', '0 kB')
+    ('2.1 GB', '350 MB', '0 B')
     """
-    factor, unit = next((one for one in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")) if size >= one[0]), (1e3, "kB"))
-    return f"{float(f'{max(size, 0) / factor:.2g}'):g} {unit}"
+    return format_quantity(float(f"{max(size, 0.0):.2g}"), "B")

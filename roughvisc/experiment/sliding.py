@@ -29,7 +29,7 @@ from roughvisc.mechanics.tangential import slope
 from roughvisc.settings import OVER_TIME, Problem, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.spectrum import resample_periodic
-from roughvisc.units import Quantity, format_quantity, number, quantities, unit_for
+from roughvisc.units import Quantity, format_quantity, number, quantities
 from roughvisc.variables import GRID_ERROR, STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
@@ -93,11 +93,10 @@ class SteadySliding(Experiment):
             raise InputError(key="pressure", found=self.pressure, expected=f"either this or the load, {self.load!r}")
 
     def __repr__(self) -> str:
-        ends = list(dict.fromkeys(unit_for([one], "m/s").text(one) for one in (min(self.speeds), max(self.speeds))))
+        ends = dict.fromkeys(format_quantity(one, "m/s") for one in (min(self.speeds), max(self.speeds)))
         count = f"{len(self.speeds)} speeds from " if len(self.speeds) > 1 else ""
         pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
-        under = unit_for([pressed[0] or 0.0], pressed[1]).text(pressed[0] or 0.0)
-        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {under}"
+        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {format_quantity(*pressed)}"
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
         """Return the steady states in the order of the speeds; the state is their number so far.
@@ -160,10 +159,6 @@ class SlidingGrid:
         """Return the body with materials that represent its own at the frequencies of a speed. [m/s]"""
         return body.over_frequencies(speed * 2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]), tolerance)
 
-    def opening(self, found: SteadyState) -> Array:
-        """Return the gap of a steady state. [m]"""
-        return np.where(found.pressure > 0, 0.0, np.maximum(self.gap + found.displacement - found.approach, 0.0))
-
 
 class SlidingRows(Rows):
     """Steady states of one curve, in the order of the speeds.
@@ -203,10 +198,10 @@ class SlidingRows(Rows):
 
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
-        grid, tolerance, xp = self._grids[0], self._settings.tolerance, arrays_of(self._settings.device)
+        tolerance, xp = self._settings.tolerance, arrays_of(self._settings.device)
         for done, speed in enumerate(self._curve.speeds[self._done :], self._done + 1):
-            law = grid.law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
-            states, across, convolutions, creep = [], 0.0, 0, 0.0
+            law = self._grids[0].law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
+            states, runs = [], []
             for cells in self._grids:
                 sliding = Sliding(law, cells.gap.shape, cells.spacing, speed, xp)
                 try:
@@ -214,46 +209,47 @@ class SlidingRows(Rows):
                 except ConvergenceError as error:
                     advice = "try a looser tolerance, a coarser grid, or layers whose moduli differ less"
                     raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
-                if not states:  # the grid of the surface
-                    across, convolutions = sliding.force(found.pressure, axis=1), sliding.convolutions
-                pressure, displacement = to_host(found.pressure), to_host(found.displacement)
-                states.append(replace(found, pressure=pressure, displacement=displacement))
-            found = states[0]
-            row, fields = self._row(found)
-            row["friction_force_across"] = across
+                pressure, contact = to_host(found.pressure), to_host(found.pressure) > 0
+                gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))
+                counted, area = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
+                states.append((found, sliding, pressure, gap, counted, area))
+                runs.append((found.power_force, area, found.approach, float(gap.mean())))
+            row, fields = self._row(*states[0])  # on the grid of the surface
+            pressure, creep = states[0][2], 0.0
             if self._settings.grid_error:
-                row |= sliding_grid_errors(self._grids, states)
-            if stands_alone(self._profile.height, found.pressure, 0):
+                row |= sliding_grid_errors(self._grids, pressure, runs)
+            if stands_alone(self._profile.height, pressure, 0):
                 for one in law.materials:  # without an end of the creep nothing counts as recovered
                     crept = float(one.contact_compliance(self._period / speed))
                     creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
-            row["convolutions"] = convolutions
             row["creep_left"] = creep  # left when the next contact arrives
             yield Row(speed, row, fields, state=done, done=float(done))
 
-    def _row(self, found: SteadyState) -> tuple[dict[str, Any], dict[str, Array]]:
+    def _row(
+        self, found: SteadyState, sliding: Sliding, pressure: Array, gap: Array, counted: float, area: float
+    ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a steady state, and its fields in the frame of the surface."""
-        force, area, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
-        grid, contact = self._grids[0], found.pressure > 0
-        counted, touching = contact_area(contact, ~contact, grid.spacing[0] * grid.spacing[1], "periodic")
-        gap, status = grid.opening(found), "full_contact" if contact.all() else "converged"
+        force, nominal, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
+        status = "full_contact" if (pressure > 0).all() else "converged"
         row = {
             "force": force,
-            "nominal_pressure": force / area,
+            "nominal_pressure": force / nominal,
             "approach": found.approach,
-            "contact_area": touching,
+            "contact_area": area,
             "contact_area_counted": counted,
-            "contact_fraction": touching / area,
+            "contact_fraction": area / nominal,
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
+            "friction_force_across": sliding.force(found.pressure, axis=1),
             "stated_error": max(found.residual, found.friction_residual),
             "residual": found.residual,
+            "convolutions": sliding.convolutions,
             "status": STATUS_MEANINGS.index(status),
         }
         fields = {}
         for name in self._settings.fields:
-            turned = np.rot90({"pressure": found.pressure, "gap": gap}[name], -quarters)
+            turned = np.rot90({"pressure": pressure, "gap": gap}[name], -quarters)
             fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self._profile.gap.shape))
         return row, fields
 
@@ -270,45 +266,44 @@ class SlidingRows(Rows):
         return dataset.drop_vars("creep_left").assign_attrs(attributes), warnings
 
 
-def sliding_grid_errors(grids: Sequence[SlidingGrid], states: Sequence[SteadyState]) -> dict[str, float]:
+def sliding_grid_errors(
+    grids: Sequence[SlidingGrid], pressure: Array, runs: Sequence[tuple[float, float, float, float]]
+) -> dict[str, float]:
     """Return the relative errors of friction, area, approach and gap that the grid causes at a speed.
 
     Parameters
     ----------
     grids : sequence of SlidingGrid
         Grid of the surface, and up to two coarser grids, the finest first.
-    states : sequence of SteadyState
-        Steady states on these grids.
+    pressure : ndarray, shape (nx, ny)
+        Pressure on the finest grid. [Pa]
+    runs : sequence of tuple
+        Friction force [N], contact area [m2], approach [m] and mean gap [m] on each grid.
 
     Returns
     -------
     dict
         Name of a variable -> error; NaN without friction, or without a coarser grid.
     """
-    grid, found = grids[0], states[0]
-    if len(grids) == 1 or found.power_force <= 0:
+    grid, (friction, *_, wide) = grids[0], runs[0]
+    if len(grids) == 1 or friction <= 0:
         return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
-    runs = []
-    for cells, state in zip(grids, states, strict=True):
-        contact, cell_area = state.pressure > 0, cells.spacing[0] * cells.spacing[1]
-        area = contact_area(contact, ~contact, cell_area, "periodic")[1]
-        runs.append((state.power_force, area, state.approach, float(cells.opening(state).mean())))
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
     errors = {}
     for name, values in zip(_QUANTITIES, np.transpose(runs), strict=True):
         near, far = np.append(np.abs(np.diff(values)) / max(abs(values[0]), 1e-300), math.nan)[:2]
         errors[name] = grid_uncertainty(name, near, far, ratio, moving=True)
 
-    contact = found.pressure > 0
-    hidden_area, hidden_gap = hidden_opening(found.pressure, -grid.gap, True)
+    contact = pressure > 0
+    hidden_area, hidden_gap = hidden_opening(pressure, -grid.gap, True)
     counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, "periodic"))
     # Friction from pressure times slope of the profile. The surface follows the profile at the centres of the contact
     # cells but not at the edges of contact; this is an error of the grid.
-    inclined = float(np.sum(found.pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]
-    apart = abs(inclined / found.power_force - 1)
+    inclined = float(np.sum(pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]
+    apart = abs(inclined / friction - 1)
     least = {
         "friction_force": apart if apart <= _MEANINGFUL else 0.0,
         "contact_area": max(hidden_area, counting),
-        "mean_gap": hidden_gap / (max(runs[0][-1], hidden_gap) or 1.0),
+        "mean_gap": hidden_gap / (max(wide, hidden_gap) or 1.0),
     }
     return {name: float(error) for name, error in grid_errors(errors, least).items()}

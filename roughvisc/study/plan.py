@@ -42,7 +42,6 @@ from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Problem
-from roughvisc.solve import cores
 from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
@@ -444,7 +443,7 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    processes = workers or processes_that_fit(largest[0], cores(), there.size)
+    processes = workers or processes_that_fit(largest[0], threads_each(1), there.size)
     processes = min(processes, total)
     together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, replace
-from functools import partial
 from itertools import filterfalse
 from pathlib import Path
 from types import MappingProxyType
@@ -29,7 +28,7 @@ from roughvisc.mechanics.materials.creep import LARGEST_SHIFT, Material, arrheni
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
-from roughvisc.settings import OPEN_BOUNDARY, Settings, known_boundary
+from roughvisc.settings import OPEN_BOUNDARY, Settings
 from roughvisc.study.audit import audit
 from roughvisc.study.machine_history import read_history
 from roughvisc.study.sweep_table import value_at
@@ -366,9 +365,12 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         settings = call(Settings, "", stated)
     except InputError as error:
         raise located(error, TABLE_OF[error.key.partition(".")[0]]) from error
-    boundary = known_boundary(settings, experiment.boundary, partial(surface_boundary, tables["surface"]))
+    boundary = settings.boundary
+    if boundary == "auto":
+        made_for = "free" if settings.edge == "accept" else surface_boundary(tables["surface"])
+        boundary = experiment.boundary or made_for
     if boundary is None:
-        raise InputError(f"solve.boundary: {OPEN_BOUNDARY}", key="solve.boundary", found="auto", expected="a boundary")
+        raise InputError(key="solve.boundary", found="auto", expected=OPEN_BOUNDARY)
     settings = replace(settings, boundary=boundary)
     if isinstance(experiment, Loading) and isinstance(settings.times, tuple):
         end, last = experiment.program.duration, max(settings.times, default=0.0)

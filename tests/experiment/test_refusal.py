@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import psutil
 import pytest
+from dask.system import CPU_COUNT
 from scipy import fft
 from support import ROUGH, refused
 
@@ -12,7 +13,7 @@ import roughvisc as rv
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, memory_available
-from roughvisc.solve import cores, threads_for
+from roughvisc.solve import threads_for
 from roughvisc.study.case import read_cases
 
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")
@@ -76,7 +77,7 @@ def test_memory__is_limited_by_the_container_and_the_dask_worker(monkeypatch):
 
 def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatch):
     assert threads_for(3) == 3
-    assert threads_for(None) == cores()
+    assert threads_for(None) == CPU_COUNT
     with fft.set_workers(5):
         assert threads_for(None) == 5
     found = []

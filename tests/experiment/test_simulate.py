@@ -84,7 +84,7 @@ def test_kept_times__are_counted_listed_or_snapped(times, expected):
         ({"height": BALL.assign_attrs(units="K")}, "height: .* K'"),
         ({"program": rv.Program()}, "program"),
         ({"times": [2.0]}, "times holds 2 s"),
-        ({"boundary": "periodic", "program": rv.Program().approach(1e-3, over=1)}, "approach goes to 0.001 m"),
+        ({"boundary": "periodic", "program": rv.Program().approach(1e-3, over=1)}, "program.0: found 0.001"),
     ],
 )
 def test_bad_input__is_named(wrong, named):

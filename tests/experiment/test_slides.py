@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from samples import QUICK_RUBBER as RUBBER
+from support import refused
 
 import roughvisc as rv
-from roughvisc.errors import InputError
 from roughvisc.experiment.grid_error import pressure_distance
 from roughvisc.settings import kept_times
 
@@ -93,16 +93,16 @@ def test_grid_error__holds_the_true_one_although_coarser_slides_come_to_other_in
 
 
 @pytest.mark.parametrize(
-    ("program", "settings", "message"),
+    ("program", "settings", "key", "found"),
     [
-        (PRESS.slide(SIDE, speed=1.0), {"boundary": "free"}, "boundary: found 'free': expected 'periodic'"),
-        (PRESS.slide(SIDE, speed=1.0), {"boundary": "mirror"}, "boundary: found 'mirror': expected 'periodic'"),
-        (PRESS.slide(1e-5, speed=1.0), {}, "program.2: slide: found 1e-05: .* half a cell of 41.6667 µm"),
-        (rv.Program().slide(SIDE, speed=1.0), {}, "program.0 slides before there is a load"),
+        (PRESS.slide(SIDE, speed=1.0), {"boundary": "free"}, "boundary", "free"),
+        (PRESS.slide(SIDE, speed=1.0), {"boundary": "mirror"}, "boundary", "mirror"),
+        (PRESS.slide(1e-5, speed=1.0), {}, "slide", 1e-5),
+        (rv.Program().slide(SIDE, speed=1.0), {}, "program.0", "slide"),
     ],
 )
-def test_what_cannot_be_computed__is_refused(program, settings, message):
-    with pytest.raises(InputError, match=message):
+def test_what_cannot_be_computed__is_refused(program, settings, key, found):
+    with refused(key, found):
         slid(program, **settings)
 
 

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.resources import PART, PROCESS
-from roughvisc.solve import cores
 from roughvisc.study.case import Case
 from roughvisc.study.execution.run import IN_USE, Outcome, attempt
 from roughvisc.study.storage.folder import case_path
@@ -141,7 +140,9 @@ def processes_that_fit(largest: float, most: int, free: float) -> int:
 
 def threads_each(processes: int) -> int:
     """Return the number of threads per process for some processes on this machine."""
-    return max(1, cores() // max(processes, 1))
+    from dask.system import CPU_COUNT
+
+    return max(1, CPU_COUNT // max(processes, 1))
 
 
 def distribute(

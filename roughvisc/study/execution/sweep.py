@@ -23,7 +23,6 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.observables import OBSERVABLES
 from roughvisc.progress import Bars, clock
-from roughvisc.solve import cores
 from roughvisc.study.case import Case, read_cases
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.cluster import (
@@ -210,11 +209,11 @@ def _computed(
     threads: int | None,
 ) -> Iterator[Outcome]:
     """Compute cases on the workers of a client, in processes of a local cluster, or in this process."""
-    processes = min(cores() if workers is None else workers, len(todo))
+    processes = min(threads_each(1) if workers is None else workers, len(todo))
     if not todo or (client is None and (not processes or (workers is None and processes == 1))):
         for key, case in todo.items():
             display.reached(key, 0.0, 0.0)
-            yield attempt(case, folder, progress=partial(display.reached, key), threads=threads or cores())
+            yield attempt(case, folder, progress=partial(display.reached, key), threads=threads or threads_each(1))
         return
     texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:

@@ -205,7 +205,7 @@ def test_sweep__computes_cases_of_much_memory_in_fewer_processes(study, tmp_path
             raise TooLargeError("it needs more")
         return bring(case, folder, **settings)
 
-    monkeypatch.setattr(sweep_module, "cores", lambda: 4)
+    monkeypatch.setattr(sweep_module, "threads_each", lambda processes: 4 // processes)
     monkeypatch.setattr(sweep_module, "local_client", cluster)
     monkeypatch.setattr(run_module, "run_case", large)
     outcomes = run_cases(cases, tmp_path / "out", display=Display(False))

@@ -55,6 +55,7 @@ ROUGH = {"generate": "self_affine", "size": "3 mm", "shape": 24, "hurst": 0.8, "
         ({"program.1.control": "force"}, "program.1.control", "force"),
         ({"keep.fields": ["presure"]}, "keep.fields", ["presure"]),
         ({"keep.times": [1, "7 s"]}, "keep.times", 7.0),
+        ({"program.1": {"slide": "1 mm", "speed": "1 mm/s"}, "solve.boundary": "free"}, "solve.boundary", "free"),
     ],
     ids=str,
 )
