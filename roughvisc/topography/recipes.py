@@ -541,7 +541,7 @@ def cells(shape: Any, least: int = 1) -> tuple[int, int]:
     Raises
     ------
     InputError
-        If `shape` is neither a whole number of at least `least` nor a pair of them.
+        If `shape` is neither a whole number of at least `least` nor a pair of such numbers.
     DataNeeded
         If `shape` is a placeholder: the recipe has checked its other arguments.
     """

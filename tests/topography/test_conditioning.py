@@ -6,8 +6,11 @@ import xarray as xr
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import examples, shapes
+from support import refused
 
+from roughvisc.arguments import arguments
 from roughvisc.errors import InputError
+from roughvisc.topography.conditioning import STEPS, condition
 from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
 from roughvisc.topography.framing import combine, crop, invert, mirror, rotate90
 from roughvisc.topography.grid import spacing
@@ -48,6 +51,32 @@ def rough(shape=(45, 38), missing=0.0, seed=0):
 def test_step__refuses_a_wrong_argument_by_name(step, named):
     with pytest.raises(InputError, match=named):
         step()
+
+
+@pytest.mark.parametrize(
+    ("steps", "key", "found"),
+    [
+        ({"level": 4}, "surface.level", 4),
+        ({"level": {"order": 4}}, "surface.level.order", 4),
+        ({"filter": 2.9}, "surface.filter", 2.9),
+        ({"resample": 1}, "surface.resample", 1),
+        ({"rotate90": 0.5}, "surface.rotate90", 0.5),
+        ({"realisation": 0}, "surface.realisation", 0),
+        ({"shortest_wave": 1e-9}, "surface.shortest_wave", 1e-9),
+        ({"outliers": 9}, "surface.outliers", 9),
+        ({"outliers": {"window": 4}}, "surface.outliers.window", 4),
+        ({"fill": "harmonic"}, "surface.fill", "harmonic"),
+    ],
+    ids=str,
+)
+def test_condition__refuses_a_plain_value_at_the_step_and_a_table_at_its_key(steps, key, found):
+    with refused(key, found):
+        condition(rough(), steps, "surface")
+
+
+@pytest.mark.parametrize("name", [name for name, step in STEPS.items() if step.argument])
+def test_steps__plain_value_is_the_argument_after_the_heights(name):
+    assert list(arguments(STEPS[name].function))[1] == STEPS[name].argument
 
 
 @pytest.mark.parametrize(("offset", "off"), [(0.0, 1e-17), (1e-2, 1e-16)])
