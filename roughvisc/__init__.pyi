@@ -48,7 +48,7 @@ from roughvisc.study.storage.sweep_data import to_csv as to_csv
 from roughvisc.study.storage.sweep_data import to_table as to_table
 from roughvisc.study.sweep_table import over_realisations as over_realisations
 from roughvisc.study.trade import trade as trade
-from roughvisc.topography.example import example_scan as example_scan
+from roughvisc.topography import example_scan as example_scan
 from roughvisc.topography.filters import fill as fill
 from roughvisc.topography.filters import gaussian_filter as gaussian_filter
 from roughvisc.topography.filters import level as level

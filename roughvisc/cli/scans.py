@@ -135,7 +135,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     from roughvisc.cli.tables import findings_table
     from roughvisc.study.first_study import first_pressure, starter_study
     from roughvisc.study.storage.folder import write_text
-    from roughvisc.topography.example import EXAMPLE
+    from roughvisc.topography import EXAMPLE
     from roughvisc.units import number
 
     part = number(contact, "1", "contact", above=0, below=1)

@@ -29,7 +29,8 @@ from roughvisc.study.case_text import case_words, study_text
 from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
-from roughvisc.topography.parameters import levelled_parameters
+from roughvisc.topography.filters import off_plane
+from roughvisc.topography.parameters import parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, IN_TABLE, VARIABLES, axis_of
 
@@ -143,8 +144,8 @@ def _case(job: tuple[Path | xr.Dataset, int, bool]) -> dict[str, Any]:
     }
     found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(source, DEFAULT)]
     if "height" in source and (number == 0 or varies_surface(case)):
-        parameters = levelled_parameters(source["height"].load())
-        rows = [(name.replace("_", " "), parameters[name].attrs["long_name"], parameters[name]) for name in _PARAMETERS]
+        measured = parameters(off_plane(source["height"].load()))
+        rows = [(name.replace("_", " "), measured[name].attrs["long_name"], measured[name]) for name in _PARAMETERS]
         found["surface"] = {
             "name": str(source["height"].attrs.get("source_file") or title),
             "picture": _picture(FIGURES["surface"][2], surface(source)),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import xarray as xr
 
@@ -91,9 +91,7 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.
     return h
 
 
-def boundary_after(
-    steps: Mapping[str, Any], made: Literal["free", "periodic"] | None
-) -> Literal["free", "periodic"] | None:
+def boundary_after(steps: Mapping[str, Any], made: str | None) -> str | None:
     """Return the boundary of a surface after conditioning steps; None if the user has to state it.
 
     Parameters

@@ -14,8 +14,6 @@ from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, like, noted, require_heights, spacing
 from roughvisc.units import Quantity, number, quantities
 
-#: 1.4826 median absolute deviations are the standard deviation of normal noise.
-_MAD = 1.4826
 #: Memory of the windows that are sorted together. [byte]
 _MEMORY = 1 << 24
 
@@ -121,7 +119,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     require_heights(h, "mask_outliers")
     off = np.abs(h.values - _local_median(h.values, window))
     faintest = 1e-12 * np.nanmax(np.abs(h.values))
-    scale = np.fmax(_local_median(off, window), np.nanmedian(off)) * _MAD
+    # 1.4826 median absolute deviations are the standard deviation of normal noise
+    scale = np.fmax(_local_median(off, window), np.nanmedian(off)) * 1.4826
     outlier = off > np.maximum(threshold * scale, faintest)
     count = int(outlier.sum())
     line = f"outliers masked: {count} points beyond {threshold:g} deviations from the median of {window} x {window}"

@@ -158,7 +158,7 @@ def combine(
     nx, ny = first.shape
     line += f", its centre ({apart[0]:.6g}, {apart[1]:.6g}) m from that of the first, on {nx} x {ny} cells of the first"
     both = with_coordinates(first.values + second, first["x"].values, first["y"].values, h1.attrs)
-    faces = ((h1, first.values), (h2, second))
+    faces = (h1, first.values), (h2, second)
     solid = all(h.attrs.get("missing") == "absent" or np.isfinite(values).all() for h, values in faces)
     attrs = {"recipe": None, "period": h1.attrs.get("period") if repeats else None}
     attrs["missing"] = "absent" if solid and np.isnan(both.values).any() else None
@@ -240,8 +240,6 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
         Twice as many points along each axis. [m]
     """
     h = checked(h, "mirror")
-    doubled = h.isel({axis: np.r_[0:n, n - 1 : -1 : -1] for axis, n in h.sizes.items()})
-    for axis, d in zip(("x", "y"), spacing(h), strict=True):
-        centres = float(h[axis][0]) + np.arange(doubled.sizes[axis]) * d
-        doubled = doubled.assign_coords({axis: (axis, centres, h[axis].attrs)})
+    axes = [float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d for axis, d in zip("xy", spacing(h), strict=True)]
+    doubled = with_coordinates(np.pad(h.values, [(0, n) for n in h.shape], mode="symmetric"), *axes, h.attrs)
     return noted(doubled, MIRRORED, period=period_of(doubled))

@@ -74,14 +74,13 @@ class Inspection:
         Conditioning steps of all findings, in order.
     boundary : {"periodic", "mirror"}
         Boundary without a step between a surface and its repetition.
-    shape, area, rms_slope : tuple of int, float, float
-        Of the surface after the steps. [-, m2, -]
+    area, rms_slope : float
+        Of the surface after the steps. [m2, -]
     """
 
     findings: dict[str, Finding]
     steps: dict[str, Any]
     boundary: Literal["periodic", "mirror"]
-    shape: tuple[int, int]
     area: float
     rms_slope: float
 
@@ -121,7 +120,7 @@ def inspect(h: xr.DataArray) -> Inspection:
         seen += f", {_percent(in_holes)} of the scan in holes wider than a few points"
         advice = f'crop to a part without these holes, or missing = "absent" if there is no material; else {advice}'
     step = {"fill": True} if missing else {}
-    findings["Missing points"] = Finding(seen, advice * (missing > 0), step, {"points": missing})
+    findings["Missing points"] = Finding(seen, advice if missing else "", step, {"points": missing})
 
     levelled = level(h)
     masked = mask_outliers(levelled)
@@ -134,16 +133,14 @@ def inspect(h: xr.DataArray) -> Inspection:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice = "outliers = true; otherwise the spikes carry the load"
     step = {"outliers": True, "fill": True} if few else {}
-    values = {"points": spikes, "rms_with": rms_levelled, "rms_without": rms}
-    findings["Spikes"] = Finding(seen, advice, step, values)
+    findings["Spikes"] = Finding(seen, advice, step, {"points": spikes, "rms_with": rms_levelled, "rms_without": rms})
 
     plane = h - levelled
     slopes = tuple(float(np.nanmean(plane.diff(axis))) / d for axis, d in zip("xy", spacing(h), strict=True))
     rms_flat = float(np.nanstd(level(kept, 2).values)) if min(h.shape) > 2 else rms
     form = 1 - (rms_flat / rms) ** 2 if rms > 0 else 0.0
     repeats = max(border_mismatch(kept)) > JUMP >= max(border_mismatch(h))  # a plane would break the periodicity
-    tilted = not repeats and float(np.nanstd(plane.values)) > _TILTED * rms
-    order = 2 if form > _FORM else int(tilted)
+    order = 2 if form > _FORM else int(not repeats and np.nanstd(plane.values) > _TILTED * rms)
     treated = (level(h, order) if order else h).where(kept.notnull())
     along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.3f}°" for one in slopes)
     seen = f"{along_x} along x, {along_y} along y; a quadratic form accounts for {_percent(form)} of Sq squared"
@@ -156,8 +153,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     borders = border_mismatch(treated)
     boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
     seen = f"opposite borders differ {borders[0]:.2f} (x) and {borders[1]:.2f} times (y) as much as neighbouring rows"
-    why = '; with "periodic" the step at the seam carries load' if boundary == "mirror" else ""
-    findings["Borders"] = Finding(seen, f'boundary = "{boundary}"{why}', {}, {"of_neighbours": borders})
+    findings["Borders"] = Finding(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
 
     findings["Noise"] = noise = _noise(treated)
     treated = gaussian_filter(treated, noise.step["filter"]) if noise.step else treated
@@ -168,7 +164,7 @@ def inspect(h: xr.DataArray) -> Inspection:
 
     proposed = {name: value for one in findings.values() for name, value in one.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
-    return Inspection(findings, steps, boundary, treated.shape, nominal_area(treated), slope)
+    return Inspection(findings, steps, boundary, nominal_area(treated), slope)
 
 
 def _in_large_holes(missing: np.ndarray) -> np.ndarray:
@@ -190,14 +186,15 @@ def _noise(h: xr.DataArray) -> Finding:
         ``wavelength``, the shortest wave above the noise [m], and ``noisy_slopes``, the share of the shorter waves in
         the mean square slope [-]. Empty if nothing was measured.
     """
-    gaps = h["filled"].values if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
+    gaps = h["filled"].values.astype(bool) if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
     # points inside or at the edge of large holes are usually artefacts
     gaps = gaps | scipy.ndimage.binary_dilation(_in_large_holes(gaps))
     rms, cell = float(h.values.std()), max(spacing(h))
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"
         return Finding(seen, "", {}, {})
-    q, density, modes = _short_waves(h, gaps)
+    waves = _short_waves(h, gaps)
+    q, density = waves["wavevector"].values, waves["psd"].values
     octave, area = q > q[-1] / 2, math.prod(spacing(h))
     tail = float(np.median(density[octave]))
     power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
@@ -205,27 +202,24 @@ def _noise(h: xr.DataArray) -> Finding:
     floor = bool(power > _WHITE and below.size and below[0] > 0 and math.sqrt(tail / area) > _ROUNDING * rms)
     if floor and gaps.any():
         more = gaps | np.roll(gaps, [n // 2 for n in gaps.shape], (0, 1))
-        floor = float(np.median(_short_waves(h, more)[1][octave])) <= _OF_GAPS * tail
+        floor = float(np.median(_short_waves(h, more)["psd"].values[octave])) <= _OF_GAPS * tail
     if not floor:
         least = math.sqrt(float(np.median(density[q > 0.8 * q[-1]])) / area)
         seen = f"no noise floor down to two cells; noise is below {_length(least)} rms"
         return Finding(seen, "", {}, {"rms": least, "floor": False})
-    strength, shortest, slopes = math.sqrt(tail / area), float(2 * np.pi / q[below[0] - 1]), density * modes * q**2
-    noisy = float(slopes[q > 2 * np.pi / shortest].sum() / slopes.sum())
-    seen = f"{_length(strength)} rms: wavelengths below {_length(shortest)} are noise"
-    seen += f", {_percent(noisy)} of the mean square slope"
-    is_harmful = noisy > _HARMLESS and shortest >= 3 * cell
-    step = {"filter": max(float(f"{shortest:.2g}"), 3.001 * cell)} if is_harmful else {}
-    values = {"rms": strength, "floor": True, "wavelength": shortest, "noisy_slopes": noisy}
+    noise, cutoff = math.sqrt(tail / area), float(2 * np.pi / q[below[0] - 1])
+    slopes = density * waves["modes"].values * q**2
+    noisy = float(slopes[q > 2 * np.pi / cutoff].sum() / slopes.sum())
+    seen = f"{_length(noise)} rms: waves below {_length(cutoff)} are noise, {_percent(noisy)} of the mean square slope"
+    is_harmful = noisy > _HARMLESS and cutoff >= 3 * cell
+    step = {"filter": max(float(f"{cutoff:.2g}"), 3.001 * cell)} if is_harmful else {}
+    values = {"rms": noise, "floor": True, "wavelength": cutoff, "noisy_slopes": noisy}
     return Finding(seen, "filter out these wavelengths" * is_harmful, step, values)
 
 
-def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return wavevector [rad/m], density [m4] and number of modes of the complete rings; a membrane fills the gaps."""
-    spectrum = psd(fill(h.where(~gaps)), "hann")
-    seen = spectrum["wavevector"].values <= np.pi / max(spacing(h))
-    q, density, modes = (spectrum[name].values[seen] for name in ("wavevector", "psd", "modes"))
-    return q, density, modes
+def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:
+    """Return the complete rings of the power spectrum; a membrane fills the gaps."""
+    return psd(fill(h.where(~gaps)), "hann").sel(wavevector=slice(None, np.pi / max(spacing(h))))
 
 
 def _length(value: float) -> str:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import xarray as xr
 
-from roughvisc.topography.filters import off_plane
 from roughvisc.topography.grid import checked, require_heights, spacing
 
 #: name -> (units, long name)
@@ -72,11 +71,6 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}
     return xr.Dataset({name: ((), float(value), declared[name]) for name, value in values.items()})
-
-
-def levelled_parameters(h: xr.DataArray) -> xr.Dataset:
-    """Return the :func:`parameters` of heights minus their mean plane, for tables, pages and figures."""
-    return parameters(off_plane(h))
 
 
 def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:

@@ -22,16 +22,7 @@ from roughvisc.arguments import DataNeeded, NoData, call, check_keys, one_of, sp
 from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
-from roughvisc.topography.grid import (
-    checked,
-    counts,
-    labelled,
-    noted,
-    pair,
-    require_complete,
-    spacing,
-    with_coordinates,
-)
+from roughvisc.topography.grid import checked, counts, labelled, noted, pair, spacing, with_coordinates
 from roughvisc.topography.spectrum import psd, wavevectors
 from roughvisc.units import Quantity, number, quantities
 
@@ -39,8 +30,8 @@ from roughvisc.units import Quantity, number, quantities
 
 
 @quantities(radius="m > 0", size="m")
-def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.DataArray:
-    r"""Return a spherical indenter, centred, with its apex at height zero.
+def sphere(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
+    r"""Return a spherical indenter, the paraboloid :math:`-r^2 / 2R` of Hertz theory, centred, with its apex at zero.
 
     Parameters
     ----------
@@ -50,9 +41,6 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
         Sides of the domain. [m]
     shape : int or pair of int
         Number of cells ``(nx, ny)``; one along an axis is a strip, which begins at zero.
-    exact : bool, default False
-        False: the paraboloid :math:`-r^2 / 2R` of Hertz theory. True: the circular cap
-        :math:`\sqrt{R^2 - r^2} - R`; cells beyond the equator are absent.
 
     Returns
     -------
@@ -65,7 +53,7 @@ def sphere(radius: Quantity, size: Any, shape: Any, exact: bool = False) -> xr.D
     InputError
         If a parameter is not positive and finite.
     """
-    return _indenter("sphere", {"radius": radius, "exact": bool(exact)}, size, shape)
+    return _indenter("sphere", {"radius": radius}, size, shape)
 
 
 @quantities(slope="1 > 0", size="m")
@@ -282,18 +270,9 @@ def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> x
     return generated(heights, name, parameters, size, **({"missing": "absent"} if absent.any() else {}))
 
 
-def _sphere(x: np.ndarray, y: np.ndarray, radius: float, exact: bool) -> np.ndarray:
-    r2 = x**2 + y**2
-    if not exact:
-        return r2 / (-2 * radius)
-    # not sqrt(R^2 - r^2) - R, which loses the digits of a shallow cap
-    cap = -r2 / (radius + np.sqrt(np.maximum(radius**2 - r2, 0)))
-    return np.where(r2 <= radius**2, cap, np.nan)
-
-
 #: Profiles, defined beyond their grid: (x, y from the centre, parameters) -> height.
 _INDENTERS: dict[str, Callable[..., np.ndarray]] = {
-    "sphere": _sphere,
+    "sphere": lambda x, y, radius: (x**2 + y**2) / (-2 * radius),
     "cone": lambda x, y, slope: -slope * np.hypot(x, y),
     "flat_punch": lambda x, y, radius: np.where(np.hypot(x, y) <= radius, 0.0, np.nan),
 }
@@ -442,7 +421,6 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     """Return one surface of :func:`surrogates`, by its number. [m]"""
     entropy = [whole("seed", seed), whole("number", number, 1)]
     h = checked(h, "surrogates")
-    require_complete(h, "surrogates")
     if is_mirrored(h):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
@@ -457,9 +435,8 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
     variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
     heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=True)
-    grid = labelled(heights, sides).assign_coords(x=h["x"], y=h["y"])
     line = f"surrogate {number} of seed {seed}: random phases, gaussian amplitudes"
-    return noted(grid, line, period=period_of(grid))
+    return noted(with_coordinates(heights, h["x"].values, h["y"].values), line, period=period_of(h))
 
 
 def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal: bool) -> np.ndarray:
@@ -489,12 +466,11 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
     for row, part in enumerate(amplitude):
         count = int(np.flatnonzero(part).max(initial=-1)) + 1
         k_x = row if 2 * row < nx else row - nx
-        streams = [
-            np.random.default_rng(np.random.SeedSequence(entropy, spawn_key=(2 * k_x if k_x >= 0 else -2 * k_x - 1, i)))
-            for i in (0, 1)
-        ]
-        waves = np.exp(2j * np.pi * streams[0].random(count))
-        waves = waves * np.sqrt(streams[1].standard_exponential(count)) if normal else waves
+        key = 2 * k_x if k_x >= 0 else -2 * k_x - 1
+        seeds = (np.random.SeedSequence(entropy, spawn_key=(key, i)) for i in (0, 1))
+        phases, powers = map(np.random.default_rng, seeds)
+        waves = np.exp(2j * np.pi * phases.random(count))
+        waves = waves * np.sqrt(powers.standard_exponential(count)) if normal else waves
         spectrum[row, :count] = part[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
     half = (nx - 1) // 2  # the first column holds both halves: make it Hermitian
     spectrum[nx - half :, 0] = spectrum[1 : half + 1, 0][::-1].conj()

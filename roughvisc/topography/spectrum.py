@@ -6,6 +6,7 @@ Heights belong to cell centres; the centres of the cells of two grids over the s
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -112,10 +113,8 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     q = np.hypot(q_x[:, None], q_y)
     ring = np.maximum(np.round(q / step).astype(int), 1)
     ring[q == 0] = 0  # the mean
-    weights = np.broadcast_to(stands_for, q.shape)
-    counted, at, total = (
-        np.bincount(ring.ravel(), one.ravel())[1:] for one in (weights, weights * q, weights * density)
-    )
+    count = np.broadcast_to(stands_for, q.shape)
+    counted, at, total = (np.bincount(ring.ravel(), one.ravel())[1:] for one in (count, count * q, count * density))
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     variables = {
@@ -215,12 +214,11 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
     if period:
         q_x, q_y, _ = wavevectors(h.shape, sides)
-        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.rfft2(h.values), 0.0)
-        heights = scipy.fft.irfft2(heights_q, s=h.shape)
+        heights_q, inverse = scipy.fft.rfft2(h.values), partial(scipy.fft.irfft2, s=h.shape)
     else:
         q_x, q_y = (np.pi * np.arange(n) / length for n, length in zip(h.shape, lengths, strict=True))
-        heights_q = np.where(np.hypot(q_x[:, None], q_y) <= limit, scipy.fft.dctn(h.values, norm="ortho"), 0.0)
-        heights = scipy.fft.idctn(heights_q, norm="ortho")
+        heights_q, inverse = scipy.fft.dctn(h.values, norm="ortho"), partial(scipy.fft.idctn, norm="ortho")
+    heights = inverse(np.where(np.hypot(q_x[:, None], q_y) <= limit, heights_q, 0.0))
     return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", period=period)
 
 

@@ -50,7 +50,7 @@ def test_border__is_a_warning_for_periodic_surfaces_that_repeat_with_a_step(capl
 
 def ball_pressed(depth, **options):
     """A ball over a square of 17 x 15 cells; its contact is within it to about the depth of the middle of a side."""
-    ball = rv.sphere(radius=1e-3, size=(17e-6, 15e-6), shape=(17, 15), exact=False)
+    ball = rv.sphere(radius=1e-3, size=(17e-6, 15e-6), shape=(17, 15))
     program = rv.Program().approach(depth, over=1.0).approach(1e-10, over=1.0)
     with_defaults = {"boundary": "free", "times": [0.1, 2.0], "numerics": rv.Numerics(time_step=0.05)} | options
     return rv.simulate(ball, rv.elastic(1e6), program, progress=False, **with_defaults)

@@ -17,7 +17,7 @@ import roughvisc as rv
 from roughvisc import observables, plot
 from roughvisc.errors import InputError
 from roughvisc.plot import fields, style
-from roughvisc.topography.parameters import levelled_parameters
+from roughvisc.topography.filters import off_plane
 
 
 def images(figure):
@@ -205,7 +205,7 @@ def test_surface__states_the_sq_and_the_spectrum_of_the_levelled_heights():
     h = rv.self_affine((3e-4, 2e-4), (120, 90), hurst=0.8, rms_height=1e-6, rolloff=5e-5, seed=3)
     tilted = h + 0.1 * h.x - 0.05 * h.y
     heights, spectrum = plot.surface(tilted).axes[2:4]
-    sq = float(levelled_parameters(tilted)["Sq"])
+    sq = float(rv.parameters(off_plane(tilted))["Sq"])
     assert f"normal, Sq = {1e6 * sq:.3g} µm" in lines(heights)
     q, density = spectrum.lines[0].get_data()
     whole = rv.psd(rv.level(h), "hann").sel(wavevector=slice(np.pi * 120 / 3e-4))

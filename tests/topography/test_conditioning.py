@@ -236,10 +236,13 @@ def test_filled__goes_with_its_points_through_later_steps():
     x, y = slice(3e-6, 2.5e-5), slice(0, 3e-5)
     part = crop(done, x=(x.start, x.stop), y=(y.start, y.stop))
     np.testing.assert_array_equal(part["filled"], np.isnan(h.sel(x=x, y=y)))
-    doubled = mirror(done)
-    np.testing.assert_array_equal(doubled["filled"], np.isnan(mirror(h)))
-    for step in (part, doubled, level(done), gaussian_filter(done, 2e-5)):
+    for step in (part, level(done), gaussian_filter(done, 2e-5)):
         assert step.attrs["filled_points"] == int(step["filled"].sum()) > 0
-    for step in (resample(done, (10, 8)), rotate90(done), combine(done, done)):  # other cells: their number is known
+    for step in (
+        resample(done, (10, 8)),
+        rotate90(done),
+        mirror(done),
+        combine(done, done),
+    ):  # other cells: their number is known
         assert "filled" not in step.coords
         assert step.attrs["filled_points"] == int(done["filled"].sum())

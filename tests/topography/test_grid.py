@@ -89,7 +89,7 @@ DOORS = {
     "psd": rv.psd,
 }
 #: Steps that make other cells, on which no point is marked as filled.
-OTHER_CELLS = ("resample", "rotate90", "combine", "combine, below")
+OTHER_CELLS = ("resample", "rotate90", "combine", "combine, below", "mirror")
 
 
 @pytest.mark.parametrize("door", DOORS)

@@ -5,8 +5,9 @@ import pytest
 import xarray as xr
 
 from roughvisc.errors import InputError
+from roughvisc.topography.filters import off_plane
 from roughvisc.topography.grid import labelled, spacing
-from roughvisc.topography.parameters import PARAMETERS, levelled_parameters, parameters, rms_slope
+from roughvisc.topography.parameters import PARAMETERS, parameters, rms_slope
 from roughvisc.topography.readers import from_array
 from roughvisc.topography.recipes import self_affine, wavy
 from roughvisc.topography.spectrum import psd
@@ -128,6 +129,6 @@ def test_lone_cell__has_no_wave_and_no_slope():
     assert psd(alone).sizes["wavevector"] == 0
 
 
-def test_levelled_parameters__subtract_the_mean_where_points_determine_no_plane():
+def test_off_plane__subtracts_the_mean_where_points_determine_no_plane():
     line = from_array(np.outer([1.0, np.nan, np.nan], np.arange(8.0)) * 1e-6, spacing=1e-5)
-    assert float(levelled_parameters(line).Sq) == pytest.approx(np.arange(8).std() * 1e-6, rel=1e-12)
+    assert float(parameters(off_plane(line)).Sq) == pytest.approx(np.arange(8).std() * 1e-6, rel=1e-12)

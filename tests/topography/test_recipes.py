@@ -52,15 +52,6 @@ def test_sphere__is_the_paraboloid_about_the_centre():
     assert h.sel(x=1.5e-3, method="nearest").max() == pytest.approx(-((1e-3 / 24) ** 2) / 0.04)  # y: between two cells
 
 
-def test_sphere__exact_cap_satisfies_the_equation_of_the_sphere_and_ends_at_the_equator():
-    h = sphere(8e-4, SIZE, SHAPE, exact=True)
-    r2 = (h.x - 1.5e-3) ** 2 + (h.y - 1e-3) ** 2
-    assert bool((np.isnan(h) == (r2 > 8e-4**2)).all())
-    np.testing.assert_allclose((r2 + (h + 8e-4) ** 2).values[~np.isnan(h)], 8e-4**2, rtol=1e-12)
-    assert h.attrs["missing"] == "absent"
-    assert "missing" not in sphere(1.0, SIZE, SHAPE, exact=True).attrs
-
-
 def test_cone__has_the_slope_given():
     h = cone(0.2, 1.0, 101)
     along = h.isel(y=50)
@@ -183,7 +174,6 @@ def test_self_affine__anisotropy_stretches_the_texture_along_x():
     "h",
     [
         sphere(1e-2, SIZE, SHAPE),
-        sphere(1e-3, SIZE, SHAPE, exact=True),
         cone(0.1, SIZE, SHAPE),
         flat_punch(5e-4, SIZE, SHAPE),
     ],
