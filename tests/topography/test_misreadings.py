@@ -112,6 +112,7 @@ def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):
         (2, lambda row: row[:20] + "\x01\x7f#?" + row[24:]),
         (2, lambda row: "***"),
         (1, lambda row: f"0.1x{row[3:]}"),
+        (5, lambda row: row[:5]),  # cut short
     ],
 )
 def test_matrix__with_a_damaged_row_is_refused_and_not_read_without_it(separator, line, broken, tmp_path):
