@@ -27,8 +27,7 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
     Example:
       roughvisc plot results/focus_variation-study --out figures
     """
-    from roughvisc.plot import save_sweep_figures
-    from roughvisc.plot.save import results_of_sweep, save_figures_of_files
+    from roughvisc.plot.save import results_of_sweep, save_figures_of_files, save_sweep_figures
     from roughvisc.study.execution.cluster import threads_each
     from roughvisc.study.storage.folder import results_at
 

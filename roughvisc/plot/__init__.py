@@ -4,12 +4,9 @@ In a notebook a figure shows itself; elsewhere ``figure.savefig("name.pdf")`` wr
 readable prefixes. Matplotlib's global state is not changed.
 """
 
+from roughvisc.plot.curves import area_against_load, budget, friction, history, trade
 from roughvisc.plot.fields import animate, maps, section, surface
-from roughvisc.plot.history import area_against_load, friction, history
-from roughvisc.plot.save import FIGURES as FIGURES
-from roughvisc.plot.save import save_figures, save_sweep_figures
 from roughvisc.plot.sweep import sweep
-from roughvisc.plot.trade import budget, trade
 
 __all__ = [
     "animate",
@@ -18,8 +15,6 @@ __all__ = [
     "friction",
     "history",
     "maps",
-    "save_figures",
-    "save_sweep_figures",
     "section",
     "surface",
     "sweep",

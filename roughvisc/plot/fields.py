@@ -23,7 +23,7 @@ from roughvisc.observables.frames import expect_result, need
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
-from roughvisc.topography.grid import cell_edges, cell_side, checked, spacing
+from roughvisc.topography.grid import cell_edges, cell_side, checked, require_heights, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import Quantity, Unit, in_si, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
@@ -42,8 +42,6 @@ _LOOK = {
 MOST_CELLS, _MOST_FRAMES = 1024, 8
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN, _SPIKE = 99.8, 1.2
-#: Direction of the motion -> arrow on a map.
-_ARROWS = {"x": "→", "-x": "←", "y": "↑", "-y": "↓"}
 
 
 def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
@@ -59,22 +57,19 @@ def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
     return np.where(from_end, rows.size + wanted, nearest).astype(int).tolist()
 
 
-def largest_contact(dataset: xr.Dataset) -> int:
-    """Return the number of the last row with the largest contact area, or of the last row if areas are not known."""
-    area = np.nan_to_num(dataset.get("contact_area", np.zeros(dataset.sizes[axis_of(dataset.variables)])))
-    return int(np.flatnonzero(area >= 0.999 * area.max())[-1])
+def largest_row(dataset: xr.Dataset) -> int:
+    """Return the number of the last row with the largest contact area, or of the row with the largest friction."""
+    axis = axis_of(dataset.variables)
+    values = np.nan_to_num(dataset.get(AXES[axis].telling or "contact_area", np.zeros(dataset.sizes[axis])))
+    return int(np.flatnonzero(values >= values.max() - 1e-3 * abs(values.max()))[-1])
 
 
 def representative_frames(dataset: xr.Dataset) -> list[int]:
-    """Return up to four rows, evenly spread and with the largest contact; for friction, the ends and the maximum."""
-    axis = axis_of(dataset.variables)
-    rows, key = dataset[axis].values, AXES[axis].telling
-    if key in dataset:
-        chosen = {int(rows.argmin()), int(np.nanargmax(dataset[key].values)), int(rows.argmax())}
-        return sorted(chosen, key=rows.__getitem__)
-    spread, largest = np.linspace(0, rows.size - 1, 4).round().astype(int), largest_contact(dataset)
+    """Return up to four rows, evenly spread and among them the one with the largest contact or friction."""
+    order = dataset[axis_of(dataset.variables)].values.argsort()
+    spread, largest = np.linspace(0, order.size - 1, 4).round().astype(int), order.argsort()[largest_row(dataset)]
     spread[np.abs(spread - largest).argmin()] = largest
-    return np.unique(spread).tolist()
+    return order[np.unique(spread)].tolist()
 
 
 def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
@@ -145,9 +140,6 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     cmap = matplotlib.colormaps[colours].with_extremes(bad=bad, under=below)
     image = ax.imshow(values, cmap=cmap, norm=norm, aspect="auto", origin="lower", extent=extent)
     ax.grid(visible=False)
-    for axis, side in (("x", ax.bbox.width), ("y", ax.bbox.height)):
-        most = int(np.clip(2.5 * side / ax.figure.dpi, 1, 4))
-        ax.locator_params(axis, nbins=most, steps=[1, 2, 5, 10])
     style.label_panels([ax], plane.label("x"), plane.label("y"))
     return image
 
@@ -158,27 +150,21 @@ def _draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Se
     unit, norm = colour_scale(name, shown)
     for ax, one in zip(axes, shown, strict=True):
         image = draw_map(ax, one, unit, norm)
-    values = unit(np.concatenate([one.values.ravel() for one in shown]))
-    named, (_, _, below, word) = {}, _LOOK[name]
+    values, named, (_, _, below, word) = unit(np.concatenate(shown)), {}, _LOOK[name]
     if below and (values < norm.vmin).any():
         named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
     if np.isnan(values).any():
-        bad = {"contact": style.CONTACT} if name == "flux" else {"missing": style.MISSING}
-        named |= {label: Patch(color=colour) for label, colour in bad.items()}
+        label, colour = ("contact", style.CONTACT) if name == "flux" else ("missing", style.MISSING)
+        named[label] = Patch(color=colour)
     extend = "max" if np.nanmax(values) > norm.vmax else "neither"
     style.colour_bar(image, axes, unit.label(VARIABLES[name].label), extend=extend)
     return named
 
 
 def frame_title(dataset: xr.Dataset, frame: int) -> str:
-    """Return the time of a row, or its speed with the direction and the friction coefficient."""
+    """Return the time or the speed of a row as text."""
     axis = axis_of(dataset.variables)
-    at = dataset.isel({axis: frame})
-    text = AXES[axis].place(float(at[axis]), 3)
-    if axis == "speed":
-        arrow = _ARROWS[str(dataset.attrs.get("direction", "x"))]
-        return f"{arrow} {text}\nµ = {float(at['friction_coefficient']):.2g}"
-    return text
+    return AXES[axis].place(float(dataset[axis][frame]), 3)
 
 
 @style.apply
@@ -188,8 +174,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
     the flux. Above 1024 cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
-    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades. For
-    friction, an arrow shows the direction of motion of the profile.
+    of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades.
 
     Parameters
     ----------
@@ -197,8 +182,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         One case's result; if its fields are on Dask, only the drawn frames are loaded.
     times : float or str, or a list, optional
         The nearest kept times [s], or speeds [m/s], are drawn; negative whole numbers count from the end. Default: up
-        to four times, among them the time of the largest contact; for friction, the lowest speed, the speed of the
-        largest friction, and the highest.
+        to four, evenly spread, among them the time of the largest contact or the speed of the largest friction.
     fields : sequence of str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
         ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else
@@ -221,20 +205,18 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         expect_result(dataset, "gap")
         dataset = dataset.assign(flux=_flux_of(dataset))
     stored = [name for name in fields if name in dataset]
-    if not stored:
-        expect_result(dataset, *fields)
+    expect_result(dataset, *(stored or fields))
     frames = representative_frames(dataset) if times is None else frames_at(dataset, times)
     columns = count = len(frames)
     size = map_size(dataset, max(1.3, 2.9 - 0.45 * count), 3.25)
     if size[0] > 3 * size[1]:  # strips are stacked
         columns, size = 1, map_size(dataset, 4.5, 4.0)
-    titles, named = [frame_title(dataset, frame) for frame in frames], {}
-    look: dict[str, Any] = {"shared": "xy", "lines": len(titles[0].splitlines()), "left": 0.65, "right": style.BAR}
-    figure, panels = style.new_panels(count * len(stored), columns, size, between=max(0.3, 1.5 - size[0]), **look)
+    room, named = {"between": max(0.3, 1.5 - size[0]), "right": style.BAR}, {}
+    figure, panels = style.new_panels(count * len(stored), columns, size, shared="xy", **room)
     for number, name in enumerate(stored):
         named |= _draw_field(panels[number * count :][:count], dataset, name, frames)
-    for ax, title in zip(panels, titles * len(stored), strict=True):
-        ax.set_title(title)
+    for ax, frame in zip(panels, frames * len(stored), strict=True):
+        ax.set_title(frame_title(dataset, frame))
     style.legend_above(figure, named)
     return figure
 
@@ -260,7 +242,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
         One case's result with ``height``, ``pressure`` and ``gap``.
     time : float or str, optional
         The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
-        the largest contact area. [s]
+        the largest contact area, or the speed of the largest friction. [s] or [m/s]
     axis : {"x", "y"}
         Direction of the cut.
     at : float or str, optional
@@ -273,33 +255,25 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
     rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
-    frame = largest_contact(dataset) if time is None else frames_at(dataset, time)[0]
+    frame = largest_row(dataset) if time is None else frames_at(dataset, time)[0]
     whole = dataset.isel({rows: frame})
     load, places = whole["pressure"].sum(axis).values, dataset[across].values
     index = int(load.argmax() if at is None else np.abs(places - at).argmin())
     cut = whole.isel({across: index}).load()
     height, surface = cut["height"], cut["height"] + cut["gap"]
-    plane, pressure = plane_unit(dataset), unit_for(cut["pressure"], "Pa")
+    plane, pressure, unit = plane_unit(dataset), unit_for(cut["pressure"], "Pa"), unit_for(surface - height.min(), "m")
     edges, x = plane(cell_edges(dataset[axis])), plane(dataset[axis])
-    figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x", left=0.7)
+    figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
-    top.set_ylim(bottom=0)
-    top.set_ylabel(pressure.label(VARIABLES["pressure"].label))
-    known = np.concatenate([height, surface])
-    known = known[np.isfinite(known)] if np.isfinite(known).any() else np.zeros(1)
-    unit, margin = unit_for(np.ptp(known), "m"), 0.12 * np.ptp(known)
-    low, high = float(unit(known.min() - margin)), float(unit(known.max() + 2 * margin))
-    bottom.fill_between(x, unit(height), low, color="0.72", lw=0, label="profile")
-    bottom.fill_between(x, unit(surface), high, color=style.BLUE, alpha=0.16, lw=0, label="body")
+    top.set(ylim=(0, None), ylabel=pressure.label("Pressure"))
     bottom.plot(x, unit(height), color="0.25", lw=1)
     bottom.plot(x, unit(surface), color=style.BLUE, lw=1)
     look = {"color": style.CONTACT, "lw": 2.4, "ms": 2.4, "mew": 0, "label": "contact"}
     bottom.plot(x, np.where(contact(cut), unit(height), np.nan), "o-", **look)
-    level = unit(float(dataset["height"].attrs.get("highest", dataset["height"].max())) - cut.get("approach", np.nan))
-    if low < level < high:
-        bottom.axhline(float(level), color=style.BLUE, lw=0.8, ls=(0, (4, 2)), label="undeformed")
-    bottom.set(xlim=(edges[0], edges[-1]), ylim=(low, high) if low < high else None, xlabel=plane.label(axis))
-    bottom.set_ylabel(unit.label(VARIABLES["height"].label))
+    low, high = bottom.get_ylim()
+    bottom.fill_between(x, unit(height), low, color="0.72", lw=0, label="profile")
+    bottom.fill_between(x, unit(surface), high, color=style.BLUE, alpha=0.16, lw=0, label="body")
+    bottom.set(xlim=(edges[0], edges[-1]), ylim=(low, high), xlabel=plane.label(axis), ylabel=unit.label("Height"))
     place = f"{across} = {plane.text(float(dataset[across][index]))}"
     top.set_title(f"{AXES[rows].place(float(whole[rows]), 3)},  {place}")
     figure.align_ylabels()
@@ -343,7 +317,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     dataset = dataset.sortby(axis_of(dataset.variables))
     count = dataset.sizes[axis_of(dataset.variables)]
     unit, norm = colour_scale(name, (frame_of(dataset, name, frame) for frame in range(count)))
-    figure, (ax,) = style.new_panels(1, 1, map_size(dataset, 3.2, 4.2), lines=2, right=style.BAR)
+    figure, (ax,) = style.new_panels(1, 1, map_size(dataset, 3.2, 4.2), right=style.BAR)
     image = draw_map(ax, frame_of(dataset, name, 0), unit, norm)
     style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
 
@@ -356,14 +330,6 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     return path
 
 
-def robust_limits(values: np.ndarray) -> tuple[float, float]:
-    """Return the limits of the heights without spikes: at most five robust standard deviations from the median. [m]"""
-    lower, median, upper = np.nanpercentile(values, (25, 50, 75))
-    reach = 5 * (upper - lower) / 1.349  # quartiles of the normal distribution are 1.349 deviations apart
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return (max(low, float(median - reach)), min(high, float(median + reach))) if reach > 0 else (low, high)
-
-
 @style.apply
 def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     """Draw a surface: map, profile through its middle, distribution of heights, power spectrum.
@@ -371,8 +337,8 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
-        Heights, peaks up; missing points are grey. The colour scale covers at most five robust standard deviations, so
-        that a spike does not flatten the rest; an arrow at the colour bar marks heights beyond it. [m]
+        Heights, peaks up; missing points are grey. The colour scale covers 98 % of the heights, so that a spike
+        does not flatten the rest. [m]
 
     Returns
     -------
@@ -380,64 +346,47 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
 
     Notes
     -----
-    Map and profile show the given heights. Distribution and spectrum show the heights minus their mean plane. The
-    distribution is drawn with the normal distribution of the same Sq. :func:`roughvisc.psd` computes the spectrum with
-    a Hann window, after missing points are filled.
+    Map and profile show the given heights. Distribution and spectrum show the heights minus their mean plane.
+    :func:`roughvisc.psd` computes the spectrum with a Hann window, after missing points are filled.
     """
     if isinstance(height, xr.Dataset):
         need(height, "height")
         height = height["height"]
     height = checked(height, "surface", least=1).rename("height")
-    if not np.isfinite(height).any():
-        raise InputError("the surface is all missing: nothing to draw")
-    low, high = robust_limits(height.values)
-    unit, plane = unit_for([high - low, low, high], "m"), plane_unit(height)
+    require_heights(height, "surface")
+    low, high = np.nanpercentile(height, (1, 99))
+    unit, plane = unit_for([low, high], "m"), plane_unit(height)
     ratio = float(np.ptp(cell_edges(height["y"])) / np.ptp(cell_edges(height["x"])))
     figure, axes = style.new_panels(4, 2, (2.4, 2.4 * float(np.clip(ratio, 0.6, 1.6))), between=1.65)
     on_map, profile, heights, spectrum = axes
     image = draw_map(on_map, drawn(height), unit, Normalize(float(unit(low)), float(unit(high))))
-    beyond = int((height < low).any()) + 2 * int((height > high).any())
-    style.colour_bar(image, [on_map], unit.label("Height"), extend=("neither", "min", "max", "both")[beyond])
+    style.colour_bar(image, [on_map], unit.label("Height"), extend="both")
     line = height.isel(y=height.sizes["y"] // 2)
     profile.plot(plane(line["x"]), unit(line), lw=0.9)
     on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
     profile.set_title(f"y = {plane.text(float(line['y']))}")
     profile.set(xlabel=plane.label("x"), ylabel=unit.label("Height"))
     levelled = off_plane(height)
-    _draw_heights(heights, levelled.values[np.isfinite(levelled.values)])
+    known = levelled.values[np.isfinite(levelled.values)]
+    low, high = np.percentile(known, (1, 99))
+    unit, ends = unit_for([low, high], "m"), np.array([1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low])
+    heights.hist(unit(known), int(np.clip(known.size**0.5 / 2, 8, 100)), range=unit(ends), density=True, alpha=0.5)
+    heights.set_title(f"Sq = {unit.text(known.std())}")
+    heights.set(xlabel=unit.label("Height, levelled"), ylabel=f"Density [1/{unit.symbol}]")
     _draw_spectrum(spectrum, levelled)
     return figure
 
 
-def _draw_heights(ax: Axes, known: np.ndarray) -> None:
-    """Draw the histogram of the levelled heights, with the normal distribution of the same deviation."""
-    low, high = robust_limits(known)
-    unit = unit_for([low, high], "m")
-    if high > low:
-        bins = int(np.clip(np.sqrt(known.size) / 1.5, 8, 100))
-        look = {"color": style.BLUE, "alpha": 0.45, "histtype": "stepfilled", "label": "measured"}
-        ax.hist(unit(known), bins, range=(float(unit(low)), float(unit(high))), density=True, **look)
-        z, middle, deviation = unit(np.linspace(low, high, 200)), unit(known.mean()), float(unit(known.std()))
-        normal = np.exp(-(((z - middle) / deviation) ** 2) / 2) / (deviation * np.sqrt(2 * np.pi))
-        ax.plot(z, normal, color=style.VERMILION, lw=1, label=f"normal, Sq = {deviation:.3g} {unit.symbol}")
-        ax.set_ylim(0, 1.4 * ax.get_ylim()[1])
-        ax.legend(loc="upper left")
-    ax.set(xlabel=unit.label("Height, levelled"), ylabel=f"Density [1/{unit.symbol}]")
-
-
 def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
     """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
-    symbol, scale = "µm", 1e-6
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
         gaps = bool(levelled.isnull().any())
         found = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
         found = found.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings inside the square of wavevectors
-        q, density = found["wavevector"].values, found["psd"].values
-        symbol, scale = ("nm", 1e-9) if q[-1] > 1e8 else ("µm", 1e-6) if q[-1] > 1e4 else ("mm", 1e-3)
-        telling = density > 1e-14 * density.max()  # the rest is rounding
-        q, density = q[telling] * scale, density[telling] / scale**4
+        found = found.where(found["psd"] > 1e-14 * found["psd"].max(), drop=True)  # the rest is rounding
+        q, density = 1e-6 * found["wavevector"], 1e24 * found["psd"]
         ax.plot(q, density, lw=1)
         style.log_axis(ax.xaxis, q)
         style.log_axis(ax.yaxis, density)
         ax.set_title("missing points filled" if gaps else "")
-    ax.set(xlabel=f"Wavevector [rad/{symbol}]", ylabel=f"Power spectral density\n[{symbol}⁴]")
+    ax.set(xlabel="Wavevector [rad/µm]", ylabel="Power spectral density\n[µm⁴]")

@@ -6,6 +6,7 @@ import json
 import multiprocessing
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,8 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
+from roughvisc.plot.curves import friction, history
 from roughvisc.plot.fields import maps, section, surface
-from roughvisc.plot.history import friction, history
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.progress import reporting
 from roughvisc.study.case_text import file_stems
@@ -73,7 +74,7 @@ def write_figure(figure: Figure, path: Path) -> Path:
     return path
 
 
-def save_figures(dataset: xr.Dataset, folder: Any, stem: str, *, names: Collection[str] | None = None) -> list[Path]:
+def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[str] | None = None) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
     Parameters
@@ -101,8 +102,7 @@ def save_figures(dataset: xr.Dataset, folder: Any, stem: str, *, names: Collecti
     figures = figures_of(dataset, names)
     written = [write_figure(figure, Path(folder, f"{stem}-{name}.png")) for name, _, figure in figures]
     if not written:
-        stored = ", ".join(str(known) for known in dataset.variables)
-        raise InputError(f"the result allows no figure: it holds {stored or 'nothing'}")
+        raise InputError(f"the result allows no figure: it holds {', '.join(map(str, dataset.variables))}")
     return written
 
 
@@ -127,12 +127,11 @@ def save_figures_of_files(
     for path in paths:
         with open_result(path) as dataset:
             cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
-    stems, jobs, is_one = file_stems(cases), [], len(paths) == 1
+    stems, jobs = file_stems(cases) if len(paths) > 1 else {}, []
     for path in paths:
-        case, stem = cases[path.stem], path.stem if is_one else stems[path.stem]
-        names = set(FIGURES if every else DEFAULT)
-        names -= set() if not jobs or varies_surface(case) else {"surface"}
-        jobs.append((path, folder or path.parent, stem, names))
+        known, with_surface = FIGURES if every else DEFAULT, not jobs or varies_surface(cases[path.stem])
+        names = [name for name in known if name != "surface" or with_surface]
+        jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), names))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
 
 
@@ -142,21 +141,17 @@ def varies_surface(case: Mapping[str, Any]) -> bool:
 
 
 def _save_file(job: tuple[Path, Path, str, Collection[str]]) -> list[Path]:
-    path, folder, stem, names = job
-    with open_result(path) as dataset:
-        return save_figures(dataset, folder, stem, names=names)
+    with open_result(job[0]) as dataset:
+        return save_figures(dataset, *job[1:])
 
 
 def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int, label: str) -> list[Any]:
     """Return the results of a function of some jobs, in order; several processes compute, with a progress bar."""
-    processes = min(processes, len(jobs))
-    context = multiprocessing.get_context("spawn")  # a process that is forked while threads run may hang
-    with (
-        reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report,
-        ProcessPoolExecutor(max(processes, 1), mp_context=context) as pool,
-    ):
+    # a process that is forked while threads run may hang
+    pool = ProcessPoolExecutor(max(min(processes, len(jobs)), 1), multiprocessing.get_context("spawn"))
+    with pool, reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
         results = []
-        for found in pool.map(work, jobs) if processes > 1 else map(work, jobs):
+        for found in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
             results.append(found)
             report(len(results), len(jobs))
         return results
@@ -164,11 +159,10 @@ def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int,
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
     """Return the results of the last sweep in a folder; None if there are fewer than two."""
-    try:
+    with suppress(InputError):
         results = open_results(folder)
-    except InputError:
-        return None
-    return results if results["case_key"].size > 1 else None
+        return results if results["case_key"].size > 1 else None
+    return None
 
 
 def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -19,31 +20,12 @@ from roughvisc.errors import printable
 from roughvisc.units import Unit, unit_for
 from roughvisc.variables import VARIABLES
 
-#: Okabe and Ito's colours, distinguishable with all common kinds of colour vision.
-BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"
-CYCLE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, "#000000", "0.5")
+#: Style sheet of all figures.
+STYLE = matplotlib.rc_params_from_file(Path(__file__).with_name("roughvisc.mplstyle"), use_default_template=False)
+#: Main colours of its cycle: distinguishable with all common kinds of colour vision.
+BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
 #: Contact in all figures; cells without contact on a map of the pressure; missing cells.
 CONTACT, NO_CONTACT, MISSING = VERMILION, "#dceaf5", "0.72"
-
-#: Print-ready: text at the size of a caption, thin lines, embedded fonts.
-STYLE = {
-    "font.size": 8,
-    "axes.labelsize": 9,
-    "axes.titlesize": 9,
-    "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # a fixed place saves the measurement of all labels
-    "axes.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.prop_cycle": matplotlib.cycler(color=CYCLE),
-    "axes.grid": True,
-    "grid.color": "0.9",
-    "legend.frameon": False,
-    "lines.linewidth": 1.3,
-    "lines.markersize": 3.5,
-    "pdf.fonttype": 42,
-    "svg.fonttype": "none",
-}
 #: Mean width of a letter of 8 points, and height of a line of text. [inch]
 LETTER, _LINE = 0.066, 0.16
 #: Width of a colour bar with its labels. [inch]
@@ -52,9 +34,8 @@ BAR = 1.0
 _DECADES = 30.0
 
 
-def apply(draw):
-    """Decorate a function to draw its figure in the package's style, independent of the user's settings."""
-    return matplotlib.rc_context(STYLE)(draw)
+#: Decorator of a function that draws a figure, in the package's style and independent of the user's settings.
+apply = matplotlib.rc_context(STYLE)
 
 
 def new_panels(
@@ -106,7 +87,7 @@ def colour_bar(mappable: Any, axes: Sequence[Axes], label: str, **options: Any) 
     """Draw a colour bar at the right of some panels, in the margin of the figure."""
     figure, box = axes[0].figure, Bbox.union([ax.get_position() for ax in axes])
     inch = 1 / figure.get_figwidth()
-    bar = figure.add_axes((box.x1 + 0.1 * inch, box.y0, 0.1 * inch, box.height))
+    bar = figure.add_axes((box.x1 + 0.14 * inch, box.y0, 0.1 * inch, box.height))
     figure.colorbar(mappable, cax=bar, **options).set_label(label)
 
 
@@ -155,7 +136,7 @@ def log_axis(axis: Axis, values: Any) -> None:
     values = np.asarray(values, dtype=float)
     positive = values[np.isfinite(values) & (values > 0)]
     low, high = (positive.min(), positive.max()) if positive.size else (1.0, 1.0)
-    set_scale = axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale
+    set_scale = getattr(axis.axes, f"set_{axis.axis_name}scale")
     if (values == 0).any():
         set_scale("symlog", linthresh=10.0 ** np.floor(np.log10(low)))
         axis.get_major_locator().set_params(numticks=6)
@@ -180,8 +161,7 @@ def described(variable: xr.DataArray) -> tuple[str, str]:
     """Return the label and the SI unit of a variable, as declared or from its attributes."""
     if declared := VARIABLES.get(str(variable.name)):
         return declared.label, declared.units
-    name = str(variable.attrs.get("long_name", str(variable.name).replace("_", " ")))
-    return name[:1].upper() + name[1:], str(variable.attrs.get("units", ""))
+    return str(variable.attrs.get("long_name", variable.name)), str(variable.attrs.get("units", ""))
 
 
 def middle_unit(values: Any, si: str) -> Unit:

@@ -13,6 +13,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.plot import style
 from roughvisc.study.case_text import names_of, value_text
@@ -32,9 +33,10 @@ def swept_keys(results: xr.Dataset) -> dict[str, pd.Series]:
     """
     names = [str(name) for name, one in results.coords.items() if one.dims == ("case",)]
     cases = pd.DataFrame({name: results[name].values for name in names if name not in ("case", "case_key", ROWS)})
-    numbered = {tuple(pd.factorize(cases[name], use_na_sentinel=False)[0]): name for name in reversed(cases.columns)}
-    varied = [name for codes, name in reversed(numbered.items()) if any(codes)]
-    dotted = {name: str(results[name].attrs.get("long_name", name)) for name in varied}
+    first: dict[tuple[int, ...], str] = {}
+    for name in cases:
+        first.setdefault(tuple(pd.factorize(cases[name], use_na_sentinel=False)[0]), name)
+    dotted = {name: str(results[name].attrs.get("long_name", name)) for codes, name in first.items() if any(codes)}
     words, keys = names_of(list(dotted.values())), {}
     for name, key in dotted.items():
         values, label = cases[name], words[key]
@@ -70,7 +72,8 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         coefficient.
     along : str, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
-        ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the speed.
+        ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the
+        speed; if only realisations vary, the time.
     times : float or str, or a list, default -1
         The nearest kept times are drawn; negative whole numbers count from the end. [s]
 
@@ -81,7 +84,7 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     Raises
     ------
     InputError
-        If the results are not a sweep, nothing varies in them, or a name is unknown.
+        If the results are not a sweep, or a name is unknown.
     """
     if not isinstance(results, xr.Dataset) or results.sizes.get("case", 1) * results.sizes.get(REALISATION, 1) < 2:
         raise InputError("expected the Dataset of rv.open_results or rv.sweep, with several cases")
@@ -89,42 +92,37 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     quantity = quantity or ("friction_coefficient" if axis == "speed" else "contact_area")
     row = ROW if ROW in results.dims else axis
     curves = [str(name) for name, one in results.variables.items() if row in one.dims and not {"x", "y"} & {*one.dims}]
-    if quantity not in curves:
-        raise InputError(key="quantity", found=quantity, expected=f"a history: {', '.join(sorted(curves))}")
+    one_of("quantity", quantity, curves)
     keys = swept_keys(results)
+    along = (along or ("speed" if axis == "speed" else next(iter(keys), axis))).replace(".", "_")
+    one_of("along", along, [*keys, *curves])
     cases = pd.DataFrame({one.name: one for one in keys.values()})
-    along = along or ("speed" if axis == "speed" else next(iter(keys), ""))
-    if along in curves:
-        table = results[[quantity, along]].load().to_dataframe().reset_index()
-        table = table.join(cases, on="case") if keys else table
-        return _draw(table, results[quantity], [along, *cases.columns], over=results[along])
-    if along.replace(".", "_") not in keys:
-        expected = ", ".join([*keys, *curves])
-        raise InputError(key="along", found=along or "nothing that varies between the cases", expected=expected)
-    columns = [keys.pop(along.replace(".", "_")).name, *(one.name for one in keys.values())]
-    table = _at_times(results[quantity], times).join(cases, on="case")
-    return _draw(table, results[quantity], [*columns[:2], "", *columns[2:]])
+    if along in keys:
+        across = keys.pop(along).name
+        others = [name for name in cases if name != across]
+        table, columns = _at_times(results[quantity], times), [across, *others[:1], "", *others[1:]]
+    else:
+        table, columns = results[[quantity, along]].load().to_dataframe().reset_index(), [along, *cases]
+    table = table.join(cases, on="case") if len(cases) else table
+    return _draw(table, results[quantity], columns, results[along] if along in curves else None)
 
 
 def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
     """Return a table of a quantity of all cases at some times, with the time as text in a column without a name."""
     axis = axis_of(values.coords)
     table = values.load().to_dataframe().reset_index().dropna(subset=axis)
+    rows = table.groupby([dim for dim in ("case", REALISATION) if dim in values.dims])[axis]
     places = np.atleast_1d(in_si(times, VARIABLES[axis].units, "times"))
-    rows = values.sizes[ROW if ROW in values.dims else axis]
-    if not 0 < len(places) <= _MOST_PANELS or not places.min() >= -rows:
-        expected = f"1 to {_MOST_PANELS} {axis}s, or -1 to -{rows} to count from the end"
+    if not 0 < len(places) <= _MOST_PANELS or not places.min() >= -rows.size().max():
+        expected = f"1 to {_MOST_PANELS} {axis}s, or whole numbers from -1 on to count from the end"
         raise InputError(key="times", found=places.tolist(), expected=expected)
-    parts, who = [], [dim for dim in ("case", REALISATION) if dim in values.dims]
+    parts = []
     for place in places:
-        if place < 0:
-            part = table.groupby(who).nth(int(place))
-        else:
-            off = table.assign(off=(table[axis] - place).abs()).groupby(who)["off"]
-            part = table.loc[off.idxmin()]
-        near = part[axis].unique()
-        text = AXES[axis].place(near[0], 3)
-        text = text if near.size == 1 else "at the end" if place == -1 else f"near {text}"
+        off = rows.cumcount(ascending=False) + 1 + place if place < 0 else table[axis] - place
+        part = table.loc[off.abs().groupby(rows.ngroup()).idxmin()]
+        text = AXES[axis].place(part[axis].iloc[0], 3)
+        if part[axis].nunique() > 1:
+            text = "at the end" if place == -1 else f"near {text}"
         parts.append(part.assign(**{"": text}))
     table = pd.concat(parts)
     return table.assign(**{"": pd.Categorical(table[""], table[""].unique())})
@@ -188,10 +186,9 @@ def _looks(column: pd.Series) -> dict[Any, dict[str, Any]]:
     """Return level of a column -> colour and label of its lines; of many levels only some have a label."""
     levels = column.cat.categories
     shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.88, len(levels)))  # without the light end
-    looks = {level: {"color": shade} for level, shade in zip(levels, shades, strict=True)}
-    for level in levels[:: -(-len(levels) // _MOST_NAMED)]:
-        looks[level]["label"] = _text(level)
-    return looks
+    named = {*levels[:: -(-len(levels) // _MOST_NAMED)]}
+    texts = [_text(level) if level in named else None for level in levels]
+    return {level: {"color": one, "label": text} for level, one, text in zip(levels, shades, texts, strict=True)}
 
 
 def _placed(axes: Sequence[Axes], table: pd.DataFrame, column: str, over: xr.DataArray | None) -> pd.DataFrame:
@@ -220,8 +217,7 @@ def _draw_line(ax: Axes, line: pd.DataFrame, look: dict[str, Any], *, joined: bo
     itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else None
     found = statistics(wide.to_numpy().T)
     ends = wide.index, found["patch_lower"], found["patch_upper"]
-    kind = f"{wide.shape[1]} {'realisations' if itself is None else 'surrogates'}"
-    band = {"color": look["color"], "label": f"mean and 95 % prediction interval, {kind}"}
+    band = {"color": look["color"], "label": f"mean and 95 % prediction interval, {wide.shape[1]} realisations"}
     if joined and len(wide) > 1:
         ax.fill_between(*ends, alpha=0.22, lw=0, **band)
     else:
@@ -238,18 +234,16 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     A quantity that is the same in all cases, or equal to a swept key, is left out.
     """
     axis = axis_of(results.variables)
-    curves, ending = ("contact_area", "leak_rate", *CONDUCTANCES), "-histories"
-    if axis == "speed":
-        curves, ending = ("friction_coefficient", "contact_fraction"), ""
-    for name in curves:
+    in_time, in_speed = ("contact_area", "leak_rate", *CONDUCTANCES), ("friction_coefficient", "contact_fraction")
+    for name in in_speed if axis == "speed" else in_time:
         if name in results and results[name].any():
             caption = f"{VARIABLES[name].label} over {axis}, for each case."
-            yield f"{name}{ending}", caption, sweep(results, name, along=axis)
+            yield f"{name}-{axis}", caption, sweep(results, name, along=axis)
     if "reduced_speed" in results and not np.allclose(results["reduced_speed"], results["speed"], equal_nan=True):
         caption = "Master curve: friction coefficient against the speed times the shift factor of the temperature."
         yield "master", caption, sweep(results, along="reduced_speed")
     keys = swept_keys(results)
-    for name in ("contact_area", "approach", "force", "leak_rate", *CONDUCTANCES) if keys and axis == "time" else ():
+    for name in (*in_time, "approach", "force") if keys and axis == "time" else ():
         if name in results:
             table = _at_times(results[name])
             stated = [table[name].iloc[0], *(table[key] for key in keys if results[key].dtype.kind in "iuf")]

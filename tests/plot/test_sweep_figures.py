@@ -15,7 +15,7 @@ import roughvisc as rv
 from roughvisc import plot
 from roughvisc.errors import InputError
 from roughvisc.labels import label
-from roughvisc.plot.save import results_of_sweep, save_figures_of_files
+from roughvisc.plot.save import results_of_sweep, save_figures_of_files, save_sweep_figures
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.execution.run import run_case
 
@@ -126,7 +126,7 @@ def test_sweep__refuses_what_cannot_be_drawn():
     for options in ({"quantity": "pressure"}, {"along": "surface.seed"}, {"along": "speed"}, {"times": range(13)}):
         with pytest.raises(InputError):
             plot.sweep(ds, **options)
-    for wrong in (ds.isel(case=0), made.one_frame(), [ds], ds.isel(case=[0]), ds.isel(case=[0, 0])):
+    for wrong in (ds.isel(case=0), made.one_frame(), [ds], ds.isel(case=[0])):
         with pytest.raises(InputError):
             plot.sweep(wrong)
 
@@ -163,12 +163,18 @@ def band_at_end(ax, number):
 def test_figures__draw_the_mean_of_the_realisations_their_band_and_the_scan(along):
     figure = plot.sweep(patches(), along=along)
     (ax,) = figure.axes
-    assert legend(figure)[-2:] == ["mean and 95 % prediction interval, 4 surrogates", "measured scan"]
+    assert legend(figure)[-2:] == ["mean and 95 % prediction interval, 4 realisations", "measured scan"]
     top = 1e-7 * LOADS[-1] * 3 * (1e12 if "µm²" in ax.get_ylabel() else 1e6)
     assert band_at_end(ax, -1) == pytest.approx([top * end for end in interval(FACTORS[1:])])
     ends = [line.get_ydata()[-1] for line in ax.lines]
     for factor in (FACTORS[1:].mean(), FACTORS[0]):
         assert np.isclose(ends, top * factor).any(), factor
+
+
+def test_sweep__of_realisations_alone_is_over_time():
+    (ax,) = plot.sweep(patches().isel(case=[0])).axes
+    assert ax.get_xlabel() == "Time [s]"
+    np.testing.assert_allclose(ax.lines[0].get_xdata(), TIMES)
 
 
 def test_figures__a_realisation_without_a_result_does_not_count():
@@ -206,8 +212,8 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
         "a panel for each hold"
     )
     names = [name for name, _, _ in sweep_figures(results)]
-    assert names == ["contact_area-histories", "contact_area", "approach"], "the force is known"
-    written = plot.save_sweep_figures(results, tmp_path / "figures")
+    assert names == ["contact_area-time", "contact_area", "approach"], "the force is known"
+    written = save_sweep_figures(results, tmp_path / "figures")
     assert [path.name for path in written] == [f"sweep-{name}.png" for name in names]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
     assert results_of_sweep(tmp_path) is None

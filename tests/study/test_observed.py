@@ -9,6 +9,7 @@ from support import BALL, ROUGH
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.plot.save import save_sweep_figures
 from roughvisc.study.case import read_cases
 
 #: It is pressed until nothing is open.
@@ -27,8 +28,7 @@ def study(tmp_path):
     return written
 
 
-def test_run__ends_with_what_is_observed(invoke, study, tmp_path, coarse_pictures, monkeypatch):
-    monkeypatch.setattr(rv.plot, "FIGURES", {"leakage": rv.plot.FIGURES["leakage"]})
+def test_run__ends_with_what_is_observed(invoke, study, tmp_path, coarse_pictures):
     status, told, _ = invoke("run", study(LEAKAGE), "--out", "out")
     assert status == 0
     assert "Leak rate at the end" in told
@@ -71,8 +71,8 @@ def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coa
     heading, *rows = (tmp_path / "out" / "cases.csv").read_text(encoding="utf-8-sig").splitlines()
     assert "leak_rate [m^3/s]" in heading
     assert len(rows) == 2
-    written = [path.name for path in rv.plot.save_sweep_figures(results, tmp_path / "figures")]
-    assert "sweep-leak_rate-histories.png" in written
+    written = [path.name for path in save_sweep_figures(results, tmp_path / "figures")]
+    assert "sweep-leak_rate-time.png" in written
 
 
 def test_observe__from_python_after_a_sweep(study, tmp_path):

@@ -200,12 +200,12 @@ def test_command__writes_its_files_and_marks_the_cheapest(invoke, tmp_path, monk
 
 def test_figure__draws_every_setting_and_the_front():
     ds = made_up(unsure=0.001)
-    (ax,) = rv.plot.trade(ds, [AREA]).axes
+    (ax,) = rv.plot.trade(ds, AREA).axes
     lines = {line.get_label(): line.get_xydata() for line in ax.lines}
     assert lines["96 × 90 cells"] == pytest.approx(np.array(MADE_UP[:4])[:, 2:] * [1, 100])
     assert lines["48 × 45 cells"] == pytest.approx(np.array([[0.5, 0.6]]))
     assert lines["Pareto front"] == pytest.approx(np.array([[0.5, 0.6], [4.0, 0.4]])), "not below the uncertainty"
     with refused("quantity", "colour"):
-        rv.plot.trade(ds, ["colour"])
+        rv.plot.trade(ds, "colour")
     with refused():
         rv.plot.trade(xr.Dataset())

@@ -81,7 +81,7 @@ KINDS = {
     "variables": variables,
     "commands and options": commands,
     "commands": lambda: {name.split()[0]: "" for name in commands()},
-    "figures of a result": lambda: dict.fromkeys(declared("roughvisc.plot", "FIGURES"), ""),
+    "figures of a result": lambda: dict.fromkeys(declared("roughvisc.plot.save", "FIGURES"), ""),
     "errors": errors,
     **{
         f"columns of a {name}": lambda name=name: {

@@ -1,8 +1,9 @@
-"""Histories of one case, area against load, and friction against speed."""
+"""Line figures: histories, area against load, friction against speed, cost against error, and sources of an error."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -10,15 +11,17 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import history as steps_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
+from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.parameters import rms_slope
 from roughvisc.units import Unit, quantities, unit_for
-from roughvisc.variables import GRID_ERROR, VARIABLES, axis_of
+from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of
 
 #: Quantities that are drawn if the result holds them.
 _QUANTITIES = (
@@ -65,13 +68,11 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
     wanted = [name for name in default if name in dataset] if quantities is None else quantities
     names = [wanted] if isinstance(wanted, str) else list(wanted)
-    expect_result(dataset, over, *names)
-    if not names:
-        raise InputError(f"the result holds none of {', '.join(default)}: nothing to draw over {over}")
+    expect_result(dataset, over, *(names or default))
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
     columns, height = 1 if len(names) <= 3 else 2, 1.1 if len(names) > 2 else 1.7
-    figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x", left=0.8)
+    figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x")
     across = style.row_axis(axes, (steps if over in steps else kept)[over])
     for ax, name in zip(axes, names, strict=True):
         _draw_history(ax, name, steps if name in steps and over in steps else kept, kept, over, across)
@@ -107,8 +108,6 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over
     if f"persson_{name}" in kept:
         ax.plot(at, unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
     style.value_axis(ax, np.concatenate([one.get_ydata() for one in ax.lines]), unit)
-    if ax.get_yscale() == "linear":
-        ax.locator_params("y", nbins=4, steps=[1, 2, 2.5, 5, 10])
     ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label).rstrip())
 
 
@@ -196,3 +195,97 @@ def friction(dataset: xr.Dataset) -> Figure:
     names = ("friction_coefficient", "contact_fraction")
     expect_result(dataset, "speed", *names)
     return history(dataset, names)
+
+
+@style.apply
+def trade(dataset: xr.Dataset, quantity: str | None = None) -> Figure:
+    """Draw wall time against error of every setting, with the Pareto front.
+
+    Each grid has a marker. Labels state the tolerances of the front. Errors below the uncertainty of the reference lie
+    in a grey band, and are not part of the front.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of :func:`roughvisc.trade`.
+    quantity : str, optional
+        Quantity whose error is drawn. Default: the first one of the trade.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not a trade or does not hold the quantity.
+    """
+    if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
+        raise InputError("expected the Dataset of rv.trade")
+    known = dataset["quantity"].values.tolist()
+    quantity = one_of("quantity", quantity or known[0], known)
+    table = dataset.sel(quantity=quantity)[["run_time", "error", "tolerance", "cells_x", "cells_y"]].to_dataframe()
+    table["error"] *= 100
+    unsure = float(np.nan_to_num(100 * uncertainty(dataset, quantity)))
+    front = table[pareto_front(dataset, quantity) & (table["error"] > unsure)].sort_values("run_time", kind="stable")
+    table = table.dropna(subset=["run_time", "error"])
+    figure, (ax,) = style.new_panels(1, 1, (3.4, 2.6), lines=0)
+    style.log_axis(ax.xaxis, table["run_time"])
+    style.log_axis(ax.yaxis, table["error"])
+    ax.plot(front["run_time"], front["error"], color="0.35", lw=1.0, zorder=1, label="Pareto front")
+    for marker, (grid, own) in zip(cycle("o^vsDP"), table.groupby(["cells_x", "cells_y"]), strict=False):
+        label = f"{grid[0]} × {grid[1]} cells"
+        ax.plot(own["run_time"], own["error"], marker, ms=5, mew=0, zorder=3, label=label)
+    ax.margins(0.15)
+    low, high = ax.get_ylim()
+    if unsure > low:
+        ax.axhspan(low, unsure, color="0.93", zorder=0, label="reference uncertainty")
+    for place in zip(front["run_time"], front["error"], front["tolerance"], strict=True):
+        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25"}
+        ax.annotate(format_tolerance(place[2]), place[:2], (5, 3), **look)
+    ax.set(ylim=(low, high), xlabel="Wall time [s]", ylabel=f"Error of {VARIABLES[quantity].label.lower()} [%]")
+    style.legend_above(figure, style.named_in(ax))
+    return figure
+
+
+@style.apply
+def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
+    """Draw the sources of error of a result as bars: the ends of their 95 % intervals.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of :func:`roughvisc.budget`, for one quantity.
+    row : int
+        Number of the row whose sources are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not a budget, or holds several quantities.
+    """
+    if not isinstance(dataset, xr.Dataset) or "half_width" not in dataset or "source" not in dataset.dims:
+        raise InputError("expected the Dataset of rv.budget")
+    if "quantity" in dataset.dims:
+        raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
+    axis, unknown = AXES[axis_of(dataset.variables)], dataset.attrs["open"].split("; ")
+    names = [f"{name} (open)" if name in unknown else str(name) for name in dataset["source"].values]
+    at = dataset.isel({axis.name: row})
+    half, towards = at["half_width"].values, at["direction"].values
+    low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
+    whole = [float(at[end] / at["value"].where(at["value"] != 0)) for end in ("lower", "upper")]
+    ends = 100 * (np.nan_to_num([*np.exp(np.c_[low, high]), whole], nan=1.0) - 1)
+    figure, (ax,) = style.new_panels(1, 1, (2.6, 2.1), lines=0, left=0.2 + style.LETTER * max(map(len, names)))
+    colours = [*[style.BLUE] * half.size, "0.35"]
+    ax.barh([*names, "all together"], ends[:, 1] - ends[:, 0], left=ends[:, 0], height=0.62, color=colours)
+    ax.invert_yaxis()
+    ax.axvline(0.0, color="black", lw=0.7)
+    what = str(dataset["quantity"].values).replace("_", " ")
+    ax.set_xlabel(f"Error of {what} at {axis.place(float(at[axis.name]))} [%]")
+    ax.use_sticky_edges = False  # else a bar ends at the frame
+    ax.margins(x=0.15, y=0.06)
+    return figure
