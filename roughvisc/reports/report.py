@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -38,11 +38,6 @@ from roughvisc.variables import AXES, IN_TABLE, VARIABLES, axis_of
 _SHOWN = 6
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
-#: Attributes that state how a result was computed and where its surface came from.
-_SETTINGS = (
-    *("source", "direction", "boundary", "tolerance", "memory", "series_error", "case_key"),
-    *("surface_sha256", "source_file", "format", "instrument", "channel", "recipe", "filled_points"),
-)
 #: Surface parameters shown.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
@@ -69,14 +64,15 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     InputError
         If there are zero results, or a Dataset comes without `out`.
     """
-    page: dict[str, Any] = {"failures": [], "figures": []}
+    page: dict[str, Any] = {"failures": {}, "figures": [], "words": case_words, "text": _text}
     sources, numbers = [results], {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError("out is None: expected the name of the page, if a Dataset is given")
     elif (folder := Path(results)).is_dir():
         out = out or folder / "report.html"
-        sources, page["failures"] = result_files(folder), _failures(folder)
+        sources, failed = result_files(folder), (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
+        page["failures"] = {key: recorded_failure(folder, key) for key in sorted(failed)}
         if not sources and not page["failures"]:
             raise no_results(folder)
         numbers = numbers_of(read_sweep(folder))
@@ -89,28 +85,12 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     page["cases"] = in_parallel(_case, [(one, i, i in shown) for i, one in enumerate(sources)], processes, "report")
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
-    titles = list(dict.fromkeys(case["title"] for case in page["cases"]))
-    page["title"] = f"{len(page['cases'])} results" if len(titles) > 1 else titles[0] if titles else "No result"
-    page["headings"] = list(dict.fromkeys(heading for case in page["cases"] for heading in case["cells"]))
     page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     page["version"] = metadata.version("roughvisc")
-    options = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    template = Environment(loader=PackageLoader("roughvisc.reports", "."), **options).get_template("report.html.jinja")
+    templates = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
     with atomic_write(out) as temporary:
-        temporary.write_text(template.render(page), encoding="utf-8")
+        temporary.write_text(templates.get_template("report.html.jinja").render(page), encoding="utf-8")
     return Path(out)
-
-
-def _failures(folder: Path) -> list[dict[str, str]]:
-    """Return the failed cases, from their records."""
-    found = []
-    for path in sorted(folder.glob("*.failed.json")):
-        key = path.name.partition(".")[0]
-        record = recorded_failure(folder, key)
-        words = record.get("case", {}).get("title", ""), case_words(record.get("case", {}))
-        message = record.get("message", "the record cannot be read")
-        found.append({"key": key, "title": ": ".join(filter(None, words)), "message": message})
-    return found
 
 
 @matplotlib.rc_context(style.STYLE)
@@ -125,35 +105,26 @@ def _picture(caption: str, figure: Figure) -> dict[str, Any]:
 def _case(job: tuple[Path | xr.Dataset, int, bool]) -> dict[str, Any]:
     """Return one case of the page: its row in the table and, if shown, figures, assumptions, surface and study."""
     source, number, is_shown = job
-    if isinstance(source, Path):
-        with open_result(source) as dataset:
-            return _case((dataset, number, is_shown))
-    expect_result(source, "x", "y")
-    case, history = json.loads(source.attrs.get("case", "{}")), str(source.attrs.get("history", "")).splitlines()
-    title = str(case.get("title") or source.attrs.get("title") or f"case {number}")
-    found: dict[str, Any] = {"title": title, "name": case_words(case) or title, "cells": _cells(source)}
-    found["key"] = str(source.attrs.get("case_key", ""))
-    if not is_shown:
-        return found
-    attributes = {**(source["height"].attrs if "height" in source else {}), **source.attrs}
-    found["stated"] = {
-        "settings": [[name.replace("_", " "), str(attributes[name])] for name in _SETTINGS if name in attributes],
-        "warnings": list(warnings_of(source.attrs).values()),
-        "history": history,
-        "text": study_text(case) if case else "",
-    }
-    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(source, DEFAULT)]
-    if "height" in source and (number == 0 or varies_surface(case)):
-        measured = parameters(off_plane(source["height"].load()))
-        rows = [(name.replace("_", " "), measured[name].attrs["long_name"], measured[name]) for name in _PARAMETERS]
-        found["surface"] = {
-            "name": str(source["height"].attrs.get("source_file") or title),
-            "picture": _picture(FIGURES["surface"][2], surface(source)),
-            "steps": [line for line in history if line and ": run of " not in line],
-            "parameters": [(name, words, _text(value)) for name, words, value in rows],
-        }
+    with open_result(source) if isinstance(source, Path) else nullcontext(source) as dataset:
+        expect_result(dataset, "x", "y")
+        case = json.loads(dataset.attrs.get("case", "{}"))
+        title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
+        found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
+        found["cells"] = _cells(dataset)
+        return found | (_details(dataset, case, number) if is_shown else {})
+
+
+def _details(dataset: xr.Dataset, case: dict[str, Any], number: int) -> dict[str, Any]:
+    """Return figures, assumptions and study of one case, and its surface if it is the first case or differs."""
+    height = dataset.get("height", xr.DataArray())
+    found: dict[str, Any] = {"attributes": {**height.attrs, **dataset.attrs}, "text": study_text(case) if case else ""}
+    found["warnings"] = warnings_of(dataset.attrs)
+    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(dataset, DEFAULT)]
+    if height.ndim and (number == 0 or varies_surface(case)):
+        picture = _picture(FIGURES["surface"][2], surface(height))
+        found["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
     with suppress(InputError):  # a Dataset that lacks the variables of an audit
-        found["audit"] = list(audit(source))
+        found["audit"] = list(audit(dataset))
     return found
 
 
@@ -172,8 +143,7 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
         cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
-    seconds = cost_of(dataset)[0]
-    if np.isfinite(seconds):
+    if np.isfinite(seconds := cost_of(dataset)[0]):
         cells["Wall time"] = unit_for([seconds], "s").text(seconds)
     if warnings := warnings_of(dataset.attrs):
         cells["Warnings"] = ", ".join(warnings)

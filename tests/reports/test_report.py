@@ -55,6 +55,7 @@ def test_page__numbers_the_cases_as_their_table(folder, page):
         (n, pytest.approx(1e3 * x)) for n, x in loads.items()
     ]
     assert "3 cases, 1 failed" in page
+    assert "<td>&lt;i&gt;Too far&lt;/i&gt; Load 9 N</td><td>contact reached the &lt;u&gt;border&lt;/u&gt;</td>" in page
 
 
 @pytest.mark.thorough
