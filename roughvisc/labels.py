@@ -114,10 +114,8 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     steps, named = result.encoding.get(_CARRIED), {"time", "force"} <= result.variables.keys()
     if steps is None or not named or result["force"].dims not in ((), ("time",)):
         return None
-    rows, known = (
-        set(zip(np.ravel(one["time"]).tolist(), np.ravel(one["force"]).tolist(), strict=True))
-        for one in (result, steps)
-    )
+    rows = set(zip(np.ravel(result["time"]).tolist(), np.ravel(result["force"]).tolist(), strict=True))
+    known = set(zip(steps["time"].values.tolist(), steps["force"].values.tolist(), strict=True))
     return steps if rows <= known else None
 
 

@@ -470,11 +470,11 @@ class Program:
     @cached_property
     def cycles(self) -> list[tuple[float, float, int]]:
         """Start [s], period [s] and number of whole cycles of each segment that oscillates."""
-        return [
-            (start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9)))
-            for start, segment in zip(self.corners, self.segments, strict=False)
-            if segment.amplitude
-        ]
+        found = []
+        for start, segment in zip(self.corners, self.segments, strict=False):
+            if segment.amplitude:
+                found.append((start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9))))
+        return found
 
     def gives(self, number: int) -> bool:
         """Return whether the program states the value of a segment; a hold may keep a computed value instead.
@@ -498,13 +498,19 @@ class Program:
     @cached_property
     def corners(self) -> list[float]:
         """Start of the program and end of each segment. [s]"""
-        return [0.0, *np.cumsum([segment.duration for segment in self.segments]).tolist()]
+        corners = [0.0]
+        for segment in self.segments:
+            corners.append(corners[-1] + segment.duration)
+        return corners
 
     @cached_property
     def largest_load(self) -> float:
         """Largest load prescribed anywhere; zero if none is. A nominal pressure has no load without an area. [N]"""
-        loads = [(s.end or 0.0) + abs(s.amplitude) for s in self.segments if s.control == "load"]
-        return max(loads, default=0.0)
+        largest = 0.0
+        for segment in self.segments:
+            if segment.control == "load":
+                largest = max(largest, (segment.end or 0.0) + abs(segment.amplitude))
+        return largest
 
     @cached_property
     def time_scale(self) -> float:

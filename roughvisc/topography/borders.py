@@ -32,9 +32,11 @@ def border_mismatch(h: xr.DataArray) -> tuple[float, float]:
     values = h.transpose("x", "y").values
     ratios = []
     for axis in (0, 1):
-        steps = values.take(0, axis) - values.take(-1, axis), np.diff(values, axis=axis)
-        known = [step[np.isfinite(step)] for step in steps]
-        across, beside = (math.sqrt((step**2).mean()) if step.size else 0.0 for step in known)
+        sizes = []
+        for step in (values.take(0, axis) - values.take(-1, axis), np.diff(values, axis=axis)):
+            known = step[np.isfinite(step)]
+            sizes.append(math.sqrt((known**2).mean()) if known.size else 0.0)
+        across, beside = sizes
         ratios.append(across / beside if beside > 0 else 0.0)
     return ratios[0], ratios[1]
 

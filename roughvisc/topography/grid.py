@@ -36,8 +36,8 @@ def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] |
         Attributes in addition to units and names.
     """
     values = np.asarray(heights, dtype=float)
-    x, y = ((np.arange(n) + 0.5) * d for n, d in zip(values.shape, spacing, strict=True))
-    return with_coordinates(values, x, y, attrs)
+    (nx, ny), (dx, dy) = values.shape, spacing
+    return with_coordinates(values, (np.arange(nx) + 0.5) * dx, (np.arange(ny) + 0.5) * dy, attrs)
 
 
 def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] | None = None) -> xr.DataArray:
@@ -52,7 +52,7 @@ def with_coordinates(values: np.ndarray, x: Any, y: Any, attrs: dict[str, Any] |
     attrs : dict, optional
         Attributes in addition to the declared ones.
     """
-    coordinates = {axis: (axis, at, VARIABLES[axis].attributes) for axis, at in (("x", x), ("y", y))}
+    coordinates = {"x": ("x", x, VARIABLES["x"].attributes), "y": ("y", y, VARIABLES["y"].attributes)}
     stated = VARIABLES["height"].attributes | (attrs or {})
     return xr.DataArray(values, coordinates, ("x", "y"), "height", stated)
 

@@ -261,7 +261,8 @@ def self_affine(
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
     size, shape = pair("size", size), cells(shape)
-    x, y = ((np.arange(n) + 0.5) * (side / n) - side / 2 for side, n in zip(size, shape, strict=True))
+    x = (np.arange(shape[0]) + 0.5) * (size[0] / shape[0]) - size[0] / 2
+    y = (np.arange(shape[1]) + 0.5) * (size[1] / shape[1]) - size[1] / 2
     heights = _INDENTERS[name](x[:, None], y, **parameters)
     absent = np.isnan(heights)
     if absent.all():
@@ -336,12 +337,13 @@ def highest(h: xr.DataArray) -> float:
     >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
     (0.0, True, True)
     """
-    known = _known(h)
-    has_apex = known is not None and all(
-        float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2
-        for axis, side, centre in zip("xy", *known[1:], strict=True)
-    )
-    return 0.0 if has_apex else float(np.nanmax(h.values))
+    known, highest_cell = _known(h), float(np.nanmax(h.values))
+    if known is None:
+        return highest_cell
+    for axis, side, centre in zip("xy", *known[1:], strict=True):
+        if not float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2:
+            return highest_cell
+    return 0.0
 
 
 def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
