@@ -83,8 +83,13 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
     shown = set(np.linspace(0, len(sources) - 1, min(len(sources), _SHOWN)).astype(int).tolist())
     page["cases"] = in_parallel(_case, [(one, i, i in shown) for i, one in enumerate(sources)], processes, "report")
+    drawn = set()
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
+        if "surface" in case:  # once, if several cases have it
+            picture = case["surface"]["picture"]["src"]
+            case["surface"] = None if picture in drawn else case["surface"]
+            drawn.add(picture)
     page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     page["version"] = metadata.version("roughvisc")
     templates = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)

@@ -66,6 +66,18 @@ def test_page__escapes_what_users_write_and_needs_no_other_file(page):
     assert html.escape(HOSTILE, quote=False) in page.replace("&#34;", '"')
 
 
+@pytest.mark.thorough
+def test_page__shows_each_surface_once(tmp_path):
+    study = tmp_path / "radii.toml"
+    study.write_text(BALL + '[sweep]\n"surface.radius" = ["1 mm", "2 mm"]\n"program.0.load" = ["1 mN", "2 mN"]\n')
+    for case in read_cases(study):
+        run_case(case, tmp_path / "found")
+    text = report(tmp_path / "found").read_text()
+    shown = re.findall(r"<h3>(.*?)</h3>", text[text.index('id="surface"') : text.index('id="audit"')])
+    assert sorted(re.findall(r"Radius . mm", " ".join(shown))) == ["Radius 1 mm", "Radius 2 mm"]
+    assert len(shown) == 2
+
+
 @pytest.mark.parametrize("within", [True, False])
 def test_page__of_a_result_without_a_study(within, tmp_path):
     ds = made.one_frame().drop_vars(["height", "gap", "displacement"])
