@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.body import Kernel
-from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.body import Kernel, love_kernel
 
 #: Contact modulus 1.
 UNIT = rv.elastic(0.25)

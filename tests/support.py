@@ -10,8 +10,8 @@ from references.half_space import lee_radok_step
 from samples import RUBBER
 
 import roughvisc as rv
+from roughvisc.mechanics.body import love_kernel
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.study.case import read_study, vary

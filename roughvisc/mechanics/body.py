@@ -4,14 +4,15 @@ The displacement is ``u = C K * p`` with the contact compliance ``C = 1/E*`` of 
 body. A material alone is a half-space. A body is accepted wherever a material is.
 
 Fourier convention: ``p_q = sum_x p exp(-i q x)`` with ``q = 2 pi n / size``, as in ``scipy.fft``. Kernels are real and
-even in x and in y, and so are their transforms. A *symbol* holds the non-negative wave numbers of both axes, shape
-``(mx // 2 + 1, my // 2 + 1)`` for ``(mx, my)`` points; symmetry gives the others.
+even in x and in y, and so are their transforms. A *symbol* is the transform at the wave numbers of ``scipy.fft.rfft2``,
+shape ``(mx, my // 2 + 1)`` for ``(mx, my)`` points.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -20,10 +21,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.half_space import love_kernel
 from roughvisc.mechanics.materials.creep import Material, check_material, complex_compliance, over_frequencies
+from roughvisc.mechanics.quadrature import rule
 
 Array = NDArray[np.float64]
+
+# Rings of distances in longer cell sides, and number of Gauss points per side for an error of 1e-15 in each ring. The
+# rounding error of the closed form grows as eps (r / side)^2 (7e-8 at 16384 cells). It is used inside the first ring
+# only.
+_GAUSS = ((4.0, 16.0, 8), (16.0, 40.0, 5), (40.0, 200.0, 4), (200.0, math.inf, 3))
 
 
 class Kernel(ABC):
@@ -93,7 +99,7 @@ class HalfSpace(Kernel):
     raises_surface = False
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-        """Return :func:`roughvisc.mechanics.half_space.love_kernel`. [m]"""
+        """Return :func:`love_kernel`. [m]"""
         return love_kernel(shape, spacing)
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
@@ -104,6 +110,103 @@ class HalfSpace(Kernel):
 
 #: The default kernel.
 HALF_SPACE = HalfSpace()
+
+
+def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    r"""Return the surface displacement of a half-space under one uniformly loaded cell.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of cells ``(nx, ny)``.
+    spacing : tuple of float
+        Cell sides ``(dx, dy)``. [m]
+
+    Returns
+    -------
+    ndarray, shape (nx, ny)
+        Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
+        compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
+
+    Notes
+    -----
+    Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
+    alternating signs, loses digits far from the cell, because the corner terms cancel. There Gauss quadrature of
+    ``1 / (pi r)`` over the cell replaces it.
+
+    References
+    ----------
+    .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
+    .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
+    """
+    longer = max(spacing)
+    dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
+    x = np.arange(shape[0], dtype=float)[:, None] * dx
+    y = np.arange(shape[1], dtype=float)[None, :] * dy
+    distance = np.hypot(x, y)
+    kernel = np.empty(shape)
+
+    near = distance <= _GAUSS[0][0]
+    rows, columns = np.nonzero(near)
+    kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
+    for start, end, points in _GAUSS:
+        ring = (distance > start) & (distance <= end)
+        rows, columns = np.nonzero(ring)
+        mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
+        kernel[ring] = mean * (dx * dy)
+    return kernel * (longer / math.pi)
+
+
+def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> Array:
+    """Return the integral of ``1 / sqrt(r^2 + depth^2)`` over a cell, in closed form.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Positions relative to the centre of the cell; none may lie on the lines of the edges. [m]
+    dx, dy : float
+        Cell sides. [m]
+    depth : float
+        Depth below the loaded plane. [m]
+
+    Returns
+    -------
+    ndarray
+        Integral. [m]
+    """
+    total = np.zeros_like(x)
+    for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
+        corner = a * np.arcsinh(b / np.hypot(a, depth)) + b * np.arcsinh(a / np.hypot(b, depth))
+        if depth:
+            corner -= depth * np.arctan(a * b / (depth * np.sqrt(a**2 + b**2 + depth**2)))
+        total += sx * sy * corner
+    return total
+
+
+def cell_mean(
+    function: Callable[[Array], Array], x: NDArray, y: NDArray, sides: tuple[float, float], points: tuple[int, int]
+) -> Array:
+    """Return the mean of a function of the distance over a cell, by Gauss quadrature.
+
+    Parameters
+    ----------
+    function : callable
+        Takes distances. [m]
+    x, y : ndarray
+        Positions relative to the centre of the cell, which broadcast. [m]
+    sides : tuple of float
+        Cell sides. [m]
+    points : tuple of int
+        Gauss points along each side.
+    """
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+    (along_x, share_x), (along_y, share_y) = map(rule, points)
+    for a, part_a in zip(along_x * sides[0] / 2, share_x / 2, strict=True):
+        square = (x + a) ** 2
+        for b, part_b in zip(along_y * sides[1] / 2, share_y / 2, strict=True):
+            total += part_a * part_b * function(np.sqrt(square + (y + b) ** 2))
+    return total
 
 
 def has_finite_mean(kernel: Kernel) -> bool:
@@ -125,7 +228,7 @@ def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[fl
 
     Returns
     -------
-    ndarray, shape (padded[0] // 2 + 1, padded[1] // 2 + 1)
+    ndarray, shape (padded[0], padded[1] // 2 + 1)
         Real; positive for a half-space. [m]
 
     Notes
@@ -135,10 +238,13 @@ def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[fl
     as a preconditioner.
     """
     offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
-    return np.asarray(fft.dctn(kernel.influence(offsets, spacing), type=1))  # the transform of the even extension
+    symbol = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
+    return np.concatenate([symbol, symbol[-2:0:-1]])
 
 
-def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
+def periodic_symbol(
+    kernel: Kernel, shape: tuple[int, int], spacing: tuple[float, float], is_whole: bool = True
+) -> Array:
     """Return the symbol of a kernel under periodic pressure.
 
     Parameters
@@ -149,32 +255,29 @@ def periodic_symbol(kernel: Kernel, shape: tuple[int, int], spacing: tuple[float
         Number of cells ``(nx, ny)`` of one period.
     spacing : tuple of float
         Cell sides. [m]
+    is_whole : bool
+        Whether the kernel is that of the body, and not of a part of its response, which may vanish.
 
     Returns
     -------
-    ndarray, shape (nx // 2 + 1, ny // 2 + 1)
+    ndarray, shape (nx, ny // 2 + 1)
         Positive, but zero at ``q = 0`` if the mean displacement is undefined and left out. [m]
 
     Raises
     ------
     InputError
-        If the transfer function is not positive.
+        If the transfer function of a body is not positive.
     """
-    symbol = np.array(kernel.transfer(*periodic_waves(shape, spacing)), dtype=float)
-    wrong = ~(np.isfinite(symbol) & (symbol > 0))
-    wrong[0, 0] = not 0 <= symbol[0, 0] < math.inf
-    if wrong.any():
-        expected = f"a positive transfer function, or zero at zero wave numbers, not {symbol[wrong][0]:g} m"
-        raise InputError(key="kernel", found=kernel, expected=expected)
-    return symbol
-
-
-def periodic_waves(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
-    """Return the wave numbers of a symbol under periodic pressure, along x and along y, which broadcast. [1/m]"""
     (nx, ny), (dx, dy) = shape, spacing
     qx = 2 * math.pi / (nx * dx) * np.arange(nx // 2 + 1.0)
     qy = 2 * math.pi / (ny * dy) * np.arange(ny // 2 + 1.0)
-    return qx[:, None], qy[None, :]
+    symbol = np.array(kernel.transfer(qx[:, None], qy[None, :]), dtype=float)
+    wrong = ~(np.isfinite(symbol) & (symbol > 0))
+    wrong[0, 0] = not 0 <= symbol[0, 0] < math.inf
+    if is_whole and wrong.any():
+        expected = f"a positive transfer function, or zero at zero wave numbers, not {symbol[wrong][0]:g} m"
+        raise InputError(key="kernel", found=kernel, expected=expected)
+    return np.concatenate([symbol, symbol[nx - len(symbol) : 0 : -1]])
 
 
 def wave_limits(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[float, float]:

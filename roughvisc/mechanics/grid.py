@@ -23,7 +23,7 @@ import numpy as np
 import scipy
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol, periodic_waves
+from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol
 
 try:
     import ducc0
@@ -98,7 +98,7 @@ class Grid:
     kernel : Kernel
         Displacement of the body's surface under pressure.
     symbol : array, optional
-        Transform of the kernel, if known from :meth:`symbol_of`. [m]
+        Transform of the kernel, if known. [m]
     xp : module
         NumPy, or CuPy for a grid on a device.
 
@@ -113,7 +113,7 @@ class Grid:
     cell_area : float
         Area of a cell. [m2]
     symbol : array
-        Transform of the kernel, in the order of the transforms. [m]
+        Transform of the kernel. [m]
     definite : bool
         Whether a uniform pressure displaces the surface.
     stiffest : float
@@ -150,10 +150,7 @@ class Grid:
         if boundary == "free":
             fast = scipy.fft.next_fast_len
             self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
-        if symbol is None and boundary == "free":
-            symbol = self._of_all_waves(free_space_symbol(kernel, self.points, spacing), self.points[0])
-        elif symbol is None:
-            symbol = self._of_all_waves(periodic_symbol(kernel, self.period, spacing), shape[0])
+        symbol = self.symbol_of(kernel) if symbol is None else symbol
         self.symbol = xp.asarray(symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.stiffest = float(self.symbol.max()) or spacing[0]
@@ -187,18 +184,13 @@ class Grid:
         rows, columns = (xp.arange(n) * m // n for n, m in zip(self.shape, self.coarse.shape, strict=True))
         return (rows[:, None] * self.coarse.shape[1] + columns).astype(np.int32).reshape(-1)
 
-    def symbol_of(self, kernel: Kernel) -> np.ndarray:
-        """Return the transform of a kernel of either sign. [m]"""
+    def symbol_of(self, kernel: Kernel, is_whole: bool = True) -> np.ndarray:
+        """Return the transform of a kernel, see :func:`~roughvisc.mechanics.body.periodic_symbol`. [m]"""
         if self.boundary == "free":
-            return self._of_all_waves(free_space_symbol(kernel, self.points, self.spacing), self.points[0])
-        symbol = np.asarray(kernel.transfer(*periodic_waves(self.period, self.spacing)), dtype=float)
-        return self._of_all_waves(symbol, self.shape[0])
-
-    def _of_all_waves(self, symbol: np.ndarray, count: int) -> np.ndarray:
-        """Return a symbol at all `count` wave numbers along x, from the non-negative ones."""
-        if self.boundary == "mirror":  # without the shortest waves, which are zero at the cells
-            return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
-        return np.concatenate([symbol, symbol[count - len(symbol) : 0 : -1]])
+            return free_space_symbol(kernel, self.points, self.spacing)
+        symbol = periodic_symbol(kernel, self.period, self.spacing, is_whole)
+        # without the shortest waves of a mirrored surface, which are zero at the cells
+        return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
 
     # ------------------------------------------------------------------------------------------------- displacement
 
@@ -229,8 +221,7 @@ class Grid:
     def _inverse_symbol(self) -> Array:
         symbol = self.symbol.copy()
         if self.boundary == "free":
-            periodic = periodic_symbol(self.kernel, self.shape, self.spacing)
-            symbol = self.xp.asarray(self._of_all_waves(periodic, self.shape[0]))
+            symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
         return (1 / symbol / self._divisor).astype(np.float32)
 

@@ -23,8 +23,7 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, check_one_body
-from roughvisc.mechanics.half_space import cell_mean, corner_sum, love_kernel
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum, love_kernel
 from roughvisc.mechanics.materials.creep import Material, laplace_compliance, lattice, nonnegative, over_frequencies
 from roughvisc.mechanics.materials.prony import Prony
 from roughvisc.units import Quantity, format_quantity, quantities

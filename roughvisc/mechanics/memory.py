@@ -309,7 +309,7 @@ class LayerMemory(Memory):
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
             alone = np.eye(len(waves.compliances))
-            self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one))) for one in alone]
+            self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one), is_whole=False)) for one in alone]
 
     def remaining(self, time: float) -> float:
         """Return one: a common rate of decay does not exist."""

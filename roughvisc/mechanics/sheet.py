@@ -15,8 +15,7 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
-from roughvisc.mechanics.body import Body, Kernel, check_one_body
-from roughvisc.mechanics.half_space import cell_mean, love_kernel
+from roughvisc.mechanics.body import Body, Kernel, cell_mean, check_one_body, love_kernel
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities

@@ -4,8 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol
-from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol, love_kernel
 
 
 def love_exact(x, y, dx, dy):

@@ -8,7 +8,7 @@ from scipy.special import j0
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.half_space import love_kernel
+from roughvisc.mechanics.body import love_kernel
 from roughvisc.mechanics.layer import effective_compliance
 
 
