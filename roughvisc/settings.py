@@ -90,7 +90,11 @@ class Numerics:
             if (found := getattr(self, name, words[0])) not in words:
                 raise InputError(key=name, found=found, expected=" or ".join(map(repr, words)))
         if self.time_step != "auto":
-            object.__setattr__(self, "time_step", number(self.time_step, "s", "time_step", above=0))
+            try:
+                step = number(self.time_step, "s", "time_step", above=0)
+            except InputError as error:
+                raise InputError(key=error.key, found=error.found, expected=f"'auto', or {error.expected}") from None
+            object.__setattr__(self, "time_step", step)
 
 
 @dataclass(frozen=True, kw_only=True)
