@@ -114,6 +114,7 @@ def two_hills(shape=(151, 133)):
 
 def same_results(followed, whole):
     """Two runs at a tolerance of 3e-3 agree, on a part of the surface and on the whole."""
+    assert followed.sizes == whole.sizes
     force, depth = float(whole.force.max()), float(whole.approach.max())
     cell = float(whole.x[1] - whole.x[0]) * float(whole.y[1] - whole.y[0])
     assert np.abs(followed.approach - whole.approach).max() < 3e-3 * depth
