@@ -127,7 +127,7 @@ def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -
     """Refuse a table with an unknown key."""
     for key in table:
         if key not in known:
-            name, expected = dotted(where, key), f"one of {', '.join(known)}"
+            name, expected = dotted(where, key), f"one of {', '.join(known)}" if known else "no key"
             raise InputError(f"{name}: unknown key{nearest(key, known)}", key=name, found=table[key], expected=expected)
 
 
@@ -136,7 +136,9 @@ def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> st
     known = list(known)
     if near := difflib.get_close_matches(str(word), known, n=1):
         return f"; did you mean {near[0]!r}?"
-    return f": expected one of {', '.join(known)}" if otherwise is None else otherwise
+    if otherwise is None:
+        return f": expected one of {', '.join(known)}" if known else ": expected no key"
+    return otherwise
 
 
 def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:

@@ -74,6 +74,11 @@ def test_condition__refuses_a_plain_value_at_the_step_and_a_table_at_its_key(ste
         condition(rough(), steps, "surface")
 
 
+def test_step_without_keys__refuses_a_key_in_words():
+    with pytest.raises(InputError, match=r"^surface.invert.a: unknown key: expected no key$"):
+        condition(rough(), {"invert": {"a": 1}}, "surface")
+
+
 @pytest.mark.parametrize("name", [name for name, step in STEPS.items() if step.argument])
 def test_steps__plain_value_is_the_argument_after_the_heights(name):
     assert list(arguments(STEPS[name].function))[1] == STEPS[name].argument
