@@ -50,6 +50,13 @@ def test_points__with_another_heading_are_refused_with_the_heading_to_write(tmp_
     assert "x [mm], y [mm], z [um]" in refusal(write_rows(tmp_path / "scan.csv", heading, POINTS, ","), unit="mm")
 
 
+@pytest.mark.parametrize("separator", [",", "; ", "\t", " "])
+def test_matrix__has_the_unit_of_its_heading(tmp_path, separator):
+    path = write_rows(tmp_path / "scan.txt", "height [nm]", MATRIX, separator)
+    np.testing.assert_allclose(open_scan(path, spacing=CELL), 1e-9 * np.array(MATRIX).T, rtol=1e-12)
+    assert "nm" in refusal(path, spacing=CELL, unit="um")
+
+
 # -- channels, units, sizes --------------------------------------------------------------------------------------------
 
 

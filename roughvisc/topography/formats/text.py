@@ -20,6 +20,7 @@ from roughvisc.errors import InputError
 from roughvisc.tables import decimal_mark, read_text
 from roughvisc.topography.formats.binary import read_with_surface_topography
 from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
+from roughvisc.units import is_quantity
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
 _COUNTS, _MISSING_COUNT = {0: 4096, 1: 32768, 2: 131072}, 2147483640
@@ -35,6 +36,8 @@ _UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
 _LENGTH = re.compile(r"(?<=[:=])\s*\d[\d.]*,\d+(?=\s*\w{0,2}m\b)")
 #: Heading of points with their units, such as ``x [mm]; y [mm]; z [um]``.
 _HEADING = re.compile(r"\W*".join(["^", *[r"(\w+)\s*[\[(]\s*(\w+)\s*[\])]"] * 3, "$"]), re.MULTILINE)
+#: Heading of a matrix with the unit of its heights, such as ``height [um]``.
+_MATRIX_HEADING = re.compile(r"\W*\w+\s*[\[(]\s*(\w+)\s*[\])]\W*")
 #: Marks of a missing height, and a number with either decimal mark or one of these.
 _MISSING = dict.fromkeys(("", "nan", "bad", "-", "#n/a", "n/a"), "nan")
 _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:e[+-]?\d++)?|nan|bad|-|(?:#?n/a)?", re.IGNORECASE)
@@ -102,14 +105,17 @@ def read_numbers(text: str) -> ScanFile:
     Three numbers on each line are points if the header does not state the size of a matrix.
     """
     lines, rows = read_table(text)
+    heading = _MATRIX_HEADING.fullmatch(lines[rows[0] - 1]) if rows and rows[0] else None
+    if heading and is_quantity(f"1 {heading[1]}", "m"):
+        lines[rows[0] - 1] = f"# Value units: {heading[1]}"  # as Gwyddion writes it
     text = "\n".join(lines) + "\n"
     if rows and len(lines[rows[0]].split()) == 3 and not _MATRIX_SIZE.search(text):
         points, stated = numbers(lines, rows), dict(_UNITS.findall(text))
-        if heading := _HEADING.search(text):
-            x, stated["Lateral"], y, other, _, stated["Value"] = heading.groups()
+        if named := _HEADING.search(text):
+            x, stated["Lateral"], y, other, _, stated["Value"] = named.groups()
             if (x.lower(), y.lower(), other) != ("x", "y", stated["Lateral"]):
                 expected = "expected 'x [mm], y [mm], z [um]', with one unit of x and y"
-                raise InputError(f"found the heading {heading[0].strip()!r}: {expected}")
+                raise InputError(f"found the heading {named[0].strip()!r}: {expected}")
         units = stated.get("Value"), stated.get("Lateral")
         return ScanFile("xyz", [Channel("points", lambda: points, *units, kind="points")])
     found = read_with_surface_topography(io.StringIO(text), "asc")
