@@ -197,7 +197,7 @@ def loading_warnings(
             f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
         )
         if scene.program.slides:
-            warnings["tolerance"] += " A slide takes one cell a step: its error falls with the square of the cell."
+            warnings["tolerance"] += " A slide takes one cell a step: its error falls with the square of the cell side."
     approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
     warnings["slope"] = slope_warning(loaded, boundary, approach)
     if boundary == "periodic":

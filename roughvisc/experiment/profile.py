@@ -36,8 +36,8 @@ MARGIN, BEYOND = 1.2, 1.05
 RIM = 2
 #: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
 WORTH_CROPPING, LARGEST_PART = 48, 0.8
-#: Factor by which the surface of an indenter grows, and the approach for which a new domain is chosen after contact has
-#: outgrown the last one.
+#: Factor by which the surface of an indenter grows; and, after contact has outgrown its domain, the factor of the
+#: estimated approach, or of the size of an indenter's contact, for which the next domain is chosen.
 GROWTH = 1.5
 #: Largest number of cells of an enlarged indenter.
 MOST_CELLS = 4096**2
@@ -206,24 +206,46 @@ def choose_surface(
         while enlarged is None and estimate.at_border and (larger := enlarged_indenter(profile.height)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             estimate = estimated(profile, compliance, program)
+    return profile, choose_domain(profile, body.kernel, estimate, GROWTH**outgrown), times, estimate.at_border
 
-    gap, shape, growth = profile.gap, (profile.gap.shape[0], profile.gap.shape[1]), GROWTH**outgrown
-    domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    corners = np.empty((0, 2), int)
-    is_connected = estimate.cells is not None and is_indenter(profile.height)
-    if not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING:
-        corners = estimate.cells if is_connected else np.argwhere(gap <= MARGIN * growth * estimate.approach)
-    if corners is not None and corners.size:
-        first, last = corners.min(axis=0), corners.max(axis=0)
-        wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int) if is_connected else 0
-        first, last = np.maximum(first - wider - RIM, 0), np.minimum(last + wider + RIM + 1, shape)
-        cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
-        inside = np.zeros(shape, bool)
-        inside[cells] = True
-        if inside.mean() <= LARGEST_PART:
-            outside = math.inf if is_connected else float(gap[~inside].min())
-            domain = replace(domain, cells=cells, outside=outside, is_whole=False)
-    return profile, domain, times, estimate.at_border
+
+def choose_domain(profile: Profile, kernel: Kernel, estimate: Estimate, growth: float) -> Domain:
+    """Return the part of a surface that may touch during a run.
+
+    Parameters
+    ----------
+    profile : Profile
+        The surface.
+    kernel : Kernel
+        Kernel of the body.
+    estimate : Estimate
+        Estimated contact. The domain is the whole surface if its approach is not known.
+    growth : float
+        Factor of the approach, or of the size of the contact of an indenter.
+    """
+    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
+    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    may_crop = not kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
+    if not may_crop or math.isinf(estimate.approach):
+        return whole
+    outside, wider, corners = math.inf, 0, estimate.cells
+    is_connected = corners is not None and is_indenter(profile.height)
+    if corners is None or not is_connected:
+        corners = np.argwhere(gap <= MARGIN * growth * estimate.approach)
+    if not corners.size:
+        return whole
+    first, last = corners.min(axis=0), corners.max(axis=0)
+    if is_connected:
+        wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int)
+    first, last = np.maximum(first - wider - RIM, 0), np.minimum(last + wider + RIM + 1, shape)
+    cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
+    inside = np.zeros(shape, bool)
+    inside[cells] = True
+    if inside.mean() > LARGEST_PART:
+        return whole
+    if not is_connected:
+        outside = float(gap[~inside].min())
+    return replace(whole, cells=cells, outside=outside, is_whole=False)
 
 
 def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:

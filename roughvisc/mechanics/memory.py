@@ -136,7 +136,7 @@ class Memory:
             own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
             driven = np.where(own > 0, own, 1.0)
             equal = np.where(own > 0, 1.0, 1 / weights)  # of the fluidity: what relaxes at the rate fluidity / glassy
-            # diag(own) + driven weights^T, in a basis in which it is symmetric
+            # eigenvalues of diag(own) + driven weights^T, which this scaling makes symmetric
             root = np.sqrt(driven * weights)
             rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
             self.rates = np.maximum(rates, 0.0)

@@ -44,15 +44,15 @@ STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
 #: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
 #: On a sphere it is a fifth, on a cone a third.
 STRAIGHT = 0.25
-#: Part of the tolerance that a pair may add to the error: usually, for bodies with hardly any instantaneous compliance,
-#: and at least, whatever the error so far. With 0.4 one soft case in eight has a row beyond the tolerance; 0.2 mends a
+#: Part of the tolerance that a pair may add to the error: usually; for bodies with hardly any instantaneous compliance;
+#: and however large the error is so far. With 0.4 one soft case in eight has a row beyond the tolerance; 0.2 mends a
 #: third to a half of them with 1.1 times the convolutions, 0.1 three in five with 1.26 times.
 SHARE, SHARE_SOFT, LEAST_SHARE = 0.4, 0.2, 0.2
 #: Part of the error so far that a pair may add in any case. The error of a slide depends on the cells and may be large.
 LEAST_CHANGE = 0.1
 #: Part of the tolerance for the error so far and the error of a pair; safety factor of the length of the next pair.
 BUDGET, PLANNED = 0.7, 0.9
-#: Tolerance of the contact solver, as a fraction of the tolerance.
+#: Tolerance of the contact solver over the tolerance of the run.
 SOLVER_SHARE = 0.2
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade: usually, and if
 #: cells leave the contact.

@@ -41,8 +41,8 @@ _LARGEST = 300.0
 _FITTED, _MEASURED = 30, 100
 #: Numbers of retardation times per decade to try in turn, and largest number of retardation times.
 _OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
-#: Shortest time over the shortest retardation time: the larger factor is more accurate before the shortest time, with
-#: more terms. Longest retardation time over the longest time.
+#: Shortest time over the shortest retardation time, two values to try: the larger one gives a better fit before the
+#: shortest time, with more terms. Longest retardation time over the longest time.
 _FASTER, _SLOWER = (3.0, 10.0), 3.0
 #: Number of times that the rows are reweighted to level the error.
 _LEVELLINGS = 6
