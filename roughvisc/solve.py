@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.experiment.base import Experiment, Outgrown, Rows
+from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import TITLE, label, with_steps
@@ -75,13 +75,11 @@ class Recorder:
     in_memory: ClassVar[bool] = True
     _arrays: list[Mapping[str, Array]] = field(default_factory=list)
 
-    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
-        self.plain.append(plain)
-        self._arrays.append(arrays)
-
-    def update(self, reached: Checkpoint) -> None:
-        """Record the progress, from which a stopped solve can continue. A solve in memory keeps no state."""
+    def append(self, row: Row, axis: str, wall_time: float) -> None:
+        """Record the values and fields of a row on an axis, and the wall time spent so far [s]; states are not kept."""
+        if row.values:
+            self.plain.append({axis: row.at, **row.values, "wall_time": wall_time, "kept": row.kept})
+            self._arrays.append(row.fields)
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows, an array (rows, x, y)."""
@@ -116,7 +114,8 @@ def solve(
     progress : bool or callable
         A progress bar, or a function called with the progress and its end.
     threads : int, optional
-        As in :func:`roughvisc.simulate`.
+        As in :func:`roughvisc.simulate`: by default all cores in the main thread of a process that ``multiprocessing``
+        did not start, otherwise one.
 
     Returns
     -------
@@ -130,6 +129,14 @@ def solve(
     ConvergenceError
         If the contact of a step or at a speed is not solved.
     """
+    if threads is None:
+        from dask.system import CPU_COUNT  # slow to import
+
+        threads = int(fft.get_workers())
+        is_alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
+        threads = CPU_COUNT if threads == 1 and is_alone else threads
+    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise InputError(key="threads", found=threads, expected="a whole number of at least 1, or None")
     problem = problem.resolved(experiment)
     height, settings = problem.height, problem.settings
     runs_again = settings.grid_error and isinstance(experiment, Loading)  # a curve of steady sliding does so itself
@@ -140,7 +147,7 @@ def solve(
         from roughvisc.progress import reporting  # slow to import
 
         bar = reporting("pressing" if experiment.axis == "time" else "sliding", experiment.progress)
-    with fft.set_workers(threads_for(threads)):
+    with fft.set_workers(threads):
         with bar as report:
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
         if settings.grid_error and isinstance(experiment, Loading):
@@ -159,57 +166,26 @@ def solve(
     return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
 
 
-def threads_for(requested: int | None) -> int:
-    """Return the number of threads of a case that this process computes.
-
-    Parameters
-    ----------
-    requested : int or None
-        Requested number. None: the value of ``scipy.fft.set_workers``. If it is not set either: all cores in the main
-        thread of a process that ``multiprocessing`` did not start, otherwise one.
-
-    Raises
-    ------
-    InputError
-        If the request is not a positive whole number.
-    """
-    if requested is not None:
-        if isinstance(requested, bool) or not isinstance(requested, int) or requested < 1:
-            raise InputError(key="threads", found=requested, expected="a whole number of at least 1, or None")
-        return requested
-    from dask.system import CPU_COUNT  # slow to import
-
-    stated = int(fft.get_workers())
-    alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
-    return CPU_COUNT if stated == 1 and alone else stated
-
-
 def solve_on_grid(
     problem: Problem, experiment: Experiment, recorder: Recorder, report: Progress | None = None
 ) -> xr.Dataset:
     """Solve on the given grid, without the runs on coarser grids and without labels."""
     began, reached = time.perf_counter(), recorder.latest
-    state, count, spent = reached.state, reached.rows, reached.wall_time
+    state, spent = reached.state, reached.wall_time
     while True:
         rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
         if reached.state is not None:
             log.info("resumes after %s", experiment.progress(reached.done, rows.end))
         try:
             for row in rows:
-                took = spent + time.perf_counter() - began
-                if row.values:
-                    values = {experiment.axis: row.at, **row.values, "wall_time": took}
-                    recorder.append(values | {"kept": row.kept}, row.fields)
-                    count += 1
+                recorder.append(row, experiment.axis, spent + time.perf_counter() - began)
                 if report is not None:
                     report(row.done, rows.end)
-                if row.state is not None:
-                    recorder.update(Checkpoint(row.state, row.done, count, took))
             return dataset_of(experiment, rows, recorder)
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")
             recorder.restart()
-            reached, state, count = recorder.latest, outgrown.args[0], 0
+            reached, state = recorder.latest, outgrown.args[0]
 
 
 def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dataset:

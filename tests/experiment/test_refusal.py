@@ -13,7 +13,6 @@ import roughvisc as rv
 from roughvisc.experiment import resources
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import Available, memory_available
-from roughvisc.solve import threads_for
 from roughvisc.study.case import read_cases
 
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")
@@ -75,15 +74,23 @@ def test_memory__is_limited_by_the_container_and_the_dask_worker(monkeypatch):
     assert memory_available().words == container.words
 
 
-def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone(monkeypatch):
-    assert threads_for(3) == 3
-    assert threads_for(None) == CPU_COUNT
+def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone():
+    ball, program = rv.sphere(1e-3, 2e-4, 9), rv.Program().load(1e-4, over=0)
+
+    def threads_of(requested):
+        found = []
+        settings = {"threads": requested, "progress": lambda *_: found.append(fft.get_workers())}
+        rv.simulate(ball, rv.elastic(1e6), program, **settings)
+        return found[0]
+
+    assert threads_of(3) == 3
+    assert threads_of(None) == CPU_COUNT
     with fft.set_workers(5):
-        assert threads_for(None) == 5
+        assert threads_of(None) == 5
     found = []
-    thread = threading.Thread(target=lambda: found.append(threads_for(None)))
+    thread = threading.Thread(target=lambda: found.append(threads_of(None)))
     thread.start()
     thread.join()
     assert found == [1], "beside other threads"
     with refused("threads", 0):
-        threads_for(0)
+        threads_of(0)

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.experiment.base import Row
 from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
 from roughvisc.solve import Checkpoint, Recorder
@@ -66,13 +67,28 @@ class CheckpointWriter(Recorder):
         self._waiting = 0  # size of the arrays in memory [byte]
         self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
 
-    def append(self, plain: dict[str, Any], arrays: Mapping[str, Array]) -> None:
-        """Record the values and the fields of a row; the caller must not change the arrays afterwards."""
-        super().append(plain, arrays)
-        for array in arrays.values():
+    def append(self, row: Row, axis: str, wall_time: float) -> None:
+        """Record a row; after an accepted step, its state too, and write a checkpoint if one is due.
+
+        The caller must not change the fields afterwards.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            If `stop` returns true; the caller writes a checkpoint.
+        """
+        super().append(row, axis, wall_time)
+        for array in row.fields.values():
             self._waiting += array.nbytes
         if self._waiting > _WAITING:
             self._write_rows()
+        if row.state is None:
+            return
+        self.latest = Checkpoint(row.state, row.done, len(self.plain), wall_time)
+        if self._stop is not None and self._stop():
+            raise KeyboardInterrupt
+        if time.monotonic() - self._last_save >= self._interval:
+            self.save()
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
         """Return a field of some rows as a lazy array (rows, x, y)."""
@@ -112,20 +128,6 @@ class CheckpointWriter(Recorder):
         except _DAMAGED as error:
             log.warning("%s: is damaged and not used: %s", path, error)
             self.restart()
-
-    def update(self, reached: Checkpoint) -> None:
-        """Record an accepted step, and write a checkpoint if one is due.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            If `stop` returns true; the caller writes a checkpoint.
-        """
-        self.latest = reached
-        if self._stop is not None and self._stop():
-            raise KeyboardInterrupt
-        if time.monotonic() - self._last_save >= self._interval:
-            self.save()
 
     def restart(self) -> None:
         """Delete all rows, because the run starts again."""

@@ -8,6 +8,7 @@ import xarray as xr
 from sample_results import hertz_creep, rough_creep
 
 import roughvisc as rv
+from roughvisc.experiment.base import Row
 from roughvisc.study.storage import netcdf
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.netcdf import open_result, write_result
@@ -59,7 +60,7 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
 
     recorder = CheckpointWriter(tmp_path / "rows")
     for row in range(shape[0]):
-        recorder.append({}, {"pressure": np.full(shape[1:], float(row))})
+        recorder.append(Row(row, {"force": 1.0}, {"pressure": np.full(shape[1:], float(row))}), "time", 0.0)
     assert list((tmp_path / "rows").iterdir()), "some rows are in a file"
     pressure = recorder.field("pressure", range(shape[0]), shape[1:])
     ds = ds.assign(pressure=(ds["pressure"].dims, pressure, ds["pressure"].attrs))
