@@ -20,9 +20,8 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
 
-#: Group of the steps in a result's file, and its title.
-STEPS, TITLE = "steps", "histories of every accepted step"
-_CARRIED = "roughvisc_steps"
+#: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result.
+STEPS, TITLE, CARRIED = "steps", "histories of every accepted step", "roughvisc_steps"
 #: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
 _ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
@@ -98,20 +97,13 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
             raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
 
 
-def with_steps(result: xr.Dataset, steps: xr.Dataset) -> xr.Dataset:
-    """Return a result that carries the history of its accepted steps."""
-    found = result.copy(deep=False)
-    found.encoding = {**result.encoding, _CARRIED: steps}
-    return found
-
-
 def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     """Return the history of the accepted steps that a result carries; None if it carries none, or another result's.
 
     When xarray combines several Datasets, it keeps the encoding of the first. Therefore the rows are compared with the
     steps.
     """
-    steps, named = result.encoding.get(_CARRIED), {"time", "force"} <= result.variables.keys()
+    steps, named = result.encoding.get(CARRIED), {"time", "force"} <= result.variables.keys()
     if steps is None or not named or result["force"].dims not in ((), ("time",)):
         return None
     rows = set(zip(np.ravel(result["time"]).tolist(), np.ravel(result["force"]).tolist(), strict=True))

@@ -21,7 +21,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
-from roughvisc.labels import TITLE, label, with_steps
+from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
 from roughvisc.topography.recipes import highest
@@ -234,11 +234,11 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
             lines.append(f"{subject}: {' '.join(text.split())}")
     if lines:
         dataset.attrs["warnings"] = "\n".join(lines)
-    if axis != "time":
-        return dataset
-    steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
-    every = {}
-    for name in ("time", *STEPPED):
-        if name in steps:
-            every[name] = STEP, steps[name].to_numpy()
-    return with_steps(dataset, label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time")))
+    if axis == "time":
+        steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
+        every = {}
+        for name in ("time", *STEPPED):
+            if name in steps:
+                every[name] = STEP, steps[name].to_numpy()
+        dataset.encoding[CARRIED] = label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time"))
+    return dataset

@@ -170,67 +170,6 @@ def area_error(step: Step, scene: Scene, length: float, pressure: Any, gap: Any,
 # ---------------------------------------------------------------------------------------------------------- warnings
 
 
-def loading_warnings(
-    scene: Scene, profile: Profile, dataset: xr.Dataset, choice: Choice, *, loaded: xr.DataArray, border: float | None
-) -> dict[str, str]:
-    """Return the warnings about a loading by subject; a text is empty if it does not apply.
-
-    Parameters
-    ----------
-    scene, profile : Scene, Profile
-        Input of the time stepping, and the surface.
-    dataset : Dataset
-        The result.
-    choice : Choice
-        Memory of the body.
-    loaded : DataArray
-        Heights of the domain, the part of the surface on which the contact was solved. [m]
-    border : float or None
-        End of the first step in which contact reached the border of a free surface. [s]
-    """
-    boundary, end, limit, warnings = scene.grid.boundary, scene.program.duration, scene.tolerance, dict[str, str]()
-    errors = dataset["stated_error"].values
-    missed = errors[errors > limit]
-    if missed.size:
-        warnings["tolerance"] = (
-            f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
-            f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
-        )
-        if scene.program.slides:
-            warnings["tolerance"] += " A slide takes one cell a step: its error falls with the square of the cell side."
-    approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
-    warnings["slope"] = slope_warning(loaded, boundary, approach)
-    if boundary == "periodic":
-        warnings["border"] = border_warning(profile.height)
-    if border is not None:
-        warnings["edge"] = (
-            f"Contact reached the border of the surface, first in the step to {border:.3g} s: its outline acts as the "
-            "edge of a punch, with pressure that no larger surface would have."
-        )
-
-    wakes, pressure = [], dataset["pressure"][-1].values if "pressure" in dataset else None
-    for axis in (0, 1):
-        period = profile.height.shape[axis] * profile.spacing[axis]
-        path, left = 0.0, dict[float, float]()
-        for segment in scene.program.segments:
-            if segment.slide is not None and segment.slide.axis == axis:
-                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
-                crept = scene.memory.compliance(min(period / speed, end))
-                left[speed] = 1.0 - crept / scene.memory.compliance(end)
-        # on a shorter path the contact does not reach the next wake
-        if path >= period / 2 and stands_alone(profile.height, pressure, axis):
-            wakes.append(wake_warning(left, period))
-    warnings["wake"] = " ".join(wakes)
-
-    off = max(choice.series_error, choice.misfit)
-    if off > limit:
-        warnings["series"] = (
-            f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
-            f"{limit:g} (memory): no passive material comes nearer to it."
-        )
-    return warnings
-
-
 def border_warning(height: xr.DataArray) -> str:
     """Return a warning if opposite borders of a periodic surface [m] do not meet, else ''."""
     x, y = border_mismatch(height)
@@ -284,6 +223,31 @@ def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> boo
     count = pressure.shape[axis]
     free = np.diff(touching, append=touching[0] + count) - 1
     return bool(free.max() >= _FREE * count)
+
+
+def wakes_of(scene: Scene, profile: Profile, pressure: Array | None) -> str:
+    """Return a warning if contacts slide into each other's wake in a program, else ''.
+
+    Parameters
+    ----------
+    scene, profile : Scene, Profile
+        Input of the time stepping, and the surface.
+    pressure : ndarray, shape (nx, ny), or None
+        Pressure at the last kept time, if kept. [Pa]
+    """
+    wakes, end = [], scene.program.duration
+    for axis in (0, 1):
+        period = profile.height.shape[axis] * profile.spacing[axis]
+        path, left = 0.0, dict[float, float]()
+        for segment in scene.program.segments:
+            if segment.slide is not None and segment.slide.axis == axis:
+                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
+                crept = scene.memory.compliance(min(period / speed, end))
+                left[speed] = 1.0 - crept / scene.memory.compliance(end)
+        # on a shorter path the contact does not reach the next wake
+        if path >= period / 2 and stands_alone(profile.height, pressure, axis):
+            wakes.append(wake_warning(left, period))
+    return " ".join(wakes)
 
 
 def wake_warning(left: Mapping[float, float], period: float) -> str:

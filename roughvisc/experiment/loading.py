@@ -14,14 +14,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
-from roughvisc.experiment.accuracy import area_error, error_columns, loading_warnings, memory_of
+from roughvisc.experiment.accuracy import area_error, border_warning, error_columns, memory_of, slope_warning, wakes_of
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
-from roughvisc.experiment.profile import BEYOND, Profile, choose_surface, enlarged_indenter
+from roughvisc.experiment.profile import BEYOND, Domain, Profile, choose_surface, enlarged_indenter
 from roughvisc.experiment.resources import WORTH_ASKING, require_loading
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
-from roughvisc.mechanics.memory import History
+from roughvisc.mechanics.memory import Choice, History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
@@ -84,8 +84,43 @@ class Loading(Experiment):
         return repr(self.program)
 
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
-        """Return all accepted steps; the kept ones are rows of the result."""
-        return LoadingRows(problem, self.program, state, in_memory=in_memory)
+        """Return all accepted steps, from rest or a state; the kept ones are rows of the result."""
+        height, body, settings = problem.height, problem.body, problem.settings
+        xp = arrays_of(settings.device)
+        if height.size >= WORTH_ASKING:
+            require_loading((height.sizes["x"], height.sizes["y"]), self.program, settings, body, in_memory)
+        given = Profile(height, settings.missing, body.kernel)
+        program = self.program.on_area(given.area)
+        check_program(given, program, settings.boundary)
+
+        before = (None, 0) if state is None else (state.enlarged, state.outgrown)
+        profile, domain, enlarged, reaches_border = choose_surface(given, problem, program, *before)
+        gap = np.ascontiguousarray(profile.gap[domain.cells])
+        present = None if profile.all_present else profile.present[domain.cells]
+        grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
+        choice = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
+        log.info("memory: %s", choice.note)
+        scene = Scene(
+            grid=grid,
+            gap=xp.asarray(gap),
+            memory=choice.memory,
+            program=program,
+            kept=kept_times(program, settings.times, profile.spacing),
+            tolerance=settings.tolerance,
+            time_step=None if settings.time_step == "auto" else settings.time_step,
+            present=None if present is None else xp.asarray(present),
+        )
+        return LoadingRows(
+            problem=replace(problem, height=profile.height),
+            end=program.duration,
+            scene=scene,
+            choice=choice,
+            profile=profile,
+            domain=domain,
+            area=given.area,
+            reaches_border=reaches_border,
+            state=on_device(state, xp) if state else LoadingState(enlarged=enlarged),
+        )
 
     def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that do not fit the program: name, value and expected value."""
@@ -106,66 +141,41 @@ class Loading(Experiment):
         return f"t = {unit(done):.3g} of {unit.text(end)}"
 
 
+@dataclass(eq=False, kw_only=True)
 class LoadingRows(Rows):
     """Accepted steps of a run, in order: values of all steps, and fields of the kept steps.
 
-    Parameters
-    ----------
-    problem : Problem
-        Surface, body and settings.
-    program : Program
-        The loading program.
-    state : LoadingState, optional
-        State from which the run continues. Default: rest.
-    in_memory : bool
-        Whether the kept fields stay in memory.
-
     Attributes
     ----------
+    problem : Problem
+        Surface, enlarged if necessary, body and settings.
+    end : float
+        Duration of the program. [s]
     scene : Scene
         Input of the time stepping: grid, gap, memory, program, kept times.
     choice : Choice
         Memory of the body, and its distance from the material.
+    profile : Profile
+        Arrays of the surface.
     domain : Domain
         Part of the surface on which the contact is solved.
     area : float
         Nominal area of the given surface. [m2]
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
+    state : LoadingState
+        State from which the run continues, then the last one of a row.
     """
 
-    def __init__(
-        self, problem: Problem, program: Program, state: LoadingState | None = None, *, in_memory: bool = True
-    ) -> None:
-        height, body, settings, self.end = problem.height, problem.body, problem.settings, program.duration
-        xp = arrays_of(settings.device)
-        if height.size >= WORTH_ASKING:
-            require_loading((height.sizes["x"], height.sizes["y"]), program, settings, body, in_memory)
-        given = Profile(height, settings.missing, body.kernel)
-        program = program.on_area(given.area)
-        check_program(given, program, settings.boundary)
-
-        before = (None, 0) if state is None else (state.enlarged, state.outgrown)
-        profile, self.domain, enlarged, self.reaches_border = choose_surface(given, problem, program, *before)
-        self.area, self._profile, self.problem = given.area, profile, replace(problem, height=profile.height)
-        self._start = on_device(state, xp) if state else LoadingState(enlarged=enlarged)
-        self._border = self._start.border
-
-        gap = np.ascontiguousarray(profile.gap[self.domain.cells])
-        present = None if profile.all_present else profile.present[self.domain.cells]
-        grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
-        self.choice = memory_of(body, program, settings, grid=grid, keeps_pressure=not self.domain.is_whole)
-        log.info("memory: %s", self.choice.note)
-        self.scene = Scene(
-            grid=grid,
-            gap=xp.asarray(gap),
-            memory=self.choice.memory,
-            program=program,
-            kept=kept_times(program, settings.times, profile.spacing),
-            tolerance=settings.tolerance,
-            time_step=None if settings.time_step == "auto" else settings.time_step,
-            present=None if present is None else xp.asarray(present),
-        )
+    problem: Problem
+    end: float
+    scene: Scene
+    choice: Choice
+    profile: Profile
+    domain: Domain
+    area: float
+    reaches_border: bool
+    state: LoadingState
 
     def __iter__(self) -> Iterator[Row]:
         """Compute the steps to the end of the program.
@@ -177,15 +187,15 @@ class LoadingRows(Rows):
         EdgeContactError
             If contact reaches the border of another free surface, unless the settings accept it.
         """
-        scene, start, largest, domain = self.scene, self._start, self._start.largest, self.domain
+        scene, largest, domain = self.scene, self.state.largest, self.domain
         every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
-        for step in march(scene, start.march):
+        for step in march(scene, self.state.march):
             point = step.point
             if is_free and point.force > 0:
                 touches = point.pressure > 0
                 at_border = bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
                 if (at_border and not domain.is_whole) or BEYOND * point.approach >= domain.outside:
-                    raise Outgrown(LoadingState(enlarged=start.enlarged, outgrown=start.outgrown + 1))
+                    raise Outgrown(LoadingState(enlarged=self.state.enlarged, outgrown=self.state.outgrown + 1))
                 if at_border:
                     self._reach_border(point.time)
 
@@ -196,25 +206,25 @@ class LoadingRows(Rows):
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= scene.tolerance
             largest = so_far if kept else largest
-            state, values, fields = None, {}, {}
+            values, fields = {}, {}
             if step.is_end:
-                state = LoadingState(step.state, largest, start.enlarged, start.outgrown, self._border)
+                self.state = replace(self.state, march=step.state, largest=largest)
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
             # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
             length = max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
             if kept or (not every and (by_load or not scene.is_soft(length))):
                 values, fields = self._row(step, length, stated, kept)
-            yield Row(point.time, values, fields, kept, state=state, done=point.time)
+            yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
 
     def _reach_border(self, time: float) -> None:
         """Record that contact reaches the border of a free surface, enlarge an indenter, or refuse the contact."""
-        start, (nx, ny) = self._start, self._profile.gap.shape
+        state, (nx, ny) = self.state, self.profile.gap.shape
         if self.problem.settings.edge == "accept":
-            self._border = time if self._border is None else self._border
+            self.state = state if state.border is not None else replace(state, border=time)
             return
-        if enlarged_indenter(self._profile.height) is not None:
-            raise Outgrown(LoadingState(enlarged=start.enlarged + 1, outgrown=start.outgrown))
+        if enlarged_indenter(self.profile.height) is not None:
+            raise Outgrown(LoadingState(enlarged=state.enlarged + 1, outgrown=state.outgrown))
         raise EdgeContactError(
             f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected "
             "contact inside it; use boundary='mirror' for a nominally flat scan, a larger scan, a smaller load, or "
@@ -237,7 +247,7 @@ class LoadingRows(Rows):
         kept : bool
             Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
         """
-        scene, profile, domain, point = self.scene, self._profile, self.domain, step.point
+        scene, profile, domain, point = self.scene, self.profile, self.domain, step.point
         grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
         displaced, pressure = scene.memory.displacement(point.history), point.pressure
         contact, displacement = pressure > 0, displaced[0]
@@ -301,12 +311,37 @@ class LoadingRows(Rows):
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
         """Return the result with the memory model and numbers for an audit, and its warnings."""
-        scene, choice, body = self.scene, self.choice, self.problem.body
-        loaded = self._profile.height[self.domain.cells]
-        warnings = loading_warnings(scene, self._profile, dataset, choice, loaded=loaded, border=self._border)
-        attributes = Loading(scene.program).facts(body, self.problem.height)
+        scene, profile, choice, limit, warnings = self.scene, self.profile, self.choice, self.scene.tolerance, {}
+        boundary, program, errors = scene.grid.boundary, scene.program, dataset["stated_error"].values
+        missed = errors[errors > limit]
+        if missed.size:
+            warnings["tolerance"] = (
+                f"{missed.size} of {errors.size} rows {'states' if missed.size == 1 else 'state'} an error above the "
+                f"tolerance {limit:g}, {missed.max():.3g} at worst (stated_error)."
+            )
+            note = " A slide takes one cell a step: its error falls with the square of the cell side."
+            warnings["tolerance"] += note if program.slides else ""
+        approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
+        warnings["slope"] = slope_warning(profile.height[self.domain.cells], boundary, approach)
+        if boundary == "periodic":
+            warnings["border"] = border_warning(profile.height)
+        if self.state.border is not None:
+            warnings["edge"] = (
+                f"Contact reached the border of the surface, first in the step to {self.state.border:.3g} s: its "
+                "outline acts as the edge of a punch, with pressure that no larger surface would have."
+            )
+        if program.slides:
+            pressure = dataset["pressure"][-1].values if "pressure" in dataset else None
+            warnings["wake"] = wakes_of(scene, profile, pressure)
+        off = max(choice.series_error, choice.misfit)
+        if off > limit:
+            warnings["series"] = (
+                f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
+                f"{limit:g} (memory): no passive material comes nearer to it."
+            )
+        attributes = Loading(program).facts(self.problem.body, profile.height)
         attributes |= {"memory": choice.note, "series_error": choice.series_error}
-        if cycles := scene.program.cycles:  # for the work in each cycle
+        if cycles := program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
         return dataset.assign_attrs(attributes), warnings
 

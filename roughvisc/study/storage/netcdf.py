@@ -26,7 +26,7 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
 from roughvisc.errors import InputError
-from roughvisc.labels import STEPS, label, steps_of, with_steps
+from roughvisc.labels import CARRIED, STEPS, label, steps_of
 from roughvisc.study.storage.folder import atomic_write, require_file, results_at, unusable
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
@@ -117,7 +117,9 @@ class ResultBackend(BackendEntrypoint):
             file.set_auto_chartostring(False)
             result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
             steps = _dataset(path, file.groups[STEPS]) if STEPS in file.groups else None
-        return result if steps is None else with_steps(result, steps.set_coords("time"))
+        if steps is not None:
+            result.encoding[CARRIED] = steps.set_coords("time")
+        return result
 
 
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
